@@ -1,0 +1,142 @@
+#pragma once
+// Estimating the free parameters of scenes from micrographs: what goes in (FitJob), what comes out (FitResult).
+// Method and statistics: docs/methods.md, "The fit".
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "birefit/image.h"
+#include "birefit/parameters.h"
+#include "birefit/render.h"
+#include "birefit/scene.h"
+
+namespace birefit {
+
+/// Variance of one pixel's counts: read_counts^2 + counts_per_photon * max(signal counts, 0).
+struct NoiseModel {
+  double read_counts = 0;
+  double counts_per_photon = 0;
+  bool estimated = false;  ///< from the image itself
+};
+
+/// One image of a fit, in memory. Values are counts, or transmission when calibration frames were given.
+struct Micrograph {
+  std::string name;   ///< for reports: the file name
+  Scene scene;
+  Image values;
+  Mask mask;          ///< 1 = usable; dead, saturated, non-finite, user-masked and out-of-ROI pixels are 0
+  Image variance_scale;  ///< calibration: variance of a value per variance of a count, (1/(parallel - dark))^2; else empty
+  ParameterRef gain, offset;  ///< linear: value = gain * intensity + offset; several micrographs may share one
+  std::optional<NoiseModel> noise;  ///< in counts; else estimated from the image
+  /// Pixel counts by reason, for the report.
+  int masked_by_user = 0, outside_roi = 0, saturated = 0, dead = 0, non_finite = 0;
+};
+
+struct FitOptions {
+  int threads = 0;             ///< 0 = all cores
+  int max_iterations = 100;
+  int scan_pixels = 4000;      ///< of the coarse scan, spread over all micrographs
+  int scan_candidates = 4;     ///< starts polished after the scan
+  std::function<void(const std::string&)> progress;  ///< called with one line now and then; may be empty
+  const std::atomic<bool>* interrupted = nullptr;    ///< set by Ctrl-C: end with the best state so far
+};
+
+struct FitJob {
+  ParameterTable parameters;
+  std::vector<Micrograph> micrographs;
+  std::optional<JointPrior> prior;
+  FitOptions options;
+  std::vector<std::string> warnings;  ///< gathered while reading the input
+};
+
+struct ParameterEstimate {
+  std::string name, unit;
+  double value = 0, stderr_ = 0;       ///< standard error; NaN when not identifiable
+  double interval95_low = 0, interval95_high = 0;  ///< Student t with FitResult::interval_degrees_of_freedom
+  double start = 0, lower = 0, upper = 0;
+  std::optional<double> prior_value, prior_sd;
+  bool at_bound = false;
+  bool linear = false;
+  /// "" or, at a physical limit, "upper" / "lower": the one-sided 95 % limit is in limit_value.
+  std::string limit;
+  double limit_value = 0;
+};
+
+/// Another minimum the data cannot exclude.
+struct RivalMinimum {
+  Theta theta;
+  double chi_square = 0;
+  double odds = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)) against the reported minimum
+};
+
+/// One eigen-direction of the scaled Fisher matrix (each parameter in units of its start range or value).
+struct FisherDirection {
+  std::vector<std::pair<std::string, double>> weights;  ///< unit vector, scaled
+  double stderr_ = 0;     ///< of the scaled combination
+  bool identifiable = true;
+  std::string words;      ///< "birefringence up 0.01 with diameter_um down 0.4: only their combination is known ..."
+};
+
+struct MicrographResult {
+  std::string name;
+  Image fitted;     ///< gain * intensity + offset, units of the micrograph's values
+  Image residual;   ///< values - fitted; NaN where not used
+  Image sigma;      ///< standard deviation used for whitening
+  int used = 0;     ///< pixels
+  double chi_square = 0;
+  double residual_rms = 0;        ///< units of the values
+  double signal_range = 0;        ///< of the fitted values, for judging the rms
+  NoiseModel noise;
+  RenderPlan plan;
+};
+
+/// The scan before the solver: objective along one parameter (for the report's chart).
+struct ScanTrace {
+  std::string name;
+  std::vector<double> value, chi_square;
+};
+
+struct Iteration {
+  int number = 0;
+  double chi_square = 0, step = 0;
+};
+
+struct FitResult {
+  bool converged = false;
+  bool interrupted = false;
+  bool ambiguous = false;
+  bool identifiable = true;
+  bool pinned = false;   ///< at a bound that is no physical limit
+  std::vector<ParameterEstimate> parameters;  ///< free ones in table order: searched first, then linear
+  std::vector<std::string> names;             ///< order of correlation and covariance
+  Eigen::MatrixXd covariance, correlation;    ///< parameters' own units
+  std::string covariance_kind;  ///< "white noise" | "scaled by reduced chi-square" | "clustered by image" | ..., in words
+  double interval_degrees_of_freedom = 0;     ///< of the t quantile behind interval95
+  double chi_square = 0, reduced_chi_square = 0;
+  int degrees_of_freedom = 0;
+  std::optional<JointPrior::FrameScatter> frame_scatter;  ///< several images in one fit
+  std::vector<RivalMinimum> rivals;
+  std::vector<FisherDirection> directions;
+  std::vector<MicrographResult> micrographs;
+  std::vector<ScanTrace> scans;
+  std::vector<Iteration> iterations;
+  int evaluations = 0;
+  double seconds = 0;
+  std::vector<std::string> warnings;   ///< sentences; empty when there is nothing to warn of
+  std::string verdict;                 ///< one paragraph in words
+  std::string solver_report;           ///< Ceres' own
+  Theta theta;                         ///< full table at the optimum
+
+  /// True when the run deserves exit code 0.
+  bool has_answer() const { return converged && !ambiguous && identifiable && !pinned && !interrupted; }
+};
+
+/// Estimates every free parameter. Deterministic: same job, same bits, whatever the number of threads.
+/// A job without usable pixels throws UserError; everything about the data's quality is in the result.
+FitResult fit(const FitJob& job);
+
+}  // namespace birefit

@@ -1,0 +1,88 @@
+#pragma once
+// Everything that touches files. Nobody outside io knows that files exist.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "birefit/fit.h"
+
+namespace birefit {
+
+/// What a config describes, read and checked completely; every mistake in it was reported at once (UserError).
+struct Config {
+  std::filesystem::path path;
+  std::string text;       ///< the file as read, for the echo
+  FitJob job;             ///< micrographs empty for render-only configs
+  Scene scene;            ///< of the first micrograph, or of `image_size_px`
+};
+
+enum class ConfigUse {
+  fit,     ///< images are required and loaded, `fit: auto` starts come from them
+  render,  ///< images are not loaded; the view comes from image_size_px or from the image's header
+};
+
+/// Reads a config (docs/configuration.md). `image` replaces the single micrograph's file.
+Config load_config(const std::filesystem::path& path, ConfigUse use,
+                   const std::optional<std::filesystem::path>& image = std::nullopt);
+
+// ---- images ---------------------------------------------------------------------------------------------------------
+
+struct ImageRequest {
+  std::filesystem::path path;
+  std::optional<int> page;             ///< of a multi-page file; required when there are several
+  std::string channel;                 ///< "r" | "g" | "b" | "mean"; "" = not chosen
+  Where where;                         ///< of the config entry, for errors
+};
+
+struct LoadedImage {
+  Image values;            ///< as stored: counts for integers, values for floats; linear light not yet applied
+  int bits = 0;            ///< 8 or 16 for integers, 32 for float
+  double top_code = 0;     ///< 255, 65535, or 0 for floats
+  double pixel_size_um = 0;  ///< 0 = the file does not state it
+  std::vector<std::string> notes;  ///< "alpha channel ignored", ...
+};
+
+/// Throws UserError: missing, truncated, empty, 1-bit, animated, palette, over 16384 x 16384 images; several pages or
+/// colour channels and none chosen (the message lists them).
+LoadedImage load_image(const ImageRequest& request);
+
+/// .tif, .exr: float; .png: 16-bit, value 1.0 = 65535 * scale. Written to a temporary name and renamed.
+void save_image(const Image& image, const std::filesystem::path& path);
+
+/// 8-bit grey or RGB PNG in memory (for reports). rgb: 3 bytes a pixel, row 0 on top.
+std::vector<unsigned char> encode_png(const std::vector<unsigned char>& samples, int width, int height, int channels);
+
+// ---- tables and text ------------------------------------------------------------------------------------------------
+
+/// Writes a whole file under a temporary name in the same folder, then renames: never half a file under the final
+/// name. Throws UserError (unwritable, disk full).
+void write_file(const std::filesystem::path& path, const std::string& content);
+
+struct Table {
+  std::vector<std::string> columns;
+  std::vector<std::vector<double>> rows;
+};
+/// Comma-separated numbers with one header line. Throws UserError naming line and column.
+Table load_table(const std::filesystem::path& path, Where where);
+
+// ---- start values from the image ------------------------------------------------------------------------------------
+
+struct DiscGuess {
+  double center_x_px = 0, center_y_px = 0, radius_px = 0;
+  double contrast = 0;  ///< signal of the disc over the background's noise; below about 3 there is no disc to see
+};
+/// Centre and radius of the one round object in a crossed-polarizer image (moments and symmetry, OpenCV).
+DiscGuess find_disc(const Image& values, const Mask& mask);
+
+// ---- results --------------------------------------------------------------------------------------------------------
+
+/// fit.json, report.html, fitted.tif, residual.tif, config.yaml, log.txt in `folder` (docs/configuration.md).
+void write_results(const std::filesystem::path& folder, const Config& config, const FitResult& result);
+std::string fit_json(const Config& config, const FitResult& result);
+std::string report_html(const Config& config, const FitResult& result);
+/// The short human summary for stdout.
+std::string summary(const FitResult& result);
+
+}  // namespace birefit

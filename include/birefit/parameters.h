@@ -1,0 +1,77 @@
+#pragma once
+// Every number of a scene that may vary is an entry of one table; a scene holds references into it, a render reads a
+// plain vector theta. Whether an entry is free is a property of the fit, never of the scene.
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "birefit/error.h"
+
+namespace birefit {
+
+/// What to do with a number: the three forms of docs/configuration.md.
+struct Parameter {
+  std::string name;   ///< config path, e.g. "sample.droplet.diameter_um"
+  std::string unit;   ///< "um", "deg", "V", "K", "px" or "" (dimensionless)
+  double value = 0;   ///< start of a fit, and what `render` uses
+  bool free = false;  ///< estimated by the fit
+  bool automatic = false;  ///< `fit: auto`: start (and bounds) come from the image
+  double lower = -std::numeric_limits<double>::infinity();  ///< fit bound
+  double upper = std::numeric_limits<double>::infinity();   ///< fit bound
+  std::optional<double> prior_sd;  ///< Gaussian prior centred on `value`
+  /// A bound that equals one of these is a physical limit (a length of zero, a pure number range), so that a fit
+  /// pinned there is an honest one-sided limit and not a failure.
+  double physical_lower = -std::numeric_limits<double>::infinity();
+  double physical_upper = std::numeric_limits<double>::infinity();
+  bool linear = false;  ///< gain or offset: solved exactly inside the fit, never searched
+  Where where;          ///< where the config gives it
+};
+
+/// Index into a ParameterTable. Default-constructed = "not given" (the scene part documents what that means).
+struct ParameterRef {
+  int index = -1;
+  explicit operator bool() const { return index >= 0; }
+  friend bool operator==(ParameterRef a, ParameterRef b) { return a.index == b.index; }
+};
+
+using Theta = std::vector<double>;
+
+class ParameterTable {
+ public:
+  ParameterRef add(Parameter parameter);
+  /// A number that is fixed and has no config path of its own (defaults).
+  ParameterRef add_constant(std::string name, double value, std::string unit = {});
+
+  int size() const { return static_cast<int>(parameters_.size()); }
+  Parameter& operator[](ParameterRef ref) { return parameters_.at(ref.index); }
+  const Parameter& operator[](ParameterRef ref) const { return parameters_.at(ref.index); }
+  Parameter& operator[](int index) { return parameters_.at(index); }
+  const Parameter& operator[](int index) const { return parameters_.at(index); }
+  ParameterRef find(const std::string& name) const;  ///< empty when absent
+  Theta values() const;
+
+ private:
+  std::vector<Parameter> parameters_;
+};
+
+/// A joint Gaussian prior from an earlier fit (docs/configuration.md, `prior:`).
+struct JointPrior {
+  std::string source;              ///< file it came from, for the report
+  std::vector<std::string> names;  ///< parameters of this fit, in the order of mean and covariance
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  double degrees_of_freedom = std::numeric_limits<double>::infinity();  ///< of the fit that made it: Student t
+  /// Relative standard deviation of one frame's own misfit, as the earlier fit measured it between its frames
+  /// (FitResult::frame_scatter), keyed like FrameScatter; nothing when it had a single frame.
+  struct FrameScatter {
+    double intensity_sd = 0;  ///< of a multiplicative error of the model intensity common to one frame
+    double degrees_of_freedom = 0;
+  };
+  std::optional<FrameScatter> frame_scatter;
+};
+
+}  // namespace birefit

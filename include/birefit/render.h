@@ -1,0 +1,73 @@
+#pragma once
+// The forward model: render(scene, parameters, theta) is a pure function.
+
+#include <array>
+#include <complex>
+#include <string>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "birefit/image.h"
+#include "birefit/scene.h"
+
+namespace birefit {
+
+/// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth.
+struct RenderPlan {
+  std::string method;               ///< transport method by name
+  std::string physics;              ///< "one_way" or "e_only"
+  std::vector<std::string> reasons; ///< one sentence for every rung: why it stopped or went on
+  double numerical_error = 0;       ///< expected, intensity fraction of the incident
+  double model_error = 0;           ///< of what the ceiling leaves out, same unit
+  std::vector<std::string> warnings;  ///< what is not modelled and may matter here
+  double cost_seconds = 0;          ///< expected for one image without derivatives, one thread
+
+  // The numerical choices themselves.
+  int steps = 1;                    ///< equal mesh steps in u (diagonal: 8 Gauss nodes each); 0 = use `mesh`
+  std::vector<double> mesh;         ///< adapted mesh in u
+  /// Samples per pixel side by distance from (sampling_center_x_px, _y_px), one entry per sampling_bin_px; 1 = the
+  /// point value with a second-order correction to the pixel's mean, n > 1 = n x n Gauss points.
+  std::vector<int> samples;
+  double sampling_bin_px = 1;
+  double sampling_center_x_px = 0, sampling_center_y_px = 0;
+};
+
+/// Chooses the cheapest method that holds scene.intensity_accuracy within scene.ceiling, at the values of theta.
+/// Throws UserError when a forced method cannot do the scene.
+RenderPlan plan(const Scene& scene, const Theta& theta);
+
+struct Rendering {
+  Image intensity;                ///< flux behind the analyser over flux behind the polarizer, per pixel
+  std::vector<Image> derivatives; ///< d intensity / d theta[active[j]]
+};
+
+/// Renders scene.view; every pixel is the mean over its area. `active` lists theta indices to differentiate by (angles
+/// in degrees, lengths in the unit of the parameter). Same bits whatever the number of threads (0 = all cores).
+Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active = {},
+                 int threads = 0);
+
+/// The same at chosen pixels only (column, row pairs): value[i], derivative(i, j). Used by the coarse scan.
+struct PixelRendering {
+  Eigen::VectorXd intensity;
+  Eigen::MatrixXd derivatives;
+};
+PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
+                             const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active = {},
+                             int threads = 0);
+
+/// One row of the `jones` table: complex transmission in the s, p basis of docs/conventions.md.
+struct JonesRow {
+  double theta_deg = 0, azimuth_deg = 0;  ///< slab scenes
+  int row = 0, column = 0;                ///< others
+  double wavelength_nm = 0;
+  std::complex<double> ss{}, ps{}, sp{}, pp{};  ///< ps: p in, s out
+};
+/// Slab scenes: one row per microscope direction; others: per pixel.
+std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta);
+
+/// Largest change of retardance phase (rad) anywhere in the image per unit of theta[index]; 0 when the parameter forms
+/// no fringes. The coarse scan steps by less than a radian of it.
+double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index);
+
+}  // namespace birefit

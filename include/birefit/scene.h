@@ -1,0 +1,157 @@
+#pragma once
+// What is in front of the camera: a sample, its material and surround, the microscope. A scene is immutable and holds
+// no numbers of its own: every number that may vary is a ParameterRef into the job's table (parameters.h).
+// Frames, signs and units: docs/conventions.md. Sources: docs/methods.md.
+
+#include <array>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "birefit/parameters.h"
+
+namespace birefit {
+
+// ---- materials ------------------------------------------------------------------------------------------------------
+
+/// n_e = n_o + birefringence, neither depends on anything. Ranges: n_o in [1, 4], birefringence in [-1, 1].
+struct ConstantIndices {
+  ParameterRef ordinary;
+  ParameterRef birefringence;
+};
+
+/// Steinberg TOG 2020 eq. 38, named preset "E44-steinberg2020": n_o = 1.53, n_e = 2.1942 - T / (750 K), 640 nm.
+/// Not a physical E44 (docs/methods.md); T in [250, 373] K.
+struct E44Steinberg2020 {
+  ParameterRef temperature_k;  ///< ignored where the sample has its own temperature profile (heated plate)
+};
+
+using Material = std::variant<ConstantIndices, E44Steinberg2020>;
+
+// ---- director fields ------------------------------------------------------------------------------------------------
+
+/// One fixed optic axis: either three components (normalised on use; a and -a are the same), or azimuth and tilt.
+struct UniformDirector {
+  std::array<ParameterRef, 3> axis;  ///< used when given
+  ParameterRef azimuth_deg;          ///< from +x, counter-clockwise in the image
+  ParameterRef tilt_deg;             ///< from the layer plane towards +z
+};
+
+/// Azimuth grows linearly with depth: azimuth(z) = azimuth_deg + twist_deg z/d; constant tilt = pretilt.
+struct TwistedDirector {
+  ParameterRef twist_deg;    ///< over the whole cell; > 0 is right-handed (x towards y as z grows)
+  ParameterRef azimuth_deg;  ///< at the entry face
+  ParameterRef pretilt_deg;
+};
+
+/// Radial hedgehog, n = r/|r|; with twist_deg != 0 the radial field turned about the optical axis by
+/// twist_deg (1 - r/R): homeotropic at the surface, twisted inside (no equilibrium, a fully coupled test scene).
+struct RadialDirector {
+  ParameterRef twist_deg;
+};
+
+// ---- samples --------------------------------------------------------------------------------------------------------
+
+/// Spherical droplet in an isotropic host; refraction at the sphere, focus on the mid plane.
+struct Droplet {
+  ParameterRef diameter_um;
+  RadialDirector director;
+};
+
+/// Plane-parallel cell, seen along its normal.
+struct Cell {
+  ParameterRef thickness_um;
+  std::variant<UniformDirector, TwistedDirector> director;
+};
+
+/// Heat conduction from a hot face at z = d into a plate at cold_k, a time fourier_number d^2 / diffusivity after
+/// the step (Carslaw & Jaeger; physics of docs/methods.md). T rises with z.
+struct HeatStep {
+  ParameterRef fourier_number;  ///< > 0
+  ParameterRef cold_k;
+  ParameterRef hot_k;
+};
+
+/// Plate with a fixed optic axis seen in a converging cone: image radius proportional to tan(incidence), half the
+/// smaller image side (pixel edge to pixel edge) at half_angle_deg. Conoscopic: an image of directions.
+struct Plate {
+  ParameterRef thickness_um;
+  UniformDirector director;
+  std::variant<std::monostate, HeatStep> heat;
+  ParameterRef half_angle_deg;  ///< in the outside medium, (0, 80]
+};
+
+/// Cubic crystal bar made birefringent by a transverse field. Retardance of a pixel = pi E d / half_wave_voltage_v with
+/// E d the local field times the electrode distance. Uniform: E d = bias_v. Varying: E d = bias_v (1 + sum_j c_j P_j(t)),
+/// t in [-1, 1] across the electrodes, P_j Legendre polynomials j = 1, 2, ..: the integral over the bar is the bias.
+struct Crystal {
+  ParameterRef half_wave_voltage_v;
+  ParameterRef bias_v;                 ///< sign not observable
+  bool field_along_y = true;           ///< else along x
+  ParameterRef slow_axis_deg;          ///< azimuth of the induced axis; 45 degrees from the field by default
+  std::vector<ParameterRef> field_legendre;  ///< c_1, c_2, ..; empty = uniform
+  /// Pixel rows (field along y; columns otherwise) of the electrodes, edge to edge; empty refs = the image's edges.
+  ParameterRef electrode_low_px, electrode_high_px;
+};
+
+/// Arbitrary depth profile (profile.csv of docs/configuration.md).
+struct SlabProfile {
+  enum class Interpolation { constant, linear, cubic };
+  struct Row {
+    double depth_um, ax, ay, az, n_o, n_e, k_o, k_e;
+  };
+  std::vector<Row> rows;  ///< axis normalised; at least 1 (constant) or 2 (linear), 4 (cubic)
+  Interpolation interpolation = Interpolation::constant;
+};
+struct Slab {
+  SlabProfile profile;
+};
+
+using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab>;
+
+// ---- microscope -----------------------------------------------------------------------------------------------------
+
+/// A direction in the outside medium.
+struct Direction {
+  double theta_deg = 0;    ///< from +z, [0, 90)
+  double azimuth_deg = 0;  ///< of the plane of incidence, from +x
+};
+
+struct Microscope {
+  ParameterRef wavelength_nm;  ///< vacuum
+  ParameterRef polarizer_deg;
+  ParameterRef analyzer_deg;
+  double bandwidth_nm = 0;   ///< FWHM, 0 = not stated; not modelled: enters the model error
+  double condenser_na = 0;   ///< 0 = not stated; not modelled: enters the model error
+  double objective_na = 0;   ///< 0 = not stated. Droplet rays leaving steeper than this are lost.
+  bool aplanatic = false;    ///< imaging: focal_plane (default) or aplanatic, docs/conventions.md
+  std::vector<Direction> directions;  ///< slab scenes
+};
+
+/// How pixels lie on the sample.
+struct View {
+  int width = 0, height = 0;
+  double pixel_size_um = 0;     ///< 0 for conoscopic plates, cells and crystals that need none
+  ParameterRef center_x_px;     ///< sample centre; pixel centres are integers, (0, 0) the top left pixel's
+  ParameterRef center_y_px;
+  ParameterRef rotation_deg;    ///< of the sample, counter-clockwise as seen in the image
+};
+
+/// The physics ceiling: what a render may leave out (docs/methods.md).
+enum class Ceiling {
+  one_way,  ///< E and H continuous, backward waves dropped (default)
+  e_only,   ///< only tangential E continuous: the source paper's
+};
+
+struct Scene {
+  Sample sample;
+  Material material;
+  ParameterRef surround_index;
+  Microscope microscope;
+  View view;
+  Ceiling ceiling = Ceiling::one_way;
+  double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold
+  std::string method = "auto";       ///< or a transport method's name
+};
+
+}  // namespace birefit

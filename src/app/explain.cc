@@ -1,0 +1,98 @@
+// birefit explain: which model and method would run, why, what it is expected to cost and to err.
+
+#include <iostream>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "app/commands.h"
+#include "birefit/io.h"
+
+namespace birefit {
+namespace {
+
+struct Arguments {
+  std::string config;
+  bool json = false;
+};
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) out += fmt::format("\\u{:04x}", static_cast<int>(c));
+    else out += c;
+  }
+  return out + "\"";
+}
+
+std::string quoted(const std::vector<std::string>& list) {
+  std::string out = "[";
+  for (const std::string& text : list) out += (out.size() > 1 ? ", " : "") + quoted(text);
+  return out + "]";
+}
+
+int run_explain(const Arguments& arguments) {
+  const Config config = load_config(arguments.config, ConfigUse::render);
+  const ParameterTable& table = config.job.parameters;
+  const Theta theta = table.values();
+  const RenderPlan chosen = plan(config.scene, theta);
+  std::vector<std::string> warnings = config.job.warnings;
+  warnings.insert(warnings.end(), chosen.warnings.begin(), chosen.warnings.end());
+
+  if (arguments.json) {
+    std::string free;
+    for (int i = 0; i < table.size(); ++i) {
+      if (!table[i].free) continue;
+      const double phase = table[i].linear ? 0 : fringe_phase_per_unit(config.scene, theta, i);
+      free += fmt::format("{}\n    {{\"name\": {}, \"unit\": {}, \"start\": {}, \"linear\": {}, \"fringe_rad_per_unit\": {}}}",
+                          free.empty() ? "" : ",", quoted(table[i].name), quoted(table[i].unit), table[i].value,
+                          table[i].linear, phase);
+    }
+    std::cout << fmt::format(
+        "{{\n  \"method\": {},\n  \"physics\": {},\n  \"reasons\": {},\n  \"numerical_error\": {},\n  \"model_error\": {},\n"
+        "  \"cost_seconds\": {},\n  \"warnings\": {},\n  \"parameters\": [{}]\n}}\n",
+        quoted(chosen.method), quoted(chosen.physics), quoted(chosen.reasons), chosen.numerical_error, chosen.model_error,
+        chosen.cost_seconds, quoted(warnings), free);
+    return kExitDone;
+  }
+  std::cout << fmt::format("Image      {} x {} pixels", config.scene.view.width, config.scene.view.height);
+  if (config.scene.view.pixel_size_um > 0) std::cout << fmt::format(" of {:g} um", config.scene.view.pixel_size_um);
+  std::cout << fmt::format("\nPhysics    {}\nMethod     {}\n", chosen.physics, chosen.method);
+  for (const std::string& reason : chosen.reasons) std::cout << "           " << reason << "\n";
+  std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} (intensity, fraction of the incident)\n",
+                           chosen.numerical_error, chosen.model_error);
+  std::cout << fmt::format("Cost       {:.3g} s an image on one thread\n", chosen.cost_seconds);
+  bool any = false;
+  for (int i = 0; i < table.size(); ++i) {
+    const Parameter& parameter = table[i];
+    if (!parameter.free) continue;
+    std::cout << (any ? "           " : "Fitted     ") << parameter.name;
+    any = true;
+    if (parameter.linear) {
+      std::cout << " (linear: solved exactly)\n";
+      continue;
+    }
+    std::cout << fmt::format(" from {:g} {}", parameter.value, parameter.unit);
+    const double phase = fringe_phase_per_unit(config.scene, theta, i);
+    const double span = parameter.upper - parameter.lower;
+    if (phase * span > 1)
+      std::cout << fmt::format(", forms fringes: {:.3g} rad between its bounds, scanned before the solver", phase * span);
+    std::cout << "\n";
+  }
+  if (!any) std::cout << "Fitted     nothing\n";
+  for (const std::string& warning : warnings) std::cout << "Warning    " << warning << "\n";
+  return kExitDone;
+}
+
+}  // namespace
+
+Command add_explain_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("explain", "which model and method would run, why, and what it costs and errs");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  command->add_flag("--json", arguments->json, "for scripts");
+  return {command, [arguments] { return run_explain(*arguments); }};
+}
+
+}  // namespace birefit

@@ -1,0 +1,90 @@
+// birefit fit: estimates the parameters that the config marks `fit`.
+
+#include <atomic>
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include <unistd.h>
+
+#include "app/commands.h"
+#include "app/output.h"
+#include "birefit/io.h"
+
+namespace birefit {
+namespace {
+
+std::atomic<bool> g_interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
+
+void on_interrupt(int) {
+  g_interrupted = true;
+  // The first Ctrl-C ends the fit with what it has; a second one ends the program.
+  std::signal(SIGINT, SIG_DFL);
+}
+
+struct Arguments {
+  std::string config;
+  std::string image;
+  std::string out;
+  int threads = -1;
+  bool quiet = false;
+  bool json = false;
+};
+
+int run_fit(const Arguments& arguments) {
+  Problems problems;
+  Config config;
+  try {
+    config = load_config(arguments.config, ConfigUse::fit,
+                         arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image));
+  } catch (const UserError& error) {
+    problems.add(error);
+  }
+  const std::filesystem::path config_path(arguments.config);
+  const std::filesystem::path out = arguments.out.empty() ? config_path.stem().string() + "-fit" : arguments.out;
+  std::unique_ptr<OutputFolder> folder;
+  try {
+    folder = std::make_unique<OutputFolder>(out);
+  } catch (const UserError& error) {
+    problems.add(error);
+  }
+  problems.throw_if_any();
+
+  FitJob& job = config.job;
+  if (arguments.threads >= 0) job.options.threads = arguments.threads;
+  job.options.interrupted = &g_interrupted;
+  const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
+  if (terminal)
+    job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
+  std::signal(SIGINT, on_interrupt);
+  const FitResult result = fit(job);
+  if (terminal) std::cerr << "\r\033[K" << std::flush;
+  write_results(out, config, result);
+  folder->keep();
+  std::signal(SIGINT, SIG_DFL);
+
+  if (arguments.json) {
+    std::cout << fit_json(config, result) << "\n";
+  } else if (!arguments.quiet) {
+    std::cout << summary(result) << "Report: " << (out / "report.html").string() << "\n";
+  }
+  return result.has_answer() ? kExitDone : kExitNoAnswer;
+}
+
+}  // namespace
+
+Command add_fit_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("fit", "estimate the parameters marked `fit`");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  command->add_option("--image", arguments->image, "use this image in place of micrograph.image");
+  command->add_option("--out", arguments->out, "folder for the results; default: the config's name + \"-fit\", here");
+  add_threads_option(*command, arguments->threads);
+  command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
+  command->add_flag("--json", arguments->json, "print fit.json in place of the summary");
+  return {command, [arguments] { return run_fit(*arguments); }};
+}
+
+}  // namespace birefit

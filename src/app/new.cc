@@ -1,0 +1,128 @@
+// birefit new: commented configs to start from.
+
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "app/commands.h"
+#include "birefit/error.h"
+
+namespace birefit {
+namespace {
+
+const char* const kDroplet = R"(# A nematic droplet between polarizers. `birefit fit THIS_FILE` estimates what is marked `fit`.
+micrograph:
+  image: droplet.tif           # 8 or 16 bit or float; colour images also need channel: r | g | b | mean
+  pixel_size_um: 0.05          # of the sample, not of the camera
+  gain: {fit: auto}            # counts = gain * intensity + offset
+  offset: {fit: auto}
+  center_px: {fit: auto}       # found in the image
+  # roi_px: [20, 20, 236, 236] # x0, y0, x1, y1, end exclusive
+sample:
+  droplet:
+    diameter_um: {value: 9.3, fit: [8.5, 10.0]}
+    director: {radial: {}}     # radial hedgehog
+  material:
+    ordinary: 1.52
+    birefringence: {value: 0.2, fit: [0.1, 0.3]}
+  surround: {index: 1.43}      # of the host around the droplet
+microscope:
+  light: {wavelength_nm: 590}
+  polarizer_deg: 0             # from +x, counter-clockwise in the image
+  analyzer_deg: 90
+  objective_na: 0.8
+)";
+
+const char* const kCell = R"(# A flat cell seen along its normal, for example 90 degrees twisted nematic.
+micrograph:
+  image: cell.tif
+  gain: {fit: auto}            # known illumination (a calibrated instrument) tells far more than one grey level:
+  offset: 0                    # write gain: 1.0e4 if you know it
+sample:
+  cell:
+    thickness_um: 5
+    director:
+      twisted: {twist_deg: 90, azimuth_deg: 0, pretilt_deg: 0}   # or uniform: {azimuth_deg: 45, tilt_deg: 0}
+  material:
+    ordinary: 1.52
+    birefringence: {value: 0.1, fit: [0.05, 0.15]}
+  surround: {index: 1.5}       # the glass; 1.0 when left out
+microscope:
+  light: {wavelength_nm: 590}
+  polarizer_deg: 0
+  analyzer_deg: 90
+)";
+
+const char* const kPlate = R"(# A heated plate in a converging cone: pixel radius is proportional to tan(incidence).
+micrograph:
+  image: conoscopy.tif
+  gain: {fit: auto}
+  offset: {fit: auto}
+sample:
+  plate:
+    thickness_um: 800
+    director: {uniform: {axis: [-0.353553, 0.353553, -0.866025]}}
+    heat:                      # a step of the temperature at one face; T rises with depth
+      fourier_number: {value: 0.1, fit: [0.005, 0.5]}
+      cold_k: 278
+      hot_k: 368
+    view: {half_angle_deg: 15} # incidence at half the smaller side of the image
+  material: {name: E44-steinberg2020}
+microscope:
+  light: {wavelength_nm: 640}
+  polarizer_deg: 0
+  analyzer_deg: 90
+)";
+
+const char* const kCrystal = R"(# A cubic crystal bar between electrodes: the applied voltage makes it birefringent.
+micrographs:                   # frames share every parameter that their `set` does not name
+  - {image: 400V.png, set: {sample.crystal.bias_v: 400}}
+  - {image: 800V.png, set: {sample.crystal.bias_v: 800}}
+micrograph:                    # what all of them have in common
+  roi_px: [70, 78, 430, 142]   # x0, y0, x1, y1, end exclusive: the bar
+  gain: {fit: auto}
+  offset: {fit: auto}
+calibration: {dark: dark.png, parallel: parallel.png, crossed: crossed_0V.png}
+sample:
+  crystal:
+    half_wave_voltage_v: {value: 1500, fit: [800, 3000]}
+    field_along: y             # from electrode to electrode in the image
+microscope:
+  light: {wavelength_nm: 1550}
+  polarizer_deg: 0
+  analyzer_deg: 90
+)";
+
+const char* const kSlab = R"(# A depth profile: `birefit jones THIS_FILE --out jones.csv` gives its transmission matrices.
+sample:
+  slab:
+    profile: profile.csv       # columns depth_um, ax, ay, az, n_o, n_e and optionally k_o, k_e
+    interpolation: constant    # constant | linear | cubic
+  surround: {index: 1.0}
+microscope:
+  light: {wavelength_nm: 590}
+  directions:                  # in the outside medium
+    - {theta_deg: 0, azimuth_deg: 0}
+    - {theta_deg: 20, azimuth_deg: 30}
+)";
+
+}  // namespace
+
+Command add_new_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("new", "print a commented config to start from");
+  auto kind = std::make_shared<std::string>();
+  command->add_option("KIND", *kind, "droplet, cell, plate, crystal or slab")->required();
+  return {command, [kind] {
+            const std::map<std::string, const char*> templates = {
+                {"droplet", kDroplet}, {"cell", kCell}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}};
+            if (*kind == "shell") throw UserError({}, "new shell: shells come later", "known: droplet, cell, plate, crystal, slab");
+            const auto found = templates.find(*kind);
+            if (found == templates.end())
+              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, cell, plate, crystal, slab");
+            std::cout << found->second;
+            return kExitDone;
+          }};
+}
+
+}  // namespace birefit

@@ -1,0 +1,84 @@
+#include "app/output.h"
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <iostream>
+
+#include <unistd.h>
+
+#include "birefit/error.h"
+
+namespace birefit {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Permissions alone do not tell (full disk, read-only mount, root): a file is written and removed.
+bool can_write_in(const fs::path& folder) {
+  const fs::path probe = folder / (".birefit-probe-" + std::to_string(::getpid()));
+  bool written = false;
+  {
+    std::ofstream stream(probe, std::ios::binary);
+    written = static_cast<bool>(stream << "birefit");
+    stream.close();
+    written = written && !stream.fail();
+  }
+  std::error_code ignored;
+  fs::remove(probe, ignored);
+  return written;
+}
+
+}  // namespace
+
+OutputFolder::OutputFolder(const fs::path& folder) {
+  std::error_code code;
+  if (fs::exists(folder, code) && !fs::is_directory(folder, code))
+    throw UserError({folder.string()}, "is a file, expected a folder for the results", "choose another --out");
+  std::vector<fs::path> missing;
+  for (fs::path part = fs::absolute(folder).lexically_normal(); !part.empty() && !fs::exists(part, code);
+       part = part.parent_path()) {
+    missing.insert(missing.begin(), part);
+    if (part == part.parent_path()) break;
+  }
+  for (const fs::path& part : missing) {
+    if (part.filename().empty()) continue;  // a trailing slash
+    if (!fs::create_directory(part, code) || code) {
+      for (auto made = made_.rbegin(); made != made_.rend(); ++made) fs::remove(*made, code);
+      throw UserError({folder.string()}, "cannot be created as a folder for the results", "choose another --out");
+    }
+    made_.push_back(part);
+  }
+  if (!can_write_in(folder)) {
+    for (auto made = made_.rbegin(); made != made_.rend(); ++made) fs::remove(*made, code);
+    throw UserError({folder.string()}, "cannot be written to (permissions, or the disk is full)", "choose another --out");
+  }
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code ignored;
+  // remove, not remove_all: a folder that holds anything stays.
+  for (auto made = made_.rbegin(); made != made_.rend(); ++made) fs::remove(*made, ignored);
+}
+
+void check_output_file(const fs::path& file, const std::vector<std::string>& extensions) {
+  std::string extension = file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end()) {
+    std::string known;
+    for (const std::string& e : extensions) known += (known.empty() ? "" : ", ") + e;
+    throw UserError({file.string()}, "the name of the output must end in " + known);
+  }
+  std::error_code code;
+  if (fs::is_directory(file, code)) throw UserError({file.string()}, "is a folder, expected the name of a file");
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, code)) throw UserError({file.string()}, "its folder " + folder.string() + " does not exist");
+  if (!can_write_in(folder))
+    throw UserError({file.string()}, "its folder cannot be written to (permissions, or the disk is full)");
+}
+
+void print_warnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) std::cerr << "warning: " << warning << "\n";
+}
+
+}  // namespace birefit

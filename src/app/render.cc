@@ -1,0 +1,63 @@
+// birefit render: the forward image at the config's values.
+
+#include <iostream>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "app/commands.h"
+#include "app/output.h"
+#include "birefit/io.h"
+
+namespace birefit {
+namespace {
+
+struct Arguments {
+  std::string config;
+  std::string out;
+  int threads = 0;
+  bool quiet = false;
+};
+
+int run_render(const Arguments& arguments) {
+  Problems problems;
+  Config config;
+  try {
+    config = load_config(arguments.config, ConfigUse::render);
+  } catch (const UserError& error) {
+    problems.add(error);
+  }
+  try {
+    check_output_file(arguments.out, {".exr", ".tif", ".tiff", ".png"});
+  } catch (const UserError& error) {
+    problems.add(error);
+  }
+  problems.throw_if_any();
+
+  const Theta theta = config.job.parameters.values();
+  const RenderPlan chosen = plan(config.scene, theta);
+  const Rendering rendering = render(config.scene, chosen, theta, {}, arguments.threads);
+  save_image(rendering.intensity, arguments.out);
+  if (!arguments.quiet) {
+    print_warnings(config.job.warnings);
+    print_warnings(chosen.warnings);
+    std::cout << fmt::format("{}: {} x {} pixels, method {} ({}), numerical error {:.1e}, model error {:.1e}\n",
+                             arguments.out, rendering.intensity.width(), rendering.intensity.height(), chosen.method,
+                             chosen.physics, chosen.numerical_error, chosen.model_error);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+Command add_render_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("render", "the forward image at the config's values");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  command->add_option("--out", arguments->out, "image to write: .exr, .tif (float) or .png (16 bit)")->required();
+  add_threads_option(*command, arguments->threads);
+  command->add_flag("--quiet", arguments->quiet, "print nothing");
+  return {command, [arguments] { return run_render(*arguments); }};
+}
+
+}  // namespace birefit

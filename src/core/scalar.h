@@ -1,0 +1,370 @@
+#pragma once
+// The numbers every kernel is written for: double, Pack (one ray per SIMD lane) and Dual<Pack, N> (first derivatives
+// by N parameters, over lanes). Kernels are templates on the scalar and use only what this header offers, so tests may
+// also run them with ceres::Jet, the oracle for derivatives.
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <type_traits>
+
+#include <xsimd/xsimd.hpp>
+
+namespace birefit {
+
+/// One ray per SIMD lane: 8 doubles with AVX-512, 4 with AVX2, 2 with SSE2 or NEON.
+using Pack = xsimd::batch<double>;
+inline constexpr int kLanes = static_cast<int>(Pack::size);
+
+using std::acos;
+using std::asin;
+using std::asinh;
+using std::atan2;
+using std::cos;
+using std::cosh;
+using std::erfc;
+using std::exp;
+using std::fabs;
+using std::log;
+using std::sin;
+using std::sinh;
+using std::sqrt;
+using std::tan;
+
+/// The plain number type under a scalar: double for double, Pack for Pack and Dual<Pack, N>.
+template <class S>
+struct ScalarTraits {
+  using Plain = S;
+  static constexpr int derivatives = 0;
+};
+template <class S>
+using PlainOf = typename ScalarTraits<S>::Plain;
+
+/// Value without derivatives.
+inline double plain(double x) { return x; }
+inline Pack plain(const Pack& x) { return x; }
+
+/// lane-wise condition ? a : b. Both sides are computed: never for "x < eps", only for piecewise definitions.
+inline double select(bool condition, double a, double b) { return condition ? a : b; }
+inline Pack select(const Pack::batch_bool_type& condition, const Pack& a, const Pack& b) {
+  return xsimd::select(condition, a, b);
+}
+inline double min_of(double a, double b) { return a < b ? a : b; }
+inline double max_of(double a, double b) { return a > b ? a : b; }
+inline Pack min_of(const Pack& a, const Pack& b) { return xsimd::min(a, b); }
+inline Pack max_of(const Pack& a, const Pack& b) { return xsimd::max(a, b); }
+inline double largest(double x) { return x; }
+inline double largest(const Pack& x) {
+  alignas(64) double lanes[kLanes];
+  x.store_aligned(lanes);
+  double result = lanes[0];
+  for (int i = 1; i < kLanes; ++i) result = lanes[i] > result ? lanes[i] : result;
+  return result;
+}
+inline double lane(double x, int) { return x; }
+inline double lane(const Pack& x, int i) { return x.get(static_cast<std::size_t>(i)); }
+inline void sin_cos(double x, double& s, double& c) {
+  s = std::sin(x);
+  c = std::cos(x);
+}
+inline void sin_cos(const Pack& x, Pack& s, Pack& c) {
+  const auto both = xsimd::sincos(x);
+  s = both.first;
+  c = both.second;
+}
+template <class T>
+T square(const T& x) {
+  return x * x;
+}
+
+/// Forward-mode derivative number: value and N partial derivatives, over any base scalar (nests).
+template <class B, int N>
+struct Dual {
+  B value{};
+  std::array<B, N> d{};
+
+  Dual() {
+    value = B(0.0);
+    d.fill(B(0.0));
+  }
+  Dual(const B& v) : value(v) { d.fill(B(0.0)); }  // NOLINT: constants mix freely with duals
+  template <class T>
+    requires(std::is_arithmetic_v<T> && !std::is_same_v<T, B>)
+  Dual(T v) : value(B(static_cast<double>(v))) {  // NOLINT
+    d.fill(B(0.0));
+  }
+  /// f(x) with derivative f'(x): the chain rule.
+  Dual chain(const B& f, const B& slope) const {
+    Dual r;
+    r.value = f;
+    for (int i = 0; i < N; ++i) r.d[i] = slope * d[i];
+    return r;
+  }
+  Dual& operator+=(const Dual& o) { return *this = *this + o; }
+  Dual& operator-=(const Dual& o) { return *this = *this - o; }
+  Dual& operator*=(const Dual& o) { return *this = *this * o; }
+
+  friend Dual operator+(const Dual& a, const Dual& b) {
+    Dual r;
+    r.value = a.value + b.value;
+    for (int i = 0; i < N; ++i) r.d[i] = a.d[i] + b.d[i];
+    return r;
+  }
+  friend Dual operator-(const Dual& a, const Dual& b) {
+    Dual r;
+    r.value = a.value - b.value;
+    for (int i = 0; i < N; ++i) r.d[i] = a.d[i] - b.d[i];
+    return r;
+  }
+  friend Dual operator-(const Dual& a) {
+    Dual r;
+    r.value = -a.value;
+    for (int i = 0; i < N; ++i) r.d[i] = -a.d[i];
+    return r;
+  }
+  friend Dual operator*(const Dual& a, const Dual& b) {
+    Dual r;
+    r.value = a.value * b.value;
+    for (int i = 0; i < N; ++i) r.d[i] = a.d[i] * b.value + a.value * b.d[i];
+    return r;
+  }
+  friend Dual operator/(const Dual& a, const Dual& b) {
+    Dual r;
+    const B inverse = B(1.0) / b.value;
+    r.value = a.value * inverse;
+    for (int i = 0; i < N; ++i) r.d[i] = (a.d[i] - r.value * b.d[i]) * inverse;
+    return r;
+  }
+  // Constants (double or base) without the work of a full dual.
+  friend Dual operator+(const Dual& a, double b) {
+    Dual r = a;
+    r.value = a.value + B(b);
+    return r;
+  }
+  friend Dual operator+(double a, const Dual& b) { return b + a; }
+  friend Dual operator-(const Dual& a, double b) { return a + (-b); }
+  friend Dual operator-(double a, const Dual& b) { return -b + a; }
+  friend Dual operator*(const Dual& a, double b) { return a.chain(a.value * B(b), B(b)); }
+  friend Dual operator*(double a, const Dual& b) { return b * a; }
+  friend Dual operator/(const Dual& a, double b) { return a * (1.0 / b); }
+  friend Dual operator/(double a, const Dual& b) {
+    const B inverse = B(1.0) / b.value;
+    const B f = B(a) * inverse;
+    return b.chain(f, -f * inverse);
+  }
+};
+
+template <class B, int N>
+struct ScalarTraits<Dual<B, N>> {
+  using Plain = PlainOf<B>;
+  static constexpr int derivatives = N;
+};
+template <class B, int N>
+PlainOf<B> plain(const Dual<B, N>& x) {
+  return plain(x.value);
+}
+template <class C, class B, int N>
+Dual<B, N> select(const C& condition, const Dual<B, N>& a, const Dual<B, N>& b) {
+  Dual<B, N> r;
+  r.value = select(condition, a.value, b.value);
+  for (int i = 0; i < N; ++i) r.d[i] = select(condition, a.d[i], b.d[i]);
+  return r;
+}
+template <class B, int N>
+Dual<B, N> min_of(const Dual<B, N>& a, const Dual<B, N>& b) {
+  return select(plain(a) < plain(b), a, b);
+}
+template <class B, int N>
+Dual<B, N> max_of(const Dual<B, N>& a, const Dual<B, N>& b) {
+  return select(plain(a) > plain(b), a, b);
+}
+template <class B, int N>
+Dual<B, N> sqrt(const Dual<B, N>& x) {
+  const B root = sqrt(x.value);
+  return x.chain(root, B(0.5) / root);
+}
+template <class B, int N>
+Dual<B, N> exp(const Dual<B, N>& x) {
+  const B e = exp(x.value);
+  return x.chain(e, e);
+}
+template <class B, int N>
+Dual<B, N> log(const Dual<B, N>& x) {
+  return x.chain(log(x.value), B(1.0) / x.value);
+}
+template <class B, int N>
+void sin_cos(const Dual<B, N>& x, Dual<B, N>& s, Dual<B, N>& c) {
+  B sv, cv;
+  sin_cos(x.value, sv, cv);
+  s = x.chain(sv, cv);
+  c = x.chain(cv, -sv);
+}
+template <class B, int N>
+Dual<B, N> sin(const Dual<B, N>& x) {
+  Dual<B, N> s, c;
+  sin_cos(x, s, c);
+  return s;
+}
+template <class B, int N>
+Dual<B, N> cos(const Dual<B, N>& x) {
+  Dual<B, N> s, c;
+  sin_cos(x, s, c);
+  return c;
+}
+template <class B, int N>
+Dual<B, N> sinh(const Dual<B, N>& x) {
+  return x.chain(sinh(x.value), cosh(x.value));
+}
+template <class B, int N>
+Dual<B, N> cosh(const Dual<B, N>& x) {
+  return x.chain(cosh(x.value), sinh(x.value));
+}
+template <class B, int N>
+Dual<B, N> asinh(const Dual<B, N>& x) {
+  return x.chain(asinh(x.value), B(1.0) / sqrt(x.value * x.value + B(1.0)));
+}
+template <class B, int N>
+Dual<B, N> erfc(const Dual<B, N>& x) {
+  return x.chain(erfc(x.value), B(-1.1283791670955126) * exp(-(x.value * x.value)));
+}
+
+// Oracles such as ceres::Jet bring no sin_cos, select, ... of their own; these serve any scalar that has sin and cos.
+template <class S>
+  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
+void sin_cos(const S& x, S& s, S& c) {
+  s = sin(x);
+  c = cos(x);
+}
+template <class S>
+  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
+S select(bool condition, const S& a, const S& b) {
+  return condition ? a : b;
+}
+template <class S>
+  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
+S max_of(const S& a, const S& b) {
+  return a > b ? a : b;
+}
+template <class S>
+  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
+S min_of(const S& a, const S& b) {
+  return a < b ? a : b;
+}
+
+// ---- functions entire in their argument, so that value, derivative and lanes all survive at zero ----------------------
+
+/// cos(sqrt(q)), any real q (cosh for negative q). |q| small or moderate: phases of one step.
+/// sinc_sq(q) = sin(sqrt q)/sqrt q. Both from one sin_cos; derivatives from d cos_sq/dq = -sinc_sq/2,
+/// d sinc_sq/dq = (cos_sq - sinc_sq)/(2 q), the latter by its Taylor series where the quotient cancels.
+/// This version is for q >= 0, which is what real rotations produce.
+template <class S>
+struct CosSinc {
+  S cos_sq, sinc_sq;
+};
+template <class B>
+B sinc_slope(const B& q, const B& cos_sq, const B& sinc_sq) {
+  // (cos_sq - sinc_sq)/(2q) = -1/6 + q/60 - q^2/1680 + q^3/90720 - q^4/7983360: next term below 1e-12 for q < 0.03.
+  const B series = B(-1.0 / 6) + q * (B(1.0 / 60) + q * (B(-1.0 / 1680) + q * (B(1.0 / 90720) - q * B(1.0 / 7983360))));
+  const auto small = plain(q) < PlainOf<B>(0.03);
+  const B safe = select(small, B(1.0), q);
+  return select(small, series, (cos_sq - sinc_sq) / (safe * B(2.0)));
+}
+template <class S>
+  requires(ScalarTraits<S>::derivatives == 0)
+CosSinc<S> cos_sinc_sq(const S& q) {
+  const S root = sqrt(max_of(q, S(1e-40)));
+  S s, c;
+  sin_cos(root, s, c);
+  return {c, s / root};
+}
+template <class B, int N>
+CosSinc<Dual<B, N>> cos_sinc_sq(const Dual<B, N>& q) {
+  const CosSinc<B> f = cos_sinc_sq(q.value);
+  return {q.chain(f.cos_sq, f.sinc_sq * B(-0.5)), q.chain(f.sinc_sq, sinc_slope(q.value, f.cos_sq, f.sinc_sq))};
+}
+
+// ---- small vectors and complex numbers over any scalar -----------------------------------------------------------------
+
+template <class S>
+struct Vec3 {
+  S x, y, z;
+};
+template <class S>
+Vec3<S> operator+(const Vec3<S>& a, const Vec3<S>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class S>
+Vec3<S> operator*(const S& s, const Vec3<S>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+template <class S>
+S dot(const Vec3<S>& a, const Vec3<S>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class S>
+Vec3<S> normalized(const Vec3<S>& a) {
+  return (S(1.0) / sqrt(dot(a, a))) * a;
+}
+
+/// std::complex is unspecified for anything but float and double.
+template <class S>
+struct Complex {
+  S re, im;
+  Complex() : re(S(0.0)), im(S(0.0)) {}
+  Complex(const S& r) : re(r), im(S(0.0)) {}  // NOLINT: real numbers are complex numbers
+  Complex(const S& r, const S& i) : re(r), im(i) {}
+};
+template <class S>
+Complex<S> operator+(const Complex<S>& a, const Complex<S>& b) {
+  return {a.re + b.re, a.im + b.im};
+}
+template <class S>
+Complex<S> operator-(const Complex<S>& a, const Complex<S>& b) {
+  return {a.re - b.re, a.im - b.im};
+}
+template <class S>
+Complex<S> operator-(const Complex<S>& a) {
+  return {-a.re, -a.im};
+}
+template <class S>
+Complex<S> operator*(const Complex<S>& a, const Complex<S>& b) {
+  return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+}
+template <class S>
+Complex<S> operator*(const S& a, const Complex<S>& b) {
+  return {a * b.re, a * b.im};
+}
+template <class S>
+Complex<S> operator/(const Complex<S>& a, const Complex<S>& b) {
+  const S inverse = S(1.0) / (b.re * b.re + b.im * b.im);
+  return {(a.re * b.re + a.im * b.im) * inverse, (a.im * b.re - a.re * b.im) * inverse};
+}
+template <class S>
+Complex<S> times_i(const Complex<S>& a) {
+  return {-a.im, a.re};
+}
+template <class S>
+Complex<S> conj(const Complex<S>& a) {
+  return {a.re, -a.im};
+}
+template <class S>
+S norm(const Complex<S>& a) {
+  return a.re * a.re + a.im * a.im;
+}
+template <class S>
+Complex<S> exp(const Complex<S>& a) {
+  S s, c;
+  sin_cos(a.im, s, c);
+  const S e = exp(a.re);
+  return {e * c, e * s};
+}
+/// Principal root, Re >= 0, written for Re a > 0 or Im a away from zero: the normal components of waves that travel.
+/// With Im a >= 0 the root has Im >= 0: the wave decays along +z.
+template <class S>
+Complex<S> sqrt(const Complex<S>& a) {
+  const S modulus = sqrt(norm(a));
+  const S re = sqrt((modulus + a.re) * S(0.5));
+  return {re, a.im / (re * S(2.0))};
+}
+
+}  // namespace birefit

@@ -1,0 +1,15 @@
+#pragma once
+// Parallel loops whose result does not depend on the number of threads: every index writes only its own output.
+
+#include <functional>
+
+namespace birefit {
+
+/// Cores to use for `requested` (0 = all).
+int thread_count(int requested);
+
+/// Calls body(i) for i in [0, n), spread over threads in blocks; returns when all are done. The first exception of a
+/// body is rethrown here.
+void parallel_for(int n, int threads, const std::function<void(int)>& body);
+
+}  // namespace birefit

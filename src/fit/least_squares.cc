@@ -1,0 +1,560 @@
+#include "fit/least_squares.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+
+#include "birefit/render.h"
+#include "fit/statistics.h"
+
+namespace birefit::estimation {
+namespace {
+
+constexpr Eigen::Index kTileRows = 4096;
+
+/// Symmetric square root rows R with R^T R = covariance^-1. Scaled to correlations first and the eigenvalues floored,
+/// so that parameters of very different size and correlations of -0.99999 keep their digits.
+Eigen::MatrixXd whitening_root(const Eigen::MatrixXd& covariance) {
+  constexpr double kFloor = 1e-13;
+  const Eigen::VectorXd inverse_sd = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse_sd.asDiagonal() * covariance *
+                                                             inverse_sd.asDiagonal());
+  const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(kFloor * eigen.eigenvalues().maxCoeff());
+  return values.cwiseSqrt().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose() * inverse_sd.asDiagonal();
+}
+
+/// Solution of a small positive semi-definite system; directions without information stay at zero.
+Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
+  constexpr double kUnseen = 1e-14;
+  const Eigen::VectorXd scale =
+      matrix.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * matrix * scale.asDiagonal());
+  const double cut = kUnseen * std::max(eigen.eigenvalues().cwiseAbs().maxCoeff(), 1e-300);
+  const Eigen::VectorXd inverse = eigen.eigenvalues().unaryExpr([&](double v) { return v > cut ? 1 / v : 0.0; });
+  return scale.asDiagonal() *
+         (eigen.eigenvectors() * (inverse.asDiagonal() * (eigen.eigenvectors().transpose() * (scale.asDiagonal() * right))));
+}
+
+int position(const std::vector<int>& indices, int index) {
+  const auto found = std::find(indices.begin(), indices.end(), index);
+  return found == indices.end() ? -1 : static_cast<int>(found - indices.begin());
+}
+
+}  // namespace
+
+Unknowns Unknowns::of(const FitJob& job) {
+  Unknowns unknowns;
+  std::vector<bool> linear(job.parameters.size(), false);
+  for (const Micrograph& micrograph : job.micrographs)
+    for (const ParameterRef ref : {micrograph.gain, micrograph.offset})
+      if (ref) linear[ref.index] = true;
+  for (int i = 0; i < job.parameters.size(); ++i)
+    if (job.parameters[i].free) (linear[i] ? unknowns.linear : unknowns.searched).push_back(i);
+  return unknowns;
+}
+
+LeastSquares::LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vector<RenderPlan> plans,
+                           std::vector<PixelSet> pixels)
+    : job_(job), unknowns_(unknowns), plans_(std::move(plans)), theta_(job.parameters.values()) {
+  for (std::size_t g = 0; g < pixels.size(); ++g) {
+    Frame frame;
+    frame.set = std::move(pixels[g]);
+    frame.begin = pixel_rows_;
+    frame.count = frame.set.value.size();
+    frame.inverse_sigma = frame.set.sigma.cwiseInverse();
+    frame.inverse_sigma_norm = frame.inverse_sigma.norm();
+    frame.gain = job.micrographs[g].gain ? position(unknowns_.linear, job.micrographs[g].gain.index) : -1;
+    frame.offset = job.micrographs[g].offset ? position(unknowns_.linear, job.micrographs[g].offset.index) : -1;
+    for (Eigen::Index begin = 0; begin < frame.count; begin += kTileRows)
+      tiles_.push_back({static_cast<int>(g), begin, std::min(kTileRows, frame.count - begin)});
+    pixel_rows_ += frame.count;
+    frames_.push_back(std::move(frame));
+  }
+  set_priors();
+  if (prior_root_.rows() > 0) tiles_.push_back({-1, 0, prior_root_.rows()});
+  intensity_.resize(pixel_rows_);
+  residual_.resize(pixel_rows_ + prior_root_.rows());
+  whitened_value_.resize(pixel_rows_);
+  whitened_intensity_.resize(pixel_rows_);
+  whitened_one_.resize(pixel_rows_);
+  set_misfit(std::vector<Misfit>(frames_.size()));
+}
+
+void LeastSquares::set_misfit(const std::vector<Misfit>& misfit) {
+  misfit_ = misfit;
+  for (std::size_t g = 0; g < frames_.size(); ++g) {
+    Frame& frame = frames_[g];
+    frame.shape_factor = 1 / std::sqrt(misfit_[g].shape_variance);
+    const double ratio = misfit_[g].mean_sd * frame.inverse_sigma_norm;  // of the mean's misfit to its noise
+    frame.mean_factor = misfit_[g].mean_follows_shape ? frame.shape_factor : 1 / std::sqrt(1 + ratio * ratio);
+    auto value = whitened_value_.segment(frame.begin, frame.count);
+    value = frame.set.value;
+    whiten(frame, value);
+    auto one = whitened_one_.segment(frame.begin, frame.count);
+    one.setOnes();
+    whiten(frame, one);
+  }
+}
+
+/// Multiplies by the inverse square root of diag(sigma^2) with the misfit's two parts. With u = 1/sigma normalised the
+/// generalised mean is the component along u of the noise-whitened vector, so that the inverse square root of
+/// I + (mean_sd |1/sigma|)^2 u u^T is another factor along u (Sherman & Morrison).
+void LeastSquares::whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const {
+  rows.array() *= frame.inverse_sigma.array();
+  if (frame.shape_factor == 1 && frame.mean_factor == 1) return;
+  if (frame.shape_factor == frame.mean_factor) {
+    rows *= frame.shape_factor;
+    return;
+  }
+  const double norm = frame.inverse_sigma_norm;
+  const double along = frame.inverse_sigma.dot(rows) / norm;
+  rows *= frame.shape_factor;
+  rows += ((frame.mean_factor - frame.shape_factor) * along / norm) * frame.inverse_sigma;
+}
+
+void LeastSquares::set_priors() {
+  const int n = unknowns_.size();
+  std::vector<Eigen::RowVectorXd> rows;
+  std::vector<double> target;
+  const auto column_of = [&](int table_index) {
+    for (int j = 0; j < n; ++j)
+      if (unknowns_.table_index(j) == table_index) return j;
+    return -1;
+  };
+  for (int j = 0; j < n; ++j) {
+    const Parameter& parameter = job_.parameters[unknowns_.table_index(j)];
+    if (!parameter.prior_sd) continue;
+    rows.push_back(Eigen::RowVectorXd::Unit(n, j) / *parameter.prior_sd);
+    target.push_back(parameter.value / *parameter.prior_sd);
+  }
+  if (job_.prior && !job_.prior->names.empty()) {
+    const JointPrior& prior = *job_.prior;
+    const Eigen::MatrixXd root = whitening_root(prior.covariance);
+    for (Eigen::Index i = 0; i < root.rows(); ++i) {
+      Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(n);
+      double mean = root.row(i).dot(prior.mean);
+      for (std::size_t k = 0; k < prior.names.size(); ++k) {
+        const ParameterRef ref = job_.parameters.find(prior.names[k]);
+        const int column = ref ? column_of(ref.index) : -1;
+        if (column >= 0) row[column] += root(i, static_cast<Eigen::Index>(k));
+        // A parameter that is known here conditions the others on its value.
+        else mean -= root(i, static_cast<Eigen::Index>(k)) *
+                     (ref ? job_.parameters[ref].value : prior.mean[static_cast<Eigen::Index>(k)]);
+      }
+      rows.push_back(row);
+      target.push_back(mean);
+    }
+  }
+  prior_root_.resize(static_cast<Eigen::Index>(rows.size()), n);
+  prior_target_.resize(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    prior_root_.row(static_cast<Eigen::Index>(i)) = rows[i];
+    prior_target_[static_cast<Eigen::Index>(i)] = target[i];
+  }
+}
+
+void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
+  const Eigen::Index p = searched.size();
+  for (Eigen::Index j = 0; j < p; ++j) theta_[unknowns_.searched[j]] = searched[j];
+  has_derivatives_ = false;
+  if (derivatives) searched_columns_.resize(residual_.size(), p);
+  const std::vector<int> active = derivatives ? unknowns_.searched : std::vector<int>{};
+  ++evaluations_;
+  for (std::size_t g = 0; g < frames_.size(); ++g) {
+    Frame& frame = frames_[g];
+    const Scene& scene = job_.micrographs[g].scene;
+    const std::vector<std::array<int, 2>>& pixels = frame.set.pixels;
+    auto intensity = intensity_.segment(frame.begin, frame.count);
+    // A whole image is cheaper by its symmetries and rows; a small part of it pixel by pixel.
+    if (2 * pixels.size() > static_cast<std::size_t>(scene.view.width) * scene.view.height) {
+      const Rendering rendering = render(scene, plans_[g], theta_, active, job_.options.threads);
+      const auto gather = [&](const Image& image, auto&& out) {
+        for (Eigen::Index i = 0; i < frame.count; ++i) out[i] = image(pixels[i][0], pixels[i][1]);
+      };
+      gather(rendering.intensity, intensity);
+      for (std::size_t j = 0; j < active.size(); ++j)
+        gather(rendering.derivatives[j], searched_columns_.col(j).segment(frame.begin, frame.count));
+    } else {
+      const PixelRendering rendering = render_pixels(scene, plans_[g], theta_, pixels, active, job_.options.threads);
+      intensity = rendering.intensity;
+      if (derivatives && p > 0) searched_columns_.middleRows(frame.begin, frame.count) = rendering.derivatives;
+    }
+    frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
+    frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
+    auto whitened = whitened_intensity_.segment(frame.begin, frame.count);
+    whitened = intensity;
+    whiten(frame, whitened);
+  }
+  solve_linear();
+  if (!derivatives) return;
+
+  const int l = static_cast<int>(unknowns_.linear.size());
+  for (std::size_t g = 0; g < frames_.size(); ++g) {
+    const Frame& frame = frames_[g];
+    const double gain = known(job_.micrographs[g].gain, 1);
+    for (Eigen::Index j = 0; j < p; ++j) {
+      auto column = searched_columns_.col(j).segment(frame.begin, frame.count);
+      column *= gain;
+      whiten(frame, column);
+    }
+  }
+  if (prior_root_.rows() > 0) searched_columns_.bottomRows(prior_root_.rows()) = prior_root_.leftCols(p);
+
+  // How the freely solved linear unknowns follow: projection = (X^T X)^-1 X^T D.
+  projection_ = Eigen::MatrixXd::Zero(l, p);
+  std::vector<int> moving;
+  for (int j = 0; j < l; ++j) {
+    const Parameter& parameter = job_.parameters[unknowns_.linear[j]];
+    const double value = theta_[unknowns_.linear[j]];
+    if (value > parameter.lower && value < parameter.upper) moving.push_back(j);
+  }
+  if (!moving.empty() && p > 0) {
+    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l), cross = Eigen::MatrixXd::Zero(l, p);
+    for (const Frame& frame : frames_) {
+      const auto x = whitened_intensity_.segment(frame.begin, frame.count);
+      const auto one = whitened_one_.segment(frame.begin, frame.count);
+      const auto d = searched_columns_.middleRows(frame.begin, frame.count);
+      if (frame.gain >= 0) {
+        gram(frame.gain, frame.gain) += x.squaredNorm();
+        cross.row(frame.gain) += x.transpose() * d;
+      }
+      if (frame.offset >= 0) {
+        gram(frame.offset, frame.offset) += one.squaredNorm();
+        cross.row(frame.offset) += one.transpose() * d;
+      }
+      if (frame.gain >= 0 && frame.offset >= 0) {
+        const double mixed = x.dot(one);
+        gram(frame.gain, frame.offset) += mixed;
+        gram(frame.offset, frame.gain) += mixed;
+      }
+    }
+    if (prior_root_.rows() > 0) {
+      gram += prior_root_.rightCols(l).transpose() * prior_root_.rightCols(l);
+      cross += prior_root_.rightCols(l).transpose() * prior_root_.leftCols(p);
+    }
+    const Eigen::MatrixXd solved = solve_semidefinite(gram(moving, moving), cross(moving, Eigen::all));
+    for (std::size_t j = 0; j < moving.size(); ++j) projection_.row(moving[j]) = solved.row(static_cast<Eigen::Index>(j));
+  }
+  has_derivatives_ = true;
+}
+
+void LeastSquares::solve_linear() {
+  const int l = static_cast<int>(unknowns_.linear.size());
+  const int p = static_cast<int>(unknowns_.searched.size());
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(l);
+  for (std::size_t g = 0; g < frames_.size() && l > 0; ++g) {
+    const Frame& frame = frames_[g];
+    const auto x = whitened_intensity_.segment(frame.begin, frame.count);
+    const auto one = whitened_one_.segment(frame.begin, frame.count);
+    const auto y = whitened_value_.segment(frame.begin, frame.count);
+    const double gain = frame.gain < 0 ? known(job_.micrographs[g].gain, 1) : 0;
+    const double offset = frame.offset < 0 ? known(job_.micrographs[g].offset, 0) : 0;
+    const double xx = x.squaredNorm(), x1 = x.dot(one), oo = one.squaredNorm();
+    if (frame.gain >= 0) {
+      gram(frame.gain, frame.gain) += xx;
+      right[frame.gain] += x.dot(y) - gain * xx - offset * x1;
+    }
+    if (frame.offset >= 0) {
+      gram(frame.offset, frame.offset) += oo;
+      right[frame.offset] += one.dot(y) - gain * x1 - offset * oo;
+    }
+    if (frame.gain >= 0 && frame.offset >= 0) {
+      gram(frame.gain, frame.offset) += x1;
+      gram(frame.offset, frame.gain) += x1;
+    }
+  }
+  Eigen::VectorXd searched(p);
+  for (int j = 0; j < p; ++j) searched[j] = theta_[unknowns_.searched[j]];
+  if (prior_root_.rows() > 0 && l > 0) {
+    gram += prior_root_.rightCols(l).transpose() * prior_root_.rightCols(l);
+    right += prior_root_.rightCols(l).transpose() * (prior_target_ - prior_root_.leftCols(p) * searched);
+  }
+  // Bounds by an active set: what leaves its bounds furthest is held there and the rest solved again.
+  std::vector<int> moving(l);
+  for (int j = 0; j < l; ++j) moving[j] = j;
+  Eigen::VectorXd linear = Eigen::VectorXd::Zero(l);
+  while (!moving.empty()) {
+    std::vector<int> held;
+    for (int j = 0; j < l; ++j)
+      if (std::find(moving.begin(), moving.end(), j) == moving.end()) held.push_back(j);
+    Eigen::VectorXd target = right(moving);
+    if (!held.empty()) target -= gram(moving, held) * linear(held);
+    const Eigen::VectorXd solved = solve_semidefinite(gram(moving, moving), target);
+    int worst = -1;
+    double worst_excess = 0;
+    for (std::size_t j = 0; j < moving.size(); ++j) {
+      const Parameter& parameter = job_.parameters[unknowns_.linear[moving[j]]];
+      const double value = solved[static_cast<Eigen::Index>(j)];
+      linear[moving[j]] = value;
+      const double excess = std::max(parameter.lower - value, value - parameter.upper) *
+                            std::sqrt(std::max(gram(moving[j], moving[j]), 1e-300));
+      if (excess > worst_excess) worst = static_cast<int>(j), worst_excess = excess;
+    }
+    if (worst < 0) break;
+    const Parameter& parameter = job_.parameters[unknowns_.linear[moving[worst]]];
+    linear[moving[worst]] = std::clamp(linear[moving[worst]], parameter.lower, parameter.upper);
+    moving.erase(moving.begin() + worst);
+  }
+  for (int j = 0; j < l; ++j) theta_[unknowns_.linear[j]] = linear[j];
+
+  for (std::size_t g = 0; g < frames_.size(); ++g) {
+    const Frame& frame = frames_[g];
+    residual_.segment(frame.begin, frame.count) =
+        known(job_.micrographs[g].gain, 1) * whitened_intensity_.segment(frame.begin, frame.count) +
+        known(job_.micrographs[g].offset, 0) * whitened_one_.segment(frame.begin, frame.count) -
+        whitened_value_.segment(frame.begin, frame.count);
+  }
+  if (prior_root_.rows() > 0)
+    residual_.tail(prior_root_.rows()) =
+        prior_root_.leftCols(p) * searched + prior_root_.rightCols(l) * linear - prior_target_;
+}
+
+void LeastSquares::copy_residual(const Tile& tile, double* out) const {
+  const Eigen::Index begin = tile.micrograph < 0 ? pixel_rows_ : frames_[tile.micrograph].begin + tile.begin;
+  Eigen::Map<Eigen::VectorXd>(out, tile.count) = residual_.segment(begin, tile.count);
+}
+
+void LeastSquares::copy_jacobian(const Tile& tile, const Eigen::VectorXd& scale, double* row_major) const {
+  const Eigen::Index p = scale.size();
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(row_major, tile.count, p);
+  if (tile.micrograph < 0) {
+    out = (searched_columns_.bottomRows(tile.count) - prior_root_.rightCols(projection_.rows()) * projection_) *
+          scale.asDiagonal();
+    return;
+  }
+  const Frame& frame = frames_[tile.micrograph];
+  const Eigen::Index begin = frame.begin + tile.begin;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    auto column = out.col(j);
+    column = searched_columns_.col(j).segment(begin, tile.count) * scale[j];
+    if (frame.gain >= 0)
+      column -= (projection_(frame.gain, j) * scale[j]) * whitened_intensity_.segment(begin, tile.count);
+    if (frame.offset >= 0)
+      column -= (projection_(frame.offset, j) * scale[j]) * whitened_one_.segment(begin, tile.count);
+  }
+}
+
+Eigen::MatrixXd LeastSquares::full_rows(const Tile& tile) const {
+  const Eigen::Index p = searched_size();
+  if (tile.micrograph < 0) return prior_root_;
+  const Frame& frame = frames_[tile.micrograph];
+  const Eigen::Index begin = frame.begin + tile.begin;
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(tile.count, unknowns_.size());
+  rows.leftCols(p) = searched_columns_.middleRows(begin, tile.count);
+  if (frame.gain >= 0) rows.col(p + frame.gain) = whitened_intensity_.segment(begin, tile.count);
+  if (frame.offset >= 0) rows.col(p + frame.offset) = whitened_one_.segment(begin, tile.count);
+  return rows;
+}
+
+Eigen::MatrixXd LeastSquares::factor(bool with_priors) const {
+  TallQr qr(unknowns_.size());
+  for (const Tile& tile : tiles_)
+    if (tile.micrograph >= 0 || with_priors) qr.add(full_rows(tile));
+  return qr.factor();
+}
+
+Eigen::VectorXd LeastSquares::gradient() const {
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(unknowns_.size());
+  for (const Tile& tile : tiles_) {
+    const Eigen::Index begin = tile.micrograph < 0 ? pixel_rows_ : frames_[tile.micrograph].begin + tile.begin;
+    gradient += 2 * full_rows(tile).transpose() * residual_.segment(begin, tile.count);
+  }
+  return gradient;
+}
+
+LeastSquares::FrameMisfit LeastSquares::frame_misfit(int micrograph) const {
+  const Frame& frame = frames_[micrograph];
+  const Eigen::VectorXd noise = noise_whitened_residual(micrograph);
+  const Eigen::VectorXd along = frame.inverse_sigma / frame.inverse_sigma_norm;
+  FrameMisfit misfit;
+  misfit.chi_square = noise.squaredNorm();
+  misfit.mean_whitened = along.dot(noise);
+  misfit.mean_noise_sd = 1 / frame.inverse_sigma_norm;
+  misfit.mean_residual = misfit.mean_whitened * misfit.mean_noise_sd;
+  const Eigen::Index p = searched_size();
+  misfit.mean_jacobian_whitened = Eigen::VectorXd::Zero(unknowns_.size());
+  if (has_derivatives_)
+    misfit.mean_jacobian_whitened.head(p) =
+        searched_columns_.middleRows(frame.begin, frame.count).transpose() * along / frame.mean_factor;
+  if (frame.gain >= 0)
+    misfit.mean_jacobian_whitened[p + frame.gain] =
+        whitened_intensity_.segment(frame.begin, frame.count).dot(along) / frame.mean_factor;
+  if (frame.offset >= 0)
+    misfit.mean_jacobian_whitened[p + frame.offset] =
+        whitened_one_.segment(frame.begin, frame.count).dot(along) / frame.mean_factor;
+  return misfit;
+}
+
+Eigen::VectorXd LeastSquares::noise_whitened_residual(int micrograph) const {
+  const Frame& frame = frames_[micrograph];
+  const double gain = known(job_.micrographs[micrograph].gain, 1);
+  const double offset = known(job_.micrographs[micrograph].offset, 0);
+  return ((gain * intensity_.segment(frame.begin, frame.count).array() + offset - frame.set.value.array()) *
+          frame.inverse_sigma.array())
+      .matrix();
+}
+
+std::array<double, 2> LeastSquares::intensity_range(int micrograph) const {
+  return {frames_[micrograph].intensity_low, frames_[micrograph].intensity_high};
+}
+
+double LeastSquares::prior_chi_square() const { return residual_.tail(prior_root_.rows()).squaredNorm(); }
+
+// ---- Ceres ----------------------------------------------------------------------------------------------------------
+
+namespace {
+
+/// The solver's parameters are unit-free: (theta - origin) / scale.
+struct Scaling {
+  Eigen::VectorXd origin, scale;
+  Eigen::VectorXd to_theta(const double* x) const {
+    return origin + scale.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(x, scale.size()));
+  }
+};
+
+/// One render per point, shared by all tiles.
+class SharedEvaluation : public ceres::EvaluationCallback {
+ public:
+  SharedEvaluation(LeastSquares& problem, const Scaling& scaling, const std::vector<double>& x)
+      : problem_(problem), scaling_(scaling), x_(x) {}
+
+  void PrepareForEvaluation(bool evaluate_jacobians, bool) override {
+    // Ceres asks again at the same point (line search, then cost, then Jacobian): compare rather than trust the flag.
+    if (valid_ && x_ == last_ && (has_jacobian_ || !evaluate_jacobians)) return;
+    valid_ = false;
+    try {
+      problem_.evaluate(scaling_.to_theta(x_.data()), evaluate_jacobians);
+      valid_ = std::isfinite(problem_.objective());
+    } catch (...) {
+      failure = std::current_exception();  // Ceres knows no exceptions: the step is refused instead
+    }
+    last_ = x_;
+    has_jacobian_ = evaluate_jacobians;
+  }
+  bool valid() const { return valid_; }
+
+  std::exception_ptr failure;
+
+ private:
+  LeastSquares& problem_;
+  const Scaling& scaling_;
+  const std::vector<double>& x_;
+  std::vector<double> last_;
+  bool valid_ = false, has_jacobian_ = false;
+};
+
+class TileCost : public ceres::CostFunction {
+ public:
+  TileCost(const LeastSquares& problem, const LeastSquares::Tile& tile, const Scaling& scaling,
+           const SharedEvaluation& evaluation)
+      : problem_(problem), tile_(tile), scaling_(scaling), evaluation_(evaluation) {
+    set_num_residuals(static_cast<int>(tile.count));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(scaling.scale.size()));
+  }
+  bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+    if (!evaluation_.valid()) return false;
+    problem_.copy_residual(tile_, residuals);
+    if (jacobians && jacobians[0]) problem_.copy_jacobian(tile_, scaling_.scale, jacobians[0]);
+    return true;
+  }
+
+ private:
+  const LeastSquares& problem_;
+  LeastSquares::Tile tile_;
+  const Scaling& scaling_;
+  const SharedEvaluation& evaluation_;
+};
+
+class Watch : public ceres::IterationCallback {
+ public:
+  explicit Watch(const SolveOptions& options) : options_(options) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    if (options_.iterations)
+      options_.iterations->push_back(
+          {static_cast<int>(options_.iterations->size()), 2 * summary.cost, summary.step_norm});
+    if (options_.progress && !options_.label.empty())
+      options_.progress(fmt::format("{}, iteration {}: chi-square {:.6g}", options_.label, summary.iteration, 2 * summary.cost));
+    if (options_.interrupted && options_.interrupted->load()) {
+      stopped = true;
+      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    }
+    return ceres::SOLVER_CONTINUE;
+  }
+  bool stopped = false;
+
+ private:
+  const SolveOptions& options_;
+};
+
+}  // namespace
+
+SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& options) {
+  SolveSummary result;
+  const int p = searched_size();
+  if (p == 0) {
+    evaluate(searched, true);
+    if (options.iterations) options.iterations->push_back({static_cast<int>(options.iterations->size()), objective(), 0});
+    result.converged = true;
+    result.report = "Only linear parameters: solved exactly, without iterations.";
+    return result;
+  }
+  Scaling scaling{searched, Eigen::VectorXd::Ones(p)};
+  for (int j = 0; j < p; ++j) {
+    const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
+    const double width = parameter.upper - parameter.lower;
+    const double size = std::abs(searched[j]);
+    scaling.scale[j] = std::isfinite(width) && width > 0 ? width : size > 0 ? size : 1;
+  }
+  std::vector<double> x(p, 0.0);
+  SharedEvaluation evaluation(*this, scaling, x);
+  ceres::Problem::Options problem_options;
+  problem_options.evaluation_callback = &evaluation;
+  ceres::Problem problem(problem_options);
+  problem.AddParameterBlock(x.data(), p);
+  for (const Tile& tile : tiles_)
+    problem.AddResidualBlock(new TileCost(*this, tile, scaling, evaluation), nullptr, x.data());
+  for (int j = 0; j < p; ++j) {
+    const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
+    if (std::isfinite(parameter.lower))
+      problem.SetParameterLowerBound(x.data(), j, (parameter.lower - scaling.origin[j]) / scaling.scale[j]);
+    if (std::isfinite(parameter.upper))
+      problem.SetParameterUpperBound(x.data(), j, (parameter.upper - scaling.origin[j]) / scaling.scale[j]);
+  }
+  ceres::Solver::Options solver;
+  solver.minimizer_type = ceres::TRUST_REGION;
+  solver.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
+  // A handful of columns: QR costs no more than the rows' copy and keeps the digits that normal equations lose.
+  solver.linear_solver_type = ceres::DENSE_QR;
+  // With bounds Ceres adds a line search; the cubic one would ask for derivative images at every trial step.
+  solver.line_search_interpolation_type = ceres::QUADRATIC;
+  solver.num_threads = 1;
+  solver.max_num_iterations = options.max_iterations;
+  solver.function_tolerance = 1e-12;
+  solver.parameter_tolerance = 1e-10;
+  solver.gradient_tolerance = 1e-12;
+  solver.logging_type = ceres::SILENT;
+  solver.minimizer_progress_to_stdout = false;
+  Watch watch(options);
+  solver.callbacks.push_back(&watch);
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  if (summary.termination_type == ceres::FAILURE && evaluation.failure) std::rethrow_exception(evaluation.failure);
+  result.converged = summary.termination_type == ceres::CONVERGENCE;
+  result.interrupted = watch.stopped;
+  result.report = summary.FullReport();
+  searched = scaling.to_theta(x.data());
+  for (int j = 0; j < p; ++j) {  // a bound is hit exactly, not to rounding
+    const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
+    searched[j] = std::clamp(searched[j], parameter.lower, parameter.upper);
+  }
+  evaluate(searched, true);
+  return result;
+}
+
+}  // namespace birefit::estimation

@@ -1,0 +1,147 @@
+#pragma once
+// The weighted least-squares problem behind a fit: pixels, weights, priors; gain and offset solved exactly inside
+// (variable projection: Golub & Pereyra, SIAM J. Numer. Anal. 10, 413 (1973); the projected Jacobian is Kaufman's,
+// BIT 15, 49 (1975): exact gradient, second-order term of the Hessian dropped); Ceres over what remains.
+
+#include <array>
+#include <atomic>
+#include <exception>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "birefit/fit.h"
+
+namespace birefit::estimation {
+
+/// Which table entries are estimated, and how.
+struct Unknowns {
+  std::vector<int> searched;  ///< table indices: the solver's parameters
+  std::vector<int> linear;    ///< table indices: gains and offsets, solved exactly
+  int size() const { return static_cast<int>(searched.size() + linear.size()); }
+  /// Table index of unknown j, searched first.
+  int table_index(int j) const {
+    const int p = static_cast<int>(searched.size());
+    return j < p ? searched[j] : linear[j - p];
+  }
+  static Unknowns of(const FitJob& job);
+};
+
+/// The pixels of one micrograph that take part, in a fixed order.
+struct PixelSet {
+  std::vector<std::array<int, 2>> pixels;  ///< column, row
+  Eigen::VectorXd value, sigma;
+};
+
+/// What a micrograph's misfit does to its weights beyond the noise of its pixels. Its residual's generalised mean
+/// gets the variance of the noise plus `mean_sd`^2, everything else its variance times `shape_variance`. In a fit of
+/// frames the mean of each frame is one observation, however many pixels it has.
+struct Misfit {
+  double mean_sd = 0;         ///< units of the values
+  double shape_variance = 1;
+  bool mean_follows_shape = true;  ///< nothing is known of the mean's misfit: it is scaled like the rest
+};
+
+struct SolveOptions {
+  int max_iterations = 100;
+  const std::atomic<bool>* interrupted = nullptr;
+  std::function<void(const std::string&)> progress;
+  std::vector<Iteration>* iterations = nullptr;  ///< appended to
+  std::string label;                             ///< of progress lines
+};
+struct SolveSummary {
+  bool converged = false;
+  bool interrupted = false;
+  std::string report;
+};
+
+/// Whitened rows in a fixed order (micrograph by micrograph, then priors), evaluated at one point at a time.
+class LeastSquares {
+ public:
+  LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vector<RenderPlan> plans, std::vector<PixelSet> pixels);
+
+  int searched_size() const { return static_cast<int>(unknowns_.searched.size()); }
+  void set_misfit(const std::vector<Misfit>& misfit);
+  const std::vector<Misfit>& misfit() const { return misfit_; }
+
+  /// Renders, solves the linear unknowns, fills the residual and (derivatives = true) the Jacobian.
+  void evaluate(const Eigen::VectorXd& searched, bool derivatives);
+  /// Minimises from `searched`, which becomes the optimum; leaves the problem evaluated there with derivatives.
+  SolveSummary solve(Eigen::VectorXd& searched, const SolveOptions& options);
+
+  // At the last evaluated point:
+  double objective() const { return residual_.squaredNorm(); }  ///< priors and misfit weights included
+  const Theta& theta() const { return theta_; }
+  int evaluations() const { return evaluations_; }
+  /// Noise-whitened residual sums of one micrograph, its misfit weights not applied.
+  struct FrameMisfit {
+    double chi_square = 0;   ///< sum of (residual / noise sd)^2
+    double mean_whitened = 0;  ///< generalised mean residual over its noise standard deviation
+    double mean_noise_sd = 0;  ///< that standard deviation, units of the values
+    double mean_residual = 0;  ///< units of the values
+    Eigen::VectorXd mean_jacobian_whitened;  ///< d mean_whitened / d unknown (searched first)
+  };
+  FrameMisfit frame_misfit(int micrograph) const;
+  const PixelSet& pixels(int micrograph) const { return frames_[micrograph].set; }
+  /// Whitened residual of one micrograph without its misfit weights, in the pixels' order.
+  Eigen::VectorXd noise_whitened_residual(int micrograph) const;
+  /// Triangular factor of all whitened rows [d/d searched, d/d linear], priors included (`with_priors`).
+  Eigen::MatrixXd factor(bool with_priors = true) const;
+  /// Gradient of the objective with respect to every unknown.
+  Eigen::VectorXd gradient() const;
+  /// Of the model intensity over all used pixels of a micrograph.
+  std::array<double, 2> intensity_range(int micrograph) const;
+  /// Sum of squares of the prior rows.
+  double prior_chi_square() const;
+  int prior_rows() const { return static_cast<int>(prior_root_.rows()); }
+  Eigen::Index pixel_rows() const { return pixel_rows_; }
+
+  // For the tiles: rows of the projected problem, searched unknowns in the solver's scale.
+  struct Tile {
+    int micrograph = 0;  ///< -1 = priors
+    Eigen::Index begin = 0, count = 0;
+  };
+  const std::vector<Tile>& tiles() const { return tiles_; }
+  void copy_residual(const Tile& tile, double* out) const;
+  void copy_jacobian(const Tile& tile, const Eigen::VectorXd& scale, double* row_major) const;
+
+ private:
+  struct Frame {
+    PixelSet set;
+    Eigen::VectorXd inverse_sigma;
+    double inverse_sigma_norm = 0;
+    Eigen::Index begin = 0, count = 0;
+    int gain = -1, offset = -1;  ///< index among the linear unknowns, -1 = known
+    double shape_factor = 1, mean_factor = 1;  ///< whitening of the parts across and along the mean
+    double intensity_low = 0, intensity_high = 0;
+  };
+  void whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const;
+  void set_priors();
+  void solve_linear();
+  Eigen::MatrixXd full_rows(const Tile& tile) const;
+  double known(const ParameterRef& ref, double absent) const { return ref ? theta_[ref.index] : absent; }
+
+  const FitJob& job_;
+  Unknowns unknowns_;
+  std::vector<RenderPlan> plans_;
+  std::vector<Frame> frames_;
+  std::vector<Misfit> misfit_;
+  std::vector<Tile> tiles_;
+  Eigen::Index pixel_rows_ = 0;
+  Eigen::MatrixXd prior_root_;    ///< whitening of all unknowns' deviation from the prior means
+  Eigen::VectorXd prior_target_;  ///< prior_root_ * means
+
+  Theta theta_;
+  Eigen::VectorXd intensity_;     ///< raw
+  Eigen::VectorXd whitened_value_, whitened_intensity_, whitened_one_;
+  Eigen::VectorXd residual_;
+  Eigen::MatrixXd searched_columns_;  ///< d whitened model / d searched, gain and offset held
+  Eigen::MatrixXd projection_;        ///< linear x searched: how the linear unknowns follow the searched ones
+  bool has_derivatives_ = false;
+  int evaluations_ = 0;
+};
+
+}  // namespace birefit::estimation

@@ -1,0 +1,536 @@
+#include "io/config_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "io/table.h"
+#include "transport/method.h"
+
+namespace birefit {
+namespace {
+
+const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate", "crystal", "slab"};
+
+NumberSpec open_length(double upper_um) {
+  NumberSpec spec;
+  spec.unit = "um";
+  spec.lower = 0;
+  spec.lower_open = true;
+  spec.upper = upper_um;
+  spec.physical_lower = 0;
+  return spec;
+}
+
+NumberSpec angle() {
+  NumberSpec spec;
+  spec.unit = "deg";
+  spec.lower = -36000;  // a hundred turns: more is a typing error
+  spec.upper = 36000;
+  return spec;
+}
+
+NumberSpec angle_within(double lower, double upper) {
+  NumberSpec spec;
+  spec.unit = "deg";
+  spec.lower = lower;
+  spec.upper = upper;
+  return spec;
+}
+
+NumberSpec index_spec() {
+  NumberSpec spec;
+  spec.lower = 1;
+  spec.upper = 4;
+  return spec;
+}
+
+NumberSpec number_within(double lower, double upper) {
+  NumberSpec spec;
+  spec.lower = lower;
+  spec.upper = upper;
+  return spec;
+}
+
+NumberSpec aperture() {
+  NumberSpec spec;
+  spec.lower = 0;
+  spec.lower_open = true;
+  spec.upper = 1.6;
+  spec.percent = true;
+  return spec;
+}
+
+NumberSpec kelvin() {
+  NumberSpec spec;
+  spec.unit = "K";
+  spec.lower = 100;
+  spec.upper = 2000;
+  return spec;
+}
+
+/// The key of a map that names a kind: {radial: {..}}. A problem unless there is exactly one; of several the first is
+/// returned, so that its mistakes are found too.
+std::optional<std::string> one_kind(ConfigReader& reader, const Block& block, const std::vector<std::string>& known,
+                                    const std::vector<std::string>& later = {},
+                                    const std::vector<std::string>& others = {}) {
+  std::vector<std::string> found;
+  for (const std::string& kind : known)
+    if (block.find(kind)) found.push_back(kind);
+  bool postponed = false;
+  for (const std::string& kind : later) {
+    if (const YamlNode* node = block.find(kind)) {
+      reader.problems.add(node->where, block.path_of(kind) + " is not available yet", "known: " + list_words(known));
+      postponed = true;
+    }
+  }
+  if (found.size() == 1) return found[0];
+  if (found.size() > 1) {
+    // The second one is the one too many.
+    std::string first;
+    for (const YamlEntry& entry : block.node->entries) {
+      if (std::find(found.begin(), found.end(), entry.key) == found.end()) continue;
+      if (!first.empty()) {
+        reader.problems.add(entry.where, block.path + " has " + list_words(found) + ": exactly one of them is allowed");
+        break;
+      }
+      first = entry.key;
+    }
+    return first;
+  } else if (block.node && !postponed) {
+    // A misspelt kind was reported as an unknown key, with the right one suggested.
+    const bool misspelt = std::any_of(block.node->entries.begin(), block.node->entries.end(), [&](const YamlEntry& entry) {
+      return std::find(others.begin(), others.end(), entry.key) == others.end();
+    });
+    if (!misspelt) reader.problems.add(block.where, block.path + " must name one of " + list_words(known));
+  }
+  return std::nullopt;
+}
+
+UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
+  UniformDirector director;
+  const Block block = reader.block(parent, "uniform", {"axis", "azimuth_deg", "tilt_deg"}, true);
+  const YamlNode* axis = block.find("axis");
+  if (axis) {
+    if (block.find("azimuth_deg") || block.find("tilt_deg"))
+      reader.problems.add(axis->where, block.path + " has an axis and angles", "give one of the two");
+    if (!axis->is_sequence() || axis->items.size() != 3) {
+      reader.problems.add(axis->where, "axis must be three components [x, y, z], found " +
+                                           (axis->is_sequence() ? std::to_string(axis->items.size()) + " items"
+                                                                : axis->describe()));
+      return director;
+    }
+    double square = 0;
+    for (int i = 0; i < 3; ++i) {
+      const char* const letters[] = {"x", "y", "z"};
+      director.axis[i] = reader.number_at(axis->items[i], block.path_of("axis") + "." + letters[i],
+                                          number_within(-1e6, 1e6));
+      square += std::pow(reader.table[director.axis[i]].value, 2);
+    }
+    if (square == 0) reader.problems.add(axis->where, "axis = [0, 0, 0] has no direction");
+    return director;
+  }
+  if (block.node && !block.find("azimuth_deg") && !block.find("tilt_deg")) {
+    reader.problems.add(block.where, block.path + " needs an axis: [x, y, z] or azimuth_deg and tilt_deg");
+    return director;
+  }
+  director.azimuth_deg = reader.number(block, "azimuth_deg", angle(), 0);
+  director.tilt_deg = reader.number(block, "tilt_deg", angle(), 0);
+  return director;
+}
+
+Droplet read_droplet(ConfigReader& reader, const Block& parent) {
+  Droplet droplet;
+  const Block block = reader.block(parent, "droplet", {"diameter_um", "director"}, true);
+  NumberSpec diameter = open_length(10000);
+  diameter.automatic = true;
+  droplet.diameter_um = reader.number(block, "diameter_um", diameter);
+  const Block director = reader.block(block, "director", {"radial", "bipolar", "axial"}, true);
+  if (one_kind(reader, director, {"radial"}, {"bipolar", "axial"}) == "radial") {
+    // `radial:` with nothing behind it is as clear as `radial: {}`.
+    const YamlNode* node = director.find("radial");
+    if (node->kind == YamlNode::Kind::null) {
+      droplet.director.twist_deg = reader.constant("sample.droplet.director.radial.twist_deg", angle(), 0);
+      return droplet;
+    }
+  }
+  const Block radial = reader.block(director, "radial", {"twist_deg"}, false);
+  droplet.director.twist_deg = reader.number(radial, "twist_deg", angle(), 0);
+  return droplet;
+}
+
+Cell read_cell(ConfigReader& reader, const Block& parent) {
+  Cell cell;
+  const Block block = reader.block(parent, "cell", {"thickness_um", "director"}, true);
+  cell.thickness_um = reader.number(block, "thickness_um", open_length(10000));
+  const Block director = reader.block(block, "director", {"uniform", "twisted", "freedericksz"}, true);
+  const auto kind = one_kind(reader, director, {"uniform", "twisted"}, {"freedericksz"});
+  if (kind == "uniform") {
+    cell.director = read_uniform(reader, director);
+  } else if (kind == "twisted") {
+    const Block twisted = reader.block(director, "twisted", {"twist_deg", "azimuth_deg", "pretilt_deg"}, true);
+    TwistedDirector field;
+    field.twist_deg = reader.number(twisted, "twist_deg", angle());
+    field.azimuth_deg = reader.number(twisted, "azimuth_deg", angle(), 0);
+    field.pretilt_deg = reader.number(twisted, "pretilt_deg", angle_within(-90, 90), 0);
+    cell.director = field;
+  }
+  return cell;
+}
+
+Plate read_plate(ConfigReader& reader, const Block& parent) {
+  Plate plate;
+  const Block block = reader.block(parent, "plate", {"thickness_um", "director", "heat", "view"}, true);
+  plate.thickness_um = reader.number(block, "thickness_um", open_length(100000));
+  const Block director = reader.block(block, "director", {"uniform"}, true);
+  if (one_kind(reader, director, {"uniform"})) plate.director = read_uniform(reader, director);
+  if (block.find("heat")) {
+    const Block heat = reader.block(block, "heat", {"fourier_number", "cold_k", "hot_k"}, true);
+    NumberSpec fourier = number_within(0, 1e4);
+    fourier.lower_open = true;
+    fourier.physical_lower = 0;
+    HeatStep step;
+    step.fourier_number = reader.number(heat, "fourier_number", fourier);
+    step.cold_k = reader.number(heat, "cold_k", kelvin());
+    step.hot_k = reader.number(heat, "hot_k", kelvin());
+    plate.heat = step;
+  }
+  const Block view = reader.block(block, "view", {"half_angle_deg"}, true);
+  NumberSpec half_angle = angle_within(0, 80);
+  half_angle.lower_open = true;
+  plate.half_angle_deg = reader.number(view, "half_angle_deg", half_angle);
+  return plate;
+}
+
+Crystal read_crystal(ConfigReader& reader, const Block& parent) {
+  Crystal crystal;
+  const Block block = reader.block(
+      parent, "crystal",
+      {"half_wave_voltage_v", "bias_v", "field_along", "slow_axis_deg", "field_legendre", "electrodes_px"}, true);
+  NumberSpec half_wave;
+  half_wave.unit = "V";
+  half_wave.lower = 0;
+  half_wave.lower_open = true;
+  half_wave.upper = 1e7;
+  half_wave.physical_lower = 0;
+  crystal.half_wave_voltage_v = reader.number(block, "half_wave_voltage_v", half_wave);
+  NumberSpec bias;  // the sign is not observable: the magnitude is asked for
+  bias.unit = "V";
+  bias.lower = 0;
+  bias.upper = 1e7;
+  bias.physical_lower = 0;
+  crystal.bias_v = reader.number(block, "bias_v", bias);
+  if (!block.find("field_along")) reader.missing(block, "field_along", "x or y, the direction of the field in the image");
+  crystal.field_along_y = reader.choice(block, "field_along", {"x", "y"}).value_or("y") == "y";
+  crystal.slow_axis_deg = reader.number(block, "slow_axis_deg", angle(), crystal.field_along_y ? 135 : 45);
+  if (const YamlNode* coefficients = block.find("field_legendre")) {
+    if (!coefficients->is_sequence() || coefficients->items.size() > 20) {
+      reader.problems.add(coefficients->where, "field_legendre must be a list of at most 20 coefficients [c1, c2, ..], found " +
+                                                   (coefficients->is_sequence()
+                                                        ? std::to_string(coefficients->items.size()) + " items"
+                                                        : coefficients->describe()));
+    } else {
+      for (std::size_t i = 0; i < coefficients->items.size(); ++i)
+        crystal.field_legendre.push_back(reader.number_at(
+            coefficients->items[i], block.path_of("field_legendre") + "[" + std::to_string(i + 1) + "]",
+            number_within(-100, 100)));
+    }
+  }
+  if (const YamlNode* electrodes = block.find("electrodes_px")) {
+    if (!electrodes->is_sequence() || electrodes->items.size() != 2) {
+      reader.problems.add(electrodes->where, "electrodes_px must be [low, high], found " +
+                                                 (electrodes->is_sequence()
+                                                      ? std::to_string(electrodes->items.size()) + " items"
+                                                      : electrodes->describe()));
+    } else {
+      const std::size_t problems_before = reader.problems.all().size();
+      NumberSpec pixel = number_within(-1e6, 1e6);
+      pixel.unit = "px";
+      crystal.electrode_low_px = reader.number_at(electrodes->items[0], block.path_of("electrodes_px.low"), pixel);
+      crystal.electrode_high_px = reader.number_at(electrodes->items[1], block.path_of("electrodes_px.high"), pixel);
+      const bool readable = reader.problems.all().size() == problems_before;
+      if (readable && reader.table[crystal.electrode_low_px].value >= reader.table[crystal.electrode_high_px].value)
+        reader.problems.add(electrodes->where, "electrodes_px must grow: [low, high]");
+    }
+  }
+  return crystal;
+}
+
+Slab read_slab(ConfigReader& reader, const Block& parent) {
+  Slab slab;
+  const Block block = reader.block(parent, "slab", {"profile", "interpolation"}, true);
+  const std::string interpolation =
+      reader.choice(block, "interpolation", {"constant", "linear", "cubic"}).value_or("constant");
+  using Interpolation = SlabProfile::Interpolation;
+  slab.profile.interpolation = interpolation == "linear"  ? Interpolation::linear
+                               : interpolation == "cubic" ? Interpolation::cubic
+                                                          : Interpolation::constant;
+  if (!block.find("profile")) reader.missing(block, "profile");
+  const std::optional<std::string> name = reader.text(block, "profile");
+  if (!name) return slab;
+  PlacedTable table;
+  try {
+    table = load_placed_table(reader.resolve(*name), block.find("profile")->where);
+  } catch (const UserError& error) {
+    reader.problems.add(error);
+    return slab;
+  }
+
+  const std::string file = reader.resolve(*name).string();
+  const std::vector<std::string> required = {"depth_um", "ax", "ay", "az", "n_o", "n_e"};
+  std::vector<std::string> known = required;
+  known.insert(known.end(), {"k_o", "k_e"});
+  std::array<int, 8> column;
+  bool complete = true;
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    const auto& columns = table.table.columns;
+    const auto found = std::find(columns.begin(), columns.end(), known[k]);
+    column[k] = found == columns.end() ? -1 : static_cast<int>(found - columns.begin());
+    if (column[k] < 0 && k < required.size()) {
+      reader.problems.add({file, table.header_line}, "has no column " + known[k], "columns: " + list_words(known));
+      complete = false;
+    }
+  }
+  for (std::size_t i = 0; i < table.table.columns.size(); ++i) {
+    const std::string& header = table.table.columns[i];
+    if (std::find(known.begin(), known.end(), header) != known.end()) continue;
+    const std::string near = nearest_word(header, known);
+    reader.problems.add({file, table.header_line, table.header_columns[i]}, "unknown column " + header,
+                        near.empty() ? "columns: " + list_words(known) : "did you mean " + near + "?");
+  }
+  if (!complete) return slab;
+
+  double above_um = 0;
+  for (std::size_t r = 0; r < table.table.rows.size(); ++r) {
+    const std::vector<double>& row = table.table.rows[r];
+    const auto value = [&](int k) { return column[k] < 0 ? 0.0 : row[column[k]]; };
+    const auto place = [&](int k) { return Where{file, table.lines[r], table.cell_columns[r][column[k]]}; };
+    SlabProfile::Row entry{value(0), value(1), value(2), value(3), value(4), value(5), value(6), value(7)};
+    const bool layers = slab.profile.interpolation == Interpolation::constant;
+    if (r == 0 && layers && !(entry.depth_um > 0))
+      reader.problems.add(place(0), "depth_um = " + show(entry.depth_um) + " must be above 0",
+                          "a row is a layer and gives the depth of its lower face; the first layer starts at 0");
+    if (r == 0 && !layers && entry.depth_um != 0)
+      reader.problems.add(place(0), "depth_um = " + show(entry.depth_um) + ": the first node must be at 0");
+    if (r > 0 && !(entry.depth_um > above_um))
+      reader.problems.add(place(0), "depth_um = " + show(entry.depth_um) + " does not grow (the row above has " +
+                                        show(above_um) + ")");
+    above_um = entry.depth_um;
+    const double length = std::hypot(entry.ax, entry.ay, entry.az);
+    if (!(length > 0)) {
+      reader.problems.add(place(1), "the axis (ax, ay, az) = (0, 0, 0) has no direction");
+    } else {
+      entry.ax /= length;
+      entry.ay /= length;
+      entry.az /= length;
+    }
+    for (int k = 4; k <= 5; ++k)
+      if (value(k) < 1 || value(k) > 4)
+        reader.problems.add(place(k), known[k] + " = " + show(value(k)) + " is outside [1, 4]");
+    for (int k = 6; k <= 7; ++k)
+      if (column[k] >= 0 && (value(k) < 0 || value(k) > 10))
+        reader.problems.add(place(k), known[k] + " = " + show(value(k)) + " is outside [0, 10]");
+    slab.profile.rows.push_back(entry);
+    if (reader.problems.all().size() > 100) break;  // a wrong column, said often enough
+  }
+  const std::size_t least = slab.profile.interpolation == Interpolation::cubic    ? 4
+                            : slab.profile.interpolation == Interpolation::linear ? 2
+                                                                                  : 1;
+  if (table.table.rows.size() < least)
+    reader.problems.add({file}, interpolation + " interpolation needs at least " + std::to_string(least) + " rows");
+  return slab;
+}
+
+/// The parameter with its value, start and bounds within [lower, upper], else a problem. A NaN value (`fit: auto`) passes.
+void check_within(ConfigReader& reader, ParameterRef ref, double lower, double upper, const std::string& why) {
+  const Parameter& parameter = reader.table[ref];
+  for (double value : {parameter.value, parameter.free ? parameter.lower : parameter.value,
+                       parameter.free ? parameter.upper : parameter.value}) {
+    if (std::isfinite(value) && (value < lower || value > upper)) {
+      reader.problems.add(parameter.where, parameter.name + ": " + show(value) + " is outside [" + show(lower) + ", " +
+                                               show(upper) + "], " + why);
+      return;
+    }
+  }
+}
+
+Material read_material(ConfigReader& reader, const Block& sample, const Sample& kind) {
+  const Block block =
+      reader.block(sample, "material", {"ordinary", "birefringence", "name", "temperature_k", "file"}, true);
+  if (const YamlNode* file = block.find("file")) {
+    reader.problems.add(file->where, "material files come later", "give ordinary and birefringence");
+    return ConstantIndices{};
+  }
+  const Plate* plate = std::get_if<Plate>(&kind);
+  const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
+  if (block.find("name")) {
+    for (const char* other : {"ordinary", "birefringence"})
+      if (const YamlNode* node = block.find(other))
+        reader.problems.add(node->where, std::string(other) + " is given beside a material's name", "give one of the two");
+    if (!reader.choice(block, "name", {"E44-steinberg2020"})) return ConstantIndices{};
+    const std::string validity = "where E44-steinberg2020 holds";
+    NumberSpec temperature = kelvin();
+    temperature.lower = 250;
+    temperature.upper = 373;
+    E44Steinberg2020 material;
+    if (!heat) {
+      material.temperature_k = reader.number(block, "temperature_k", temperature);
+    } else {
+      if (const YamlNode* node = block.find("temperature_k"))
+        reader.problems.add(node->where, "temperature_k is given beside a temperature profile (sample.plate.heat)",
+                            "leave it out");
+      check_within(reader, heat->cold_k, 250, 373, validity);
+      check_within(reader, heat->hot_k, 250, 373, validity);
+      material.temperature_k = reader.constant("sample.material.temperature_k", temperature, 298.15);
+      reader.specs.erase("sample.material.temperature_k");
+    }
+    return material;
+  }
+  if (const YamlNode* node = block.find("temperature_k"))
+    reader.problems.add(node->where, "temperature_k has no effect on constant indices", "leave it out");
+  if (heat && block.node)
+    reader.problems.add(block.where, "sample.plate.heat has no effect on constant indices",
+                        "use material: {name: E44-steinberg2020}, or leave heat out");
+  ConstantIndices material;
+  material.ordinary = reader.number(block, "ordinary", index_spec());
+  material.birefringence = reader.number(block, "birefringence", number_within(-1, 1));
+  const double extraordinary = reader.table[material.ordinary].value + reader.table[material.birefringence].value;
+  if (extraordinary < 1 && reader.problems.empty())
+    reader.problems.add(block.where, "ordinary + birefringence = " + show(extraordinary) + " is below 1");
+  return material;
+}
+
+void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
+  std::vector<std::string> keys = kSampleKinds;
+  keys.insert(keys.end(), {"material", "surround"});
+  const Block block = reader.block(root, "sample", keys, true);
+  const std::vector<std::string> available = {"droplet", "cell", "plate", "crystal", "slab"};
+  const auto kind = one_kind(reader, block, available, {"shell"}, {"material", "surround"});
+  if (!kind) return;
+  if (*kind == "droplet") scene.sample = read_droplet(reader, block);
+  if (*kind == "cell") scene.sample = read_cell(reader, block);
+  if (*kind == "plate") scene.sample = read_plate(reader, block);
+  if (*kind == "crystal") scene.sample = read_crystal(reader, block);
+  if (*kind == "slab") scene.sample = read_slab(reader, block);
+
+  const bool own_indices = *kind == "crystal" || *kind == "slab";
+  if (own_indices) {
+    if (const YamlNode* node = block.find("material"))
+      reader.problems.add(node->where, "unknown key material: a " + *kind + " needs none",
+                          *kind == "slab" ? "its indices are in the profile" : "its half-wave voltage says it all");
+  } else {
+    scene.material = read_material(reader, block, scene.sample);
+  }
+  if (*kind == "crystal") {
+    if (const YamlNode* node = block.find("surround"))
+      reader.problems.add(node->where, "unknown key surround: a crystal needs none");
+    scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
+    reader.specs.erase("sample.surround.index");
+    return;
+  }
+  const Block surround = reader.block(block, "surround", {"index"}, *kind == "droplet");
+  if (surround.node || *kind == "droplet") {
+    scene.surround_index = reader.number(surround, "index", index_spec());
+  } else {
+    scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
+  }
+}
+
+/// The value under either of two spellings; both at once is a mistake.
+ParameterRef polarizing_element(ConfigReader& reader, const Block& block, const std::string& canonical,
+                                const std::string& variant, bool required) {
+  const YamlNode* node = block.find(canonical);
+  const YamlNode* other = block.find(variant);
+  if (node && other)
+    reader.problems.add(other->where, variant + " and " + canonical + " are the same key", "give one of the two");
+  if (!node) node = other;
+  const std::string path = block.path_of(canonical);
+  if (node) return reader.number_at(*node, path, angle());
+  return reader.number(block, canonical, angle(), required ? std::nullopt : std::optional<double>(0));
+}
+
+void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
+  Microscope& microscope = scene.microscope;
+  const Block block = reader.block(root, "microscope",
+                                   {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg",
+                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions"},
+                                   true);
+  const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
+  NumberSpec wavelength;
+  wavelength.unit = "nm";
+  wavelength.lower = 100;
+  wavelength.upper = 20000;
+  microscope.wavelength_nm = reader.number(light, "wavelength_nm", wavelength);
+  NumberSpec bandwidth;
+  bandwidth.unit = "nm";
+  bandwidth.lower = 0;
+  bandwidth.upper = 5000;
+  microscope.bandwidth_nm = reader.plain(light, "bandwidth_nm", bandwidth).value_or(0);
+
+  const bool slab = std::holds_alternative<Slab>(scene.sample);
+  microscope.polarizer_deg = polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab);
+  microscope.analyzer_deg = polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab);
+  microscope.objective_na = reader.plain(block, "objective_na", aperture()).value_or(0);
+  microscope.condenser_na = reader.plain(block, "condenser_na", aperture()).value_or(0);
+  if (const std::optional<double> focus = reader.plain(block, "focus_um", number_within(-1e4, 1e4)); focus && *focus != 0)
+    reader.problems.add(block.find("focus_um")->where, "focus_um = " + show(*focus) + ": defocus is not available yet",
+                        "0, the mid plane, is");
+  microscope.aplanatic = reader.choice(block, "imaging", {"focal_plane", "aplanatic"}).value_or("") == "aplanatic";
+
+  if (const YamlNode* directions = block.find("directions")) {
+    if (!slab)
+      reader.problems.add(directions->where, "directions belong to slab scenes");
+    if (!directions->is_sequence() || directions->items.empty()) {
+      reader.problems.add(directions->where, "directions must be a list of {theta_deg, azimuth_deg}, found " +
+                                                 (directions->is_sequence() ? "an empty one" : directions->describe()));
+      return;
+    }
+    for (const YamlNode& item : directions->items) {
+      const Block direction = reader.block_of(item, "microscope.directions", {"theta_deg", "azimuth_deg"});
+      NumberSpec theta = angle_within(0, 90);
+      theta.upper_open = true;
+      if (direction.node && !direction.find("theta_deg")) reader.missing(direction, "theta_deg");
+      microscope.directions.push_back({reader.plain(direction, "theta_deg", theta).value_or(0),
+                                       reader.plain(direction, "azimuth_deg", angle()).value_or(0)});
+    }
+  } else if (slab) {
+    microscope.directions = {{0, 0}};
+  }
+}
+
+void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
+  const Block accuracy = reader.block(root, "accuracy", {"intensity"}, false);
+  scene.intensity_accuracy = reader.plain(accuracy, "intensity", number_within(1e-12, 0.1)).value_or(1e-4);
+
+  const Block physics = reader.block(root, "physics", {"ceiling", "max_seconds"}, false);
+  const YamlNode* ceiling = physics.find("ceiling");
+  if (ceiling && ceiling->is_scalar() && (ceiling->text == "reflections" || ceiling->text == "wave")) {
+    reader.problems.add(ceiling->where, "ceiling: " + ceiling->text + " is not available yet",
+                        "known: one_way, e_only and auto");
+  } else {
+    scene.ceiling = reader.choice(physics, "ceiling", {"one_way", "e_only", "auto"}).value_or("auto") == "e_only"
+                        ? Ceiling::e_only
+                        : Ceiling::one_way;
+  }
+  if (const YamlNode* seconds = physics.find("max_seconds"))
+    reader.problems.add(seconds->where, "max_seconds belongs to ceiling: wave, which is not available yet", "leave it out");
+
+  const Block transport = reader.block(root, "transport", {"method"}, false);
+  std::vector<std::string> methods = {"auto"};
+  methods.insert(methods.end(), transport_method_names().begin(), transport_method_names().end());
+  scene.method = reader.choice(transport, "method", methods).value_or("auto");
+}
+
+}  // namespace
+
+Scene read_scene(ConfigReader& reader, const Block& root) {
+  Scene scene;
+  // Which kind it is steers what the microscope needs, so the sample comes first.
+  read_sample(reader, root, scene);
+  read_microscope(reader, root, scene);
+  read_numerics(reader, root, scene);
+  return scene;
+}
+
+}  // namespace birefit

@@ -1,0 +1,63 @@
+#pragma once
+// The parts of a config that describe the scene: sample, material, surround, microscope, accuracy, physics, transport.
+
+#include "birefit/scene.h"
+#include "io/config_reader.h"
+
+namespace birefit {
+
+/// Everything of a Scene but its view. Mistakes go to the reader's problems; the scene then holds stand-ins.
+Scene read_scene(ConfigReader& reader, const Block& root);
+
+/// Calls f(ParameterRef&) for every reference of the scene, the empty ones included.
+template <class F>
+void for_each_ref(Scene& scene, F&& f) {
+  const auto uniform = [&](UniformDirector& director) {
+    for (ParameterRef& component : director.axis) f(component);
+    f(director.azimuth_deg);
+    f(director.tilt_deg);
+  };
+  if (auto* droplet = std::get_if<Droplet>(&scene.sample)) {
+    f(droplet->diameter_um);
+    f(droplet->director.twist_deg);
+  } else if (auto* cell = std::get_if<Cell>(&scene.sample)) {
+    f(cell->thickness_um);
+    if (auto* director = std::get_if<UniformDirector>(&cell->director)) uniform(*director);
+    if (auto* director = std::get_if<TwistedDirector>(&cell->director)) {
+      f(director->twist_deg);
+      f(director->azimuth_deg);
+      f(director->pretilt_deg);
+    }
+  } else if (auto* plate = std::get_if<Plate>(&scene.sample)) {
+    f(plate->thickness_um);
+    uniform(plate->director);
+    if (auto* heat = std::get_if<HeatStep>(&plate->heat)) {
+      f(heat->fourier_number);
+      f(heat->cold_k);
+      f(heat->hot_k);
+    }
+    f(plate->half_angle_deg);
+  } else if (auto* crystal = std::get_if<Crystal>(&scene.sample)) {
+    f(crystal->half_wave_voltage_v);
+    f(crystal->bias_v);
+    f(crystal->slow_axis_deg);
+    for (ParameterRef& coefficient : crystal->field_legendre) f(coefficient);
+    f(crystal->electrode_low_px);
+    f(crystal->electrode_high_px);
+  }
+  if (auto* constant = std::get_if<ConstantIndices>(&scene.material)) {
+    f(constant->ordinary);
+    f(constant->birefringence);
+  } else if (auto* e44 = std::get_if<E44Steinberg2020>(&scene.material)) {
+    f(e44->temperature_k);
+  }
+  f(scene.surround_index);
+  f(scene.microscope.wavelength_nm);
+  f(scene.microscope.polarizer_deg);
+  f(scene.microscope.analyzer_deg);
+  f(scene.view.center_x_px);
+  f(scene.view.center_y_px);
+  f(scene.view.rotation_deg);
+}
+
+}  // namespace birefit

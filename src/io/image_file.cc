@@ -1,0 +1,547 @@
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <new>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <unistd.h>
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include "birefit/io.h"
+#include "io/file.h"
+
+namespace birefit {
+namespace {
+
+namespace fs = std::filesystem;
+using OIIO::TypeDesc;
+
+constexpr int kLargestSide = 16384;
+constexpr int kListedPages = 12;
+constexpr int kCountedPages = 1000;             // libtiff walks the chain of pages from its start each time
+constexpr std::size_t kBandBytes = 64u << 20;   // read at once; a whole ordinary image
+constexpr double kLargestCrediblePixelUm = 20;  // 72, 96 and 300 dpi are 353, 265 and 85 um: meant for paper
+
+// ---- what the first bytes say ---------------------------------------------------------------------------------------
+
+/// Facts that OpenImageIO does not pass on. Only the formats named here are opened: the type follows from the content,
+/// so that a wrong extension neither confuses nor hands an untrusted file to some rarely used decoder.
+struct Signature {
+  std::string format;        ///< OpenImageIO's name; "" = none of ours
+  std::string format_name;   ///< for people
+  int stored_bits = 0;       ///< per sample or palette index, when the header says; 0 = ask OpenImageIO
+  bool palette = false;
+  bool animated = false;
+  bool truncated = false;
+  bool lossy = false;
+};
+
+std::uint32_t big_endian(const unsigned char* p) {
+  return std::uint32_t{p[0]} << 24 | std::uint32_t{p[1]} << 16 | std::uint32_t{p[2]} << 8 | p[3];
+}
+
+void read_png_signature(std::ifstream& file, std::uintmax_t file_size, Signature& signature) {
+  std::uintmax_t position = 8;
+  bool ended = false;
+  while (!ended && position + 12 <= file_size) {
+    std::array<unsigned char, 8> head{};
+    file.seekg(static_cast<std::streamoff>(position));
+    if (!file.read(reinterpret_cast<char*>(head.data()), head.size())) break;
+    const std::uint32_t length = big_endian(head.data());
+    const std::string type(reinterpret_cast<const char*>(head.data()) + 4, 4);
+    if (type == "IHDR" && length >= 13) {
+      std::array<unsigned char, 13> header{};
+      if (!file.read(reinterpret_cast<char*>(header.data()), header.size())) break;
+      signature.stored_bits = header[8];
+      signature.palette = header[9] == 3;
+    } else if (type == "acTL") {
+      signature.animated = true;
+    }
+    position += std::uintmax_t{12} + length;
+    ended = type == "IEND" && position <= file_size;
+  }
+  signature.truncated = !ended;
+}
+
+Signature read_signature(const fs::path& path, std::uintmax_t file_size) {
+  Signature signature;
+  std::ifstream file(path, std::ios::binary);
+  std::array<unsigned char, 32> head{};
+  file.read(reinterpret_cast<char*>(head.data()), head.size());
+  const std::size_t count = static_cast<std::size_t>(file.gcount());
+  file.clear();
+  const auto starts_with = [&](std::string_view bytes, std::size_t at = 0) {
+    return count >= at + bytes.size() && std::memcmp(head.data() + at, bytes.data(), bytes.size()) == 0;
+  };
+  using namespace std::string_view_literals;
+  if (starts_with("\x89PNG\r\n\x1a\n"sv)) {
+    signature = {"png", "PNG"};
+    read_png_signature(file, file_size, signature);
+  } else if (starts_with("II*\0"sv) || starts_with("MM\0*"sv) || starts_with("II+\0"sv) || starts_with("MM\0+"sv)) {
+    signature = {"tiff", "TIFF"};
+  } else if (starts_with("v/1\x01"sv)) {
+    signature = {"openexr", "OpenEXR"};
+  } else if (starts_with("\xff\xd8\xff"sv)) {
+    signature = {"jpeg", "JPEG"};
+    signature.stored_bits = 8;
+    signature.lossy = true;
+  } else if (starts_with("GIF8"sv)) {
+    signature = {"gif", "GIF"};
+    signature.palette = true;
+  } else if (starts_with("RIFF"sv) && starts_with("WEBP"sv, 8)) {
+    signature = {"webp", "WebP"};
+    signature.stored_bits = 8;
+    signature.lossy = !starts_with("VP8L"sv, 12);
+    signature.animated = starts_with("VP8X"sv, 12) && (head[20] & 0x02) != 0;
+  } else if (starts_with("BM"sv) && count >= 30) {
+    signature = {"bmp", "BMP"};
+    signature.stored_bits = head[28] | head[29] << 8;
+    signature.palette = signature.stored_bits <= 8;
+  }
+  return signature;
+}
+
+// ---- pixel size -----------------------------------------------------------------------------------------------------
+
+/// Micrometres in one `unit`; 0 = no length we know.
+double micrometres_in(std::string unit) {
+  // The two micro signs of Unicode (U+00B5, U+03BC), ImageJ's escape and Latin-1.
+  for (const char* micro : {"\xc2\xb5", "\xce\xbc", "\\u00B5", "\\u00b5", "\xb5"})
+    if (unit.rfind(micro, 0) == 0) unit = "u" + unit.substr(std::strlen(micro));
+  std::transform(unit.begin(), unit.end(), unit.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (unit == "um" || unit == "micron" || unit == "microns" || unit == "micrometer" || unit == "micrometre") return 1;
+  if (unit == "nm" || unit == "nanometer" || unit == "nanometre") return 1e-3;
+  if (unit == "pm") return 1e-6;
+  if (unit == "\xc3\x85" || unit == "\xc3\xa5" || unit == "angstrom") return 1e-4;
+  if (unit == "mm" || unit == "millimeter" || unit == "millimetre") return 1e3;
+  if (unit == "cm" || unit == "centimeter" || unit == "centimetre") return 1e4;
+  if (unit == "m" || unit == "meter" || unit == "metre") return 1e6;
+  if (unit == "in" || unit == "inch" || unit == "inches") return 25400;
+  return 0;
+}
+
+std::string attribute_value(const std::string& tag, const std::string& name) {
+  std::smatch match;
+  const std::regex pattern("\\s" + name + "\\s*=\\s*[\"']([^\"']*)[\"']");
+  return std::regex_search(tag, match, pattern) ? match[1].str() : std::string();
+}
+
+double number_or_zero(const std::string& text) {
+  try {
+    const double value = std::stod(text);
+    return std::isfinite(value) && value > 0 ? value : 0;
+  } catch (const std::exception&) {
+    return 0;
+  }
+}
+
+/// The value of `key=` on a line of its own in an ImageJ description.
+std::string imagej_value(const std::string& description, const std::string& key) {
+  if (description.rfind("ImageJ=", 0) != 0) return {};
+  const std::string start = "\n" + key + "=";
+  const std::size_t at = description.find(start);
+  if (at == std::string::npos) return {};
+  const std::size_t end = description.find_first_of("\r\n", at + start.size());
+  return description.substr(at + start.size(), end == std::string::npos ? end : end - at - start.size());
+}
+
+/// Micrometres per pixel, 0 when the file does not state it credibly; says in `notes` where it comes from.
+double stated_pixel_size_um(const OIIO::ImageSpec& spec, const std::string& description,
+                            std::vector<std::string>& notes) {
+  const auto accept = [&](double x, double y, const std::string& source) -> double {
+    if (y > 0 && std::abs(y / x - 1) > 0.01) {
+      notes.push_back(fmt::format("{} states pixels that are not square ({:.5g} x {:.5g} um): ignored", source, x, y));
+      return 0;
+    }
+    notes.push_back(fmt::format("pixel size {:.5g} um from {}", x, source));
+    return x;
+  };
+
+  if (description.find("<OME") != std::string::npos || description.find("<ome:OME") != std::string::npos) {
+    double x = 0, y = 0;
+    bool several = false;
+    for (std::size_t at = description.find("Pixels"); at != std::string::npos; at = description.find("Pixels", at + 6)) {
+      if (at == 0 || (description[at - 1] != '<' && description[at - 1] != ':')) continue;
+      const std::string tag = description.substr(at, description.find('>', at) - at);
+      const auto length = [&](const std::string& name) {
+        const std::string unit = attribute_value(tag, name + "Unit");
+        return number_or_zero(attribute_value(tag, name)) * (unit.empty() ? 1.0 : micrometres_in(unit));
+      };
+      const double this_x = length("PhysicalSizeX"), this_y = length("PhysicalSizeY");
+      several = several || (x > 0 && std::abs(this_x - x) > 1e-6 * x);
+      if (x == 0) x = this_x, y = this_y;
+    }
+    if (several) {
+      notes.push_back("the OME metadata states several pixel sizes: ignored");
+      return 0;
+    }
+    if (x > 0) return accept(x, y, "the file's OME metadata");
+  }
+
+  const double x_resolution = spec.get_float_attribute("XResolution", 0);
+  const double y_resolution = spec.get_float_attribute("YResolution", 0);
+  const double x = x_resolution > 0 ? 1.0 / x_resolution : 0;
+  const double y = y_resolution > 0 ? 1.0 / y_resolution : 0;
+  if (!(x > 0) || !std::isfinite(x)) return 0;
+  if (const double um = micrometres_in(imagej_value(description, "unit")); um > 0)
+    return accept(x * um, y * um, "the file's ImageJ metadata");
+
+  const double um = micrometres_in(spec.get_string_attribute("ResolutionUnit", ""));
+  if (um > 0 && x * um < kLargestCrediblePixelUm) return accept(x * um, y * um, "the file's resolution tag");
+  return 0;
+}
+
+// ---- reading --------------------------------------------------------------------------------------------------------
+
+[[noreturn]] void refuse(const ImageRequest& request, const std::string& found, const std::string& hint) {
+  Where where = request.where;
+  std::string what = "image '" + request.path.string() + "' " + found;
+  throw UserError(std::move(where), std::move(what), hint);
+}
+
+/// One line of OpenImageIO's messages, fit for the end of a sentence.
+std::string decoder_message(OIIO::ImageInput& input) {
+  std::string text = input.geterror();
+  text = text.substr(0, text.find('\n'));
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
+  return text.empty() ? text : " (" + text + ")";
+}
+
+[[noreturn]] void refuse_damaged(const ImageRequest& request, const Signature& signature, const std::string& detail) {
+  refuse(request, fmt::format("is truncated or damaged: it starts like a {} file but cannot be read completely{}",
+                              signature.format_name, detail),
+         "copy it again from its source, or export it again");
+}
+
+std::string describe_type(const OIIO::ImageSpec& spec) {
+  const int bits = spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size()) * 8);
+  const char* kind = spec.format.is_floating_point() ? "float" : spec.format.is_signed() ? "signed integer" : "integer";
+  return fmt::format("{}-bit {}", bits, kind);
+}
+
+std::string describe_page(const OIIO::ImageSpec& spec) {
+  return fmt::format("{} x {}, {} channel{}, {}", spec.width, spec.height, spec.nchannels,
+                     spec.nchannels == 1 ? "" : "s", describe_type(spec));
+}
+
+int count_pages(OIIO::ImageInput& input) {
+  int pages = 1;
+  while (pages < kCountedPages && input.seek_subimage(pages, 0)) ++pages;
+  (void)input.geterror();  // the failed seek past the last page
+  return pages;
+}
+
+std::string list_pages(OIIO::ImageInput& input, int pages) {
+  std::string text;
+  for (int page = 0; page < std::min(pages, kListedPages); ++page)
+    text += fmt::format("{}{}: {}", page ? "; " : "", page, describe_page(input.spec(page)));
+  if (pages > kListedPages)
+    text += fmt::format("; ... {}{}", pages - 1, pages == kCountedPages ? " and perhaps more" : "");
+  return text;
+}
+
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+/// Channels whose plain average is the image.
+std::vector<int> chosen_channels(const ImageRequest& request, const OIIO::ImageSpec& spec, bool palette,
+                                 std::vector<std::string>& notes) {
+  static const std::array<std::string, 4> kChoices = {"r", "g", "b", "mean"};
+  const std::string choice = lower_case(request.channel);
+  if (!choice.empty() && std::find(kChoices.begin(), kChoices.end(), choice) == kChoices.end())
+    throw UserError(request.where, "channel: '" + request.channel + "' is none of r, g, b, mean", "choose one of them");
+
+  std::vector<int> colours;
+  std::array<int, 3> rgb = {-1, -1, -1};
+  std::string names;
+  for (int c = 0; c < spec.nchannels; ++c) {
+    const std::string name = c < static_cast<int>(spec.channelnames.size()) ? spec.channelnames[c] : std::string();
+    const std::string last = lower_case(name.substr(name.rfind('.') + 1));
+    names += (c ? ", " : "") + name;
+    if (c == spec.alpha_channel || c == spec.z_channel || last == "a" || last == "alpha") continue;
+    colours.push_back(c);
+    for (int i = 0; i < 3; ++i)
+      if (last == std::array{"r", "g", "b"}[i] || last == std::array{"red", "green", "blue"}[i]) rgb[i] = c;
+  }
+  if (colours.size() < static_cast<std::size_t>(spec.nchannels)) notes.push_back("alpha channel ignored");
+  if (colours.empty() && spec.nchannels == 1) colours.push_back(0);
+
+  if (colours.size() == 1) {
+    if (!choice.empty()) notes.push_back("channel: " + choice + " has no effect: the image is grey");
+    return colours;
+  }
+  if (colours.size() == 3 && std::count(rgb.begin(), rgb.end(), -1) == 3) std::copy_n(colours.begin(), 3, rgb.begin());
+  if (std::count(rgb.begin(), rgb.end(), -1) > 0)
+    refuse(request, fmt::format("has {} channels ({}) that are neither grey nor red, green and blue", spec.nchannels, names),
+           "save the one to be fitted as a grey image");
+  if (choice.empty())
+    refuse(request, fmt::format("has colour channels ({}{}) and none is chosen", names,
+                                palette ? ", expanded from a palette" : ""),
+           "add `channel: r`, `g`, `b` or `mean` (their plain average)");
+  if (choice == "mean") return {rgb[0], rgb[1], rgb[2]};
+  return {rgb[choice == "r" ? 0 : choice == "g" ? 1 : 2]};
+}
+
+template <class T>
+void add_samples(const std::vector<unsigned char>& bytes, int channels, const std::vector<int>& offsets, int row,
+                 int rows, Image& values) {
+  const double weight = 1.0 / static_cast<double>(offsets.size());
+  const unsigned char* pixel = bytes.data();
+  for (int y = row; y < row + rows; ++y) {
+    double* out = values.row(y);
+    for (int x = 0; x < values.width(); ++x, pixel += sizeof(T) * channels) {
+      double sum = 0;
+      for (const int offset : offsets) {
+        T sample;
+        std::memcpy(&sample, pixel + sizeof(T) * offset, sizeof(T));
+        sum += static_cast<double>(sample);
+      }
+      out[x] = offsets.size() == 1 ? sum : sum * weight;
+    }
+  }
+}
+
+Image read_samples(const ImageRequest& request, const Signature& signature, OIIO::ImageInput& input, int page,
+                   const OIIO::ImageSpec& spec, const std::vector<int>& channels) {
+  const int first = *std::min_element(channels.begin(), channels.end());
+  const int last = *std::max_element(channels.begin(), channels.end()) + 1;
+  std::vector<int> offsets;
+  for (const int channel : channels) offsets.push_back(channel - first);
+  // The file's own type, so that OpenImageIO has nothing to scale; half becomes float without loss.
+  const bool half = spec.format == TypeDesc::HALF || !spec.channelformats.empty();
+  const TypeDesc type = half ? TypeDesc(TypeDesc::FLOAT) : spec.format;
+
+  const std::size_t row_bytes = std::size_t(spec.width) * (last - first) * type.size();
+  int band = static_cast<int>(std::clamp<std::size_t>(kBandBytes / row_bytes, 1, spec.height));
+  if (spec.tile_height > 0) band = std::max(band / spec.tile_height, 1) * spec.tile_height;
+  std::vector<unsigned char> bytes;
+  bytes.resize(row_bytes * std::min(band, spec.height));
+
+  Image values;
+  for (int row = 0; row < spec.height; row += band) {
+    const int rows = std::min(band, spec.height - row);
+    const int y = spec.y + row;
+    const bool read = spec.tile_width > 0
+                          ? input.read_tiles(page, 0, spec.x, spec.x + spec.width, y, y + rows, spec.z, spec.z + 1,
+                                             first, last, type, bytes.data())
+                          : input.read_scanlines(page, 0, y, y + rows, spec.z, first, last, type, bytes.data());
+    // Some decoders (JPEG) fill what is missing with grey, report success and leave a message.
+    if (!read || input.has_error()) refuse_damaged(request, signature, decoder_message(input));
+    if (values.empty()) values = Image(spec.width, spec.height);
+    switch (type.basetype) {
+      case TypeDesc::UINT8: add_samples<std::uint8_t>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::INT8: add_samples<std::int8_t>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::UINT16: add_samples<std::uint16_t>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::INT16: add_samples<std::int16_t>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::UINT32: add_samples<std::uint32_t>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::INT32: add_samples<std::int32_t>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::FLOAT: add_samples<float>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::DOUBLE: add_samples<double>(bytes, last - first, offsets, row, rows, values); break;
+      default:
+        refuse(request, fmt::format("has samples of type {}", type.c_str()), "save it as 8- or 16-bit integers or float");
+    }
+  }
+  return values;
+}
+
+/// Undoes the expansion of packed 2- to 14-bit samples to the full range of 8 or 16 bits: counts are counts.
+void restore_packed_counts(int bits, double container_top, Image& values, bool averaged) {
+  const double scale = (std::exp2(bits) - 1) / container_top;
+  for (double& value : values.values()) value = averaged ? value * scale : std::round(value * scale);
+}
+
+LoadedImage load_checked(const ImageRequest& request, const Signature& signature) {
+  if (signature.animated)
+    refuse(request, "is animated (" + signature.format_name + ")", "extract the frame to be fitted as a still image");
+  if (signature.stored_bits == 1)
+    refuse(request, "has 1 bit per pixel: black and white carry no intensities", "export the original grey image");
+  if (signature.truncated) refuse_damaged(request, signature, " (its end is missing)");
+
+  const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(signature.format);
+  if (!input) {
+    (void)OIIO::geterror();
+    refuse(request, "cannot be read: this OpenImageIO has no " + signature.format_name + " support", "convert it to TIFF");
+  }
+  OIIO::ImageSpec settings, spec;
+  settings.attribute("oiio:UnassociatedAlpha", 1);
+  settings.attribute("bmp:monochrome_detect", 1);
+  if (!input->open(request.path.string(), spec, settings))
+    refuse_damaged(request, signature, decoder_message(*input));
+
+  const bool several = input->seek_subimage(1, 0);
+  (void)input->geterror();
+  if (several && (signature.format == "gif" || spec.get_int_attribute("oiio:Movie", 0) != 0))
+    refuse(request, "is animated (" + signature.format_name + ")", "extract the frame to be fitted as a still image");
+  int page = 0;
+  if (several && !request.page) {
+    const int pages = count_pages(*input);
+    refuse(request, fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
+                                list_pages(*input, pages)),
+           "add `page: 0` for the first");
+  }
+  if (request.page) {
+    page = *request.page;
+    if (page < 0 || !input->seek_subimage(page, 0)) {
+      (void)input->geterror();
+      const int pages = count_pages(*input);
+      refuse(request, fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
+                                  list_pages(*input, pages)),
+             "pages count from 0");
+    }
+  }
+  if (!input->seek_subimage(page, 0)) refuse_damaged(request, signature, decoder_message(*input));
+  spec = input->spec(page, 0);
+
+  // From the header, before anything of the image's size is allocated.
+  if (spec.width < 1 || spec.height < 1) refuse_damaged(request, signature, " (it has no pixels)");
+  if (spec.width > kLargestSide || spec.height > kLargestSide)
+    refuse(request, fmt::format("is {} x {} pixels; at most {} on a side can be read", spec.width, spec.height, kLargestSide),
+           "crop it to the object, or bin it");
+  if (spec.depth > 1 || spec.deep)
+    refuse(request, spec.deep ? "is a deep image" : "is a volume, not an image", "export one plane of it");
+
+  const bool is_float = spec.format.is_floating_point();
+  const int bits = signature.stored_bits > 0 && signature.format != "bmp"
+                       ? signature.stored_bits
+                       : spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size()) * 8);
+  const bool tiff = signature.format == "tiff";
+  const int photometric = tiff ? spec.get_int_attribute("tiff:PhotometricInterpretation", 1) : -1;
+  constexpr int kWhiteIsZero = 0, kPalette = 3, kSubsampledColour = 6;
+  const bool palette = signature.palette || photometric == kPalette;
+  if (bits == 1)
+    refuse(request, "has 1 bit per pixel: black and white carry no intensities", "export the original grey image");
+  if (tiff && photometric > kPalette && photometric != kSubsampledColour)
+    refuse(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
+  if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
+    refuse(request, "is stored in the print colour space " + space, "save it as grey or RGB");
+  if (bits == 24 && !is_float && tiff)
+    refuse(request, "has 24 bits per sample", "save it as 16-bit integers or float");
+  if (!spec.channelformats.empty())
+    for (const TypeDesc& type : spec.channelformats)
+      if (!type.is_floating_point())
+        refuse(request, "has channels of different types", "save it as a grey image of 16-bit integers or float");
+
+  LoadedImage loaded;
+  const std::string description = spec.get_string_attribute("ImageDescription", "");
+  const std::vector<int> channels = chosen_channels(request, spec, palette, loaded.notes);
+  loaded.values = read_samples(request, signature, *input, page, spec, channels);
+
+  const bool small_integer = spec.format == TypeDesc::UINT8 || spec.format == TypeDesc::UINT16;
+  if (small_integer) {
+    loaded.bits = static_cast<int>(spec.format.size()) * 8;
+    loaded.top_code = loaded.bits == 8 ? 255 : 65535;
+    if (bits < loaded.bits && !palette && (tiff || signature.format == "png")) {
+      restore_packed_counts(bits, loaded.top_code, loaded.values, channels.size() > 1);
+      loaded.top_code = std::exp2(bits) - 1;
+      loaded.notes.push_back(fmt::format("{}-bit samples: counts from 0 to {:.0f}", bits, loaded.top_code));
+    }
+  } else {
+    loaded.bits = 32;
+    if (!is_float)
+      loaded.notes.push_back(fmt::format("{}: read as float, the saturation code is not known", describe_type(spec)));
+    else if (spec.format == TypeDesc::HALF)
+      loaded.notes.push_back("16-bit float samples hold three decimal digits only");
+  }
+  if (palette)
+    loaded.notes.push_back("palette image: its colours, not its indices, are the intensities; fit the original if you can");
+  if (signature.lossy || photometric == kSubsampledColour)
+    loaded.notes.push_back("lossy compression has changed the counts and their noise; fit the original if you can");
+  if (photometric == kWhiteIsZero)
+    loaded.notes.push_back("white is stored as zero: values inverted on reading, larger is brighter");
+  if (const int orientation = spec.get_int_attribute("Orientation", 1); orientation > 1 && orientation <= 8)
+    loaded.notes.push_back(fmt::format("orientation tag {} ignored: rows and columns are as stored", orientation));
+  if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width || spec.height != spec.full_height)
+    loaded.notes.push_back("the stored pixels are a window of a larger canvas: (0, 0) is the first stored pixel");
+  if (const double stack = number_or_zero(imagej_value(description, "images")); stack > 1 && !several) {
+    const std::string found = fmt::format("is an ImageJ stack of {:.0f} images with a single TIFF page", stack);
+    if (!request.page) refuse(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
+    loaded.notes.push_back("it " + found + ": the first is used");
+  }
+  loaded.pixel_size_um = stated_pixel_size_um(spec, description, loaded.notes);
+  return loaded;
+}
+
+// ---- writing --------------------------------------------------------------------------------------------------------
+
+/// The whole file in memory: every byte then goes through write_files, which sees a full disk; libtiff would not say.
+template <class T>
+std::string encode(const std::string& format, const OIIO::ImageSpec& spec, const std::vector<T>& samples) {
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput memory(bytes);
+  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(format);
+  if (!output || !output->supports("ioproxy") || !output->set_ioproxy(&memory))
+    throw std::runtime_error("OpenImageIO cannot write " + format + " to memory");
+  // close() leaves a message about Exif data that there are none of; its return value is what counts.
+  if (!output->open("memory." + format, spec) || !output->write_image(spec.format, samples.data()) || !output->close())
+    throw std::runtime_error("OpenImageIO cannot write " + format + ": " + output->geterror());
+  (void)output->geterror();
+  return std::string(bytes.begin(), bytes.end());
+}
+
+}  // namespace
+
+std::string encode_image(const Image& image, const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  if (image.empty()) throw std::logic_error("save_image: empty image");
+  if (extension == ".png") {
+    std::vector<std::uint16_t> samples(image.size());
+    std::transform(image.values().begin(), image.values().end(), samples.begin(), [](double value) {
+      return static_cast<std::uint16_t>(std::lround(value > 0 ? std::min(value, 1.0) * 65535 : 0.0));  // NaN is 0
+    });
+    return encode("png", OIIO::ImageSpec(image.width(), image.height(), 1, TypeDesc::UINT16), samples);
+  }
+  if (extension != ".tif" && extension != ".tiff" && extension != ".exr")
+    throw UserError({path.string()}, "has an unknown image extension '" + extension + "'",
+                    "use .tif or .exr (32-bit float) or .png (16-bit, 0 to 1)");
+  OIIO::ImageSpec spec(image.width(), image.height(), 1, TypeDesc::FLOAT);
+  spec.attribute("compression", "zip");
+  const std::vector<float> samples(image.values().begin(), image.values().end());
+  return encode(extension == ".exr" ? "openexr" : "tiff", spec, samples);
+}
+
+LoadedImage load_image(const ImageRequest& request) {
+  std::error_code code;
+  const fs::file_status status = fs::status(request.path, code);
+  if (status.type() == fs::file_type::not_found)
+    refuse(request, "does not exist", "check the name; relative paths start at the config's folder");
+  if (code) refuse(request, "cannot be opened: " + code.message(), "check the permissions of its folder");
+  if (fs::is_directory(status)) refuse(request, "is a folder", "name one image in it");
+  if (!fs::is_regular_file(status)) refuse(request, "is not a file", "name an image file");
+  const std::uintmax_t size = fs::file_size(request.path, code);
+  if (code) refuse(request, "cannot be opened: " + code.message(), "check its permissions");
+  if (size == 0) refuse(request, "is empty (zero bytes)", "copy it again from its source");
+  if (::access(request.path.c_str(), R_OK) != 0)
+    refuse(request, std::string("cannot be opened: ") + std::strerror(errno), "check its permissions");
+
+  const Signature signature = read_signature(request.path, size);
+  if (signature.format.empty())
+    refuse(request, "is no image of a kind birefit reads", "use PNG, TIFF, OpenEXR, JPEG, BMP, GIF or WebP");
+  try {
+    return load_checked(request, signature);
+  } catch (const std::bad_alloc&) {
+    refuse(request, "does not fit into memory", "crop it to the object, or bin it");
+  }
+}
+
+void save_image(const Image& image, const fs::path& path) { write_file(path, encode_image(image, path)); }
+
+std::vector<unsigned char> encode_png(const std::vector<unsigned char>& samples, int width, int height, int channels) {
+  if (samples.size() != static_cast<std::size_t>(width) * height * channels || (channels != 1 && channels != 3))
+    throw std::logic_error("encode_png: the samples do not fill the image");
+  const std::string file = encode("png", OIIO::ImageSpec(width, height, channels, TypeDesc::UINT8), samples);
+  return {file.begin(), file.end()};
+}
+
+}  // namespace birefit

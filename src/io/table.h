@@ -1,0 +1,26 @@
+#pragma once
+// Tables with the place of every row, for checks that go beyond "is a number".
+
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "birefit/io.h"
+
+namespace birefit {
+
+/// The whole of `text` as a decimal number ("1", "-2.5e-3", "+4"; no hexadecimal, no infinity); nothing when it is not.
+/// A number too large for a double is returned as infinity.
+std::optional<double> parse_number(std::string_view text);
+
+struct PlacedTable {
+  Table table;
+  std::vector<int> header_columns;             ///< character column of each header field, from 1
+  int header_line = 0;
+  std::vector<int> lines;                      ///< line of each row
+  std::vector<std::vector<int>> cell_columns;  ///< character column of each cell
+};
+PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where);
+
+}  // namespace birefit

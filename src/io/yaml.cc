@@ -1,0 +1,283 @@
+#include "io/yaml.h"
+
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/mark.h>
+#include <yaml-cpp/parser.h>
+
+#include <algorithm>
+#include <sstream>
+
+namespace birefit {
+namespace {
+
+/// Throws at the first byte that is no UTF-8 text. yaml-cpp would guess an encoding or replace such bytes silently.
+void check_text(const std::string& text, const std::string& file) {
+  int line = 1, column = 1;
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned char first = byte(i);
+    int length = 0;
+    if (first < 0x80) length = 1;
+    else if (first >= 0xC2 && first < 0xE0) length = 2;
+    else if (first >= 0xE0 && first < 0xF0) length = 3;
+    else if (first >= 0xF0 && first < 0xF5) length = 4;
+    bool good = length > 0 && i + length <= text.size();
+    for (int k = 1; good && k < length; ++k) good = (byte(i + k) & 0xC0) == 0x80;
+    if (good && length == 3) good = !(first == 0xE0 && byte(i + 1) < 0xA0) && !(first == 0xED && byte(i + 1) >= 0xA0);
+    if (good && length == 4) good = !(first == 0xF0 && byte(i + 1) < 0x90) && !(first == 0xF4 && byte(i + 1) >= 0x90);
+    if (!good) throw UserError({file, line, column}, "is not UTF-8 text", "is this a config file?");
+    if (first < 0x20 && first != '\t' && first != '\n' && first != '\r')
+      throw UserError({file, line, column}, "is not a text file (a control character)", "is this a config file?");
+    if (first == '\n') {
+      ++line;
+      column = 1;
+    } else {
+      ++column;
+    }
+    i += length;
+  }
+}
+
+[[noreturn]] void throw_too_deep(const Where& where) {
+  throw UserError(where, "is nested deeper than " + std::to_string(kMaxYamlDepth) + " levels");
+}
+
+/// Bounds the nesting before the recursive parser sees the text. An upper bound of the true depth: open brackets
+/// outside quotes and comments, and the stack of indentations including those made by "- - - x" in one line.
+void check_depth(const std::string& text, const std::string& file) {
+  std::vector<int> indents;
+  int brackets = 0, line = 1;
+  char quote = 0;
+  std::size_t line_start = 0;
+  while (line_start <= text.size()) {
+    std::size_t line_end = text.find('\n', line_start);
+    if (line_end == std::string::npos) line_end = text.size();
+    std::size_t i = line_start;
+    if (brackets == 0 && !quote) {
+      for (;;) {
+        while (i < line_end && text[i] == ' ') ++i;
+        if (i >= line_end || text[i] == '#' || text[i] == '\r') break;
+        const int column = static_cast<int>(i - line_start);
+        while (!indents.empty() && indents.back() >= column) indents.pop_back();
+        indents.push_back(column);
+        if (static_cast<int>(indents.size()) > kMaxYamlDepth) throw_too_deep({file, line, column + 1});
+        const bool indicator = (text[i] == '-' || text[i] == '?' || text[i] == ':') && i + 1 < line_end && text[i + 1] == ' ';
+        if (!indicator) break;
+        ++i;
+      }
+    }
+    char previous = 0;  // the last character that is not a space: a quote opens only where a value can begin
+    for (; i < line_end; ++i) {
+      const char c = text[i];
+      if (quote) {
+        if (quote == '"' && c == '\\') ++i;
+        else if (c == quote) quote = 0;
+        previous = c;
+        continue;
+      }
+      if (c == '#' && (i == line_start || text[i - 1] == ' ' || text[i - 1] == '\t')) break;
+      if ((c == '"' || c == '\'') && (previous == 0 || previous == ':' || previous == ',' || previous == '[' ||
+                                      previous == '{' || previous == '-' || previous == '?')) {
+        quote = c;
+      } else if (c == '[' || c == '{') {
+        if (++brackets > kMaxYamlDepth) throw_too_deep({file, line, static_cast<int>(i - line_start) + 1});
+      } else if ((c == ']' || c == '}') && brackets > 0) {
+        --brackets;
+      }
+      if (c != ' ') previous = c;
+    }
+    line_start = line_end + 1;
+    ++line;
+  }
+}
+
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  TreeBuilder(const std::string& file, Problems& problems) : file_(file), problems_(problems) {}
+
+  YamlNode root;
+  int documents = 0;
+  Where second_document;
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (++documents == 2) second_document = where(mark);
+  }
+  void OnDocumentEnd() override {}
+
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { leaf(mark, YamlNode::Kind::null, {}, false); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    throw UserError(where(mark), "aliases are not supported", "write the value out where it is used");
+  }
+  void OnAnchor(const YAML::Mark& mark, const std::string& name) override {
+    throw UserError(where(mark), "anchors and aliases are not supported: &" + name,
+                    "write the value out where it is used");
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t, const std::string& value) override {
+    check_tag(mark, tag);
+    leaf(mark, YamlNode::Kind::scalar, value, tag == "!");
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    check_tag(mark, tag);
+    open(mark, YamlNode::Kind::sequence);
+  }
+  void OnSequenceEnd() override { close(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    check_tag(mark, tag);
+    open(mark, YamlNode::Kind::map);
+  }
+  void OnMapEnd() override { close(); }
+
+ private:
+  struct Frame {
+    YamlNode node;
+    bool has_key = false;
+    std::string key;
+    Where key_where;
+  };
+
+  Where where(const YAML::Mark& mark) const {
+    if (mark.is_null()) return {file_};
+    return {file_, mark.line + 1, mark.column + 1};
+  }
+
+  void check_tag(const YAML::Mark& mark, const std::string& tag) const {
+    if (!tag.empty() && tag != "?" && tag != "!")
+      throw UserError(where(mark), "YAML tags are not supported: " + tag, "write the plain value");
+  }
+
+  void open(const YAML::Mark& mark, YamlNode::Kind kind) {
+    if (!stack_.empty() && stack_.back().node.is_map() && !stack_.back().has_key)
+      throw UserError(where(mark), "a key must be a plain word, not a list or a map");
+    if (static_cast<int>(stack_.size()) >= kMaxYamlDepth) throw_too_deep(where(mark));
+    Frame frame;
+    frame.node.kind = kind;
+    frame.node.where = where(mark);
+    stack_.push_back(std::move(frame));
+  }
+
+  void close() {
+    YamlNode node = std::move(stack_.back().node);
+    stack_.pop_back();
+    place(std::move(node));
+  }
+
+  void leaf(const YAML::Mark& mark, YamlNode::Kind kind, std::string text, bool quoted) {
+    if (!stack_.empty() && stack_.back().node.is_map() && !stack_.back().has_key) {
+      if (kind == YamlNode::Kind::null) throw UserError(where(mark), "a key is empty");
+      stack_.back().has_key = true;
+      stack_.back().key = std::move(text);
+      stack_.back().key_where = where(mark);
+      return;
+    }
+    YamlNode node;
+    node.kind = kind;
+    node.where = where(mark);
+    node.text = std::move(text);
+    node.quoted = quoted;
+    place(std::move(node));
+  }
+
+  void place(YamlNode node) {
+    if (stack_.empty()) {
+      if (documents <= 1) root = std::move(node);
+      return;
+    }
+    Frame& parent = stack_.back();
+    if (parent.node.is_sequence()) {
+      parent.node.items.push_back(std::move(node));
+      return;
+    }
+    parent.has_key = false;
+    for (const YamlEntry& entry : parent.node.entries) {
+      if (entry.key != parent.key) continue;
+      problems_.add(parent.key_where, "duplicate key " + parent.key,
+                    "first given at line " + std::to_string(entry.where.line) + "; keep one of the two");
+      return;
+    }
+    // The value of "key:" with nothing behind it has no useful place of its own.
+    if (node.kind == YamlNode::Kind::null) node.where = parent.key_where;
+    parent.node.entries.push_back({parent.key, parent.key_where, std::move(node)});
+  }
+
+  std::string file_;
+  Problems& problems_;
+  std::vector<Frame> stack_;
+};
+
+}  // namespace
+
+const YamlNode* YamlNode::find(const std::string& key) const {
+  for (const YamlEntry& entry : entries)
+    if (entry.key == key) return &entry.value;
+  return nullptr;
+}
+
+std::string YamlNode::describe() const {
+  switch (kind) {
+    case Kind::null: return "nothing";
+    case Kind::sequence: return "a list";
+    case Kind::map: return "a map";
+    case Kind::scalar: break;
+  }
+  const std::string shown = text.size() > 40 ? text.substr(0, 37) + "..." : text;
+  return quoted ? "the text \"" + shown + "\"" : shown;
+}
+
+YamlNode parse_yaml(const std::string& text, const std::string& file, Problems& problems) {
+  check_text(text, file);
+  check_depth(text, file);
+  TreeBuilder builder(file, problems);
+  std::istringstream stream(text);
+  try {
+    YAML::Parser parser(stream);
+    while (builder.documents < 2 && parser.HandleNextDocument(builder)) {
+    }
+  } catch (const YAML::Exception& error) {
+    Where where{file};
+    if (!error.mark.is_null()) where = {file, error.mark.line + 1, error.mark.column + 1};
+    throw UserError(where, "YAML syntax error: " + error.msg);
+  }
+  if (builder.documents > 1)
+    throw UserError(builder.second_document, "a second YAML document starts here", "a config is one document");
+  if (builder.documents == 0 || builder.root.kind == YamlNode::Kind::null)
+    throw UserError({file}, "is empty", "`birefit new droplet` prints a config to start from");
+  if (!builder.root.is_map())
+    throw UserError(builder.root.where, "expected `key: value` lines, found " + builder.root.describe());
+  return std::move(builder.root);
+}
+
+int edit_distance(const std::string& a, const std::string& b) {
+  const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
+  std::vector<std::vector<int>> d(n + 1, std::vector<int>(m + 1));
+  for (int i = 0; i <= n; ++i) d[i][0] = i;
+  for (int j = 0; j <= m; ++j) d[0][j] = j;
+  for (int i = 1; i <= n; ++i) {
+    for (int j = 1; j <= m; ++j) {
+      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+    }
+  }
+  return d[n][m];
+}
+
+std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
+  if (word.size() > 100) return {};
+  std::string best;
+  int best_distance = 1 << 20;
+  for (const std::string& candidate : known) {
+    int distance = edit_distance(word, candidate);
+    // A forgotten or wrong unit ("diameter", "diameter_nm" for diameter_um) is far in letters but near in meaning.
+    const std::string stem = candidate.substr(0, candidate.rfind('_'));
+    if (stem.size() >= 4 && stem != candidate && (word == stem || word.substr(0, word.rfind('_')) == stem))
+      distance = std::min(distance, 1);
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = candidate;
+    }
+  }
+  const int longest = static_cast<int>(std::max(word.size(), best.size()));
+  return best_distance <= std::max(1, longest * 2 / 5) && best_distance < static_cast<int>(word.size()) ? best : "";
+}
+
+}  // namespace birefit

@@ -1,0 +1,84 @@
+#pragma once
+// From scene descriptions to columns: the one place that knows which family and index law a scene asks for. Adding a
+// family: its law in families/ and a case here.
+
+#include <memory>
+#include <variant>
+
+#include "birefit/scene.h"
+#include "medium/column.h"
+#include "medium/families/planar.h"
+#include "medium/families/profile.h"
+#include "medium/families/radial.h"
+
+namespace birefit {
+
+template <class S>
+struct Indices {
+  S ordinary, extraordinary;  ///< n_o, n_e
+};
+
+/// `value(ref)` gives a parameter as S, `value.radians(ref)` an angle, `value.get(ref, fallback)` an optional one.
+template <class S, class V>
+Indices<S> material_indices(const Material& material, const V& value) {
+  if (const auto* constant = std::get_if<ConstantIndices>(&material)) {
+    const S n_o = value(constant->ordinary);
+    return {n_o, n_o + value(constant->birefringence)};
+  }
+  const auto& e44 = std::get<E44Steinberg2020>(material);
+  return {S(kE44Steinberg2020Ordinary), e44_steinberg2020_extraordinary(value.get(e44.temperature_k, 298.0))};
+}
+
+template <class S, class V>
+Vec3<S> uniform_axis(const UniformDirector& director, const V& value) {
+  if (director.axis[0])
+    return normalized(Vec3<S>{value(director.axis[0]), value(director.axis[1]), value(director.axis[2])});
+  return axis_from_angles<S>(value.radians(director.tilt_deg), value.radians(director.azimuth_deg));
+}
+
+/// The axis turned about z by the sample's rotation in the image.
+template <class S>
+Vec3<S> rotated(const Vec3<S>& axis, const S& angle_rad) {
+  S s, c;
+  sin_cos(angle_rad, s, c);
+  return {c * axis.x - s * axis.y, s * axis.x + c * axis.y, axis.z};
+}
+
+/// Column through a plane-parallel sample (cell, plate, slab), turned by `rotation_rad` about z.
+template <class S, class V>
+std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Material& material, const V& value,
+                                              const S& rotation_rad) {
+  const auto make = [](auto law, bool planar) -> std::unique_ptr<Column<S>> {
+    auto column = std::make_unique<LawColumn<S, decltype(law)>>(std::move(law));
+    column->planar = planar;
+    return column;
+  };
+  if (const auto* slab = std::get_if<Slab>(&sample)) {
+    auto table = std::make_shared<const ProfileTable>(slab->profile);
+    auto column = std::make_unique<LawColumn<S, ProfileLaw<S>>>(ProfileLaw<S>{table});
+    column->absorbing = table->absorbing();
+    column->jumps = table->jumps();
+    column->breaks.assign(table->edges().begin() + 1, table->edges().end() - 1);
+    return column;
+  }
+  const Indices<S> n = material_indices<S>(material, value);
+  const S eo = n.ordinary * n.ordinary, ee = n.extraordinary * n.extraordinary;
+  if (const auto* cell = std::get_if<Cell>(&sample)) {
+    const S thickness = value(cell->thickness_um);
+    if (const auto* uniform = std::get_if<UniformDirector>(&cell->director))
+      return make(UniformLaw<S>{rotated(uniform_axis<S>(*uniform, value), rotation_rad), eo, ee, thickness}, true);
+    const auto& twisted = std::get<TwistedDirector>(cell->director);
+    return make(TwistedLaw<S>{value.radians(twisted.azimuth_deg) + rotation_rad, value.radians(twisted.twist_deg),
+                              value.radians(twisted.pretilt_deg), eo, ee, thickness},
+                false);
+  }
+  const Plate& plate = std::get<Plate>(sample);
+  const S thickness = value(plate.thickness_um);
+  const Vec3<S> axis = rotated(uniform_axis<S>(plate.director, value), rotation_rad);
+  if (const auto* heat = std::get_if<HeatStep>(&plate.heat))
+    return make(HeatedLaw<S>{axis, value(heat->fourier_number), value(heat->cold_k), value(heat->hot_k), thickness},
+                true);
+  return make(UniformLaw<S>{axis, eo, ee, thickness}, true);
+}
+
+}  // namespace birefit

@@ -1,0 +1,107 @@
+#pragma once
+// The waist of the hourglass: many director families above, many transport methods below, and between them only this:
+// a straight column of light, sampled at plain numbers u in [0, 1] from entry to exit. Families map u to depth as it
+// suits them (clustered at a defect, scaled by the thickness), so that one fixed mesh in u serves every ray and every
+// parameter value, and the objective of a fit stays smooth.
+
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/scalar.h"
+
+namespace birefit {
+
+/// The medium at one point of a column, in the column's frame: z along the column (for a stratified slab its normal).
+template <class S>
+struct OpticalPoint {
+  Vec3<S> axis;              ///< unit optic axis; axis and -axis are the same state
+  S ordinary, extraordinary; ///< permittivities n_o^2, n_e^2, real parts
+  S ordinary_im, extraordinary_im;  ///< imaginary parts, >= 0 absorbs; only read when Column::absorbing
+  S depth_slope_um;          ///< d depth / d u
+};
+
+template <class S>
+using Slope = Dual<S, 1>;
+
+template <class S>
+class Column {
+ public:
+  virtual ~Column() = default;
+  /// The medium at each u; out has u.size() places.
+  virtual void sample(std::span<const double> u, OpticalPoint<S>* out) const = 0;
+  /// The same with d/du of every field in .d[0].
+  virtual void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const = 0;
+
+  bool absorbing = false;
+  /// The axis stays in a plane that contains z and does not turn: transport is diagonal at normal incidence.
+  bool planar = false;
+  /// Inner points where the medium has a kink or, with `jumps`, a step: meshes must have a node there.
+  std::vector<double> breaks;
+  bool jumps = false;
+};
+
+/// Makes a Column of a law with a member template `OpticalPoint<T> at(const T& u) const` for T = S and T = Slope<S>.
+template <class S, class Law>
+class LawColumn final : public Column<S> {
+ public:
+  explicit LawColumn(Law law) : law_(std::move(law)) {}
+  void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
+    for (std::size_t i = 0; i < u.size(); ++i) out[i] = law_.template at<S>(S(u[i]));
+  }
+  void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      Slope<S> x{S(u[i])};
+      x.d[0] = S(1.0);
+      out[i] = law_.template at<Slope<S>>(x);
+    }
+  }
+  Law& law() { return law_; }
+
+ private:
+  Law law_;
+};
+
+/// A column whose samples at the node sets of one method are computed once and shared by all rays: for plates, where
+/// only the direction changes from pixel to pixel. Node sets seen before freeze() are remembered; others still work.
+template <class S>
+class CachedColumn final : public Column<S> {
+ public:
+  explicit CachedColumn(std::unique_ptr<Column<S>> column) : column_(std::move(column)) {
+    this->absorbing = column_->absorbing;
+    this->planar = column_->planar;
+    this->breaks = column_->breaks;
+    this->jumps = column_->jumps;
+  }
+  void freeze() { frozen_ = true; }
+  void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
+    serve(u, out, values_, [&](auto* p) { column_->sample(u, p); });
+  }
+  void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
+    serve(u, out, slopes_, [&](auto* p) { column_->sample_with_slope(u, p); });
+  }
+
+ private:
+  template <class P>
+  struct Entry {
+    std::vector<double> u;
+    std::vector<P> points;
+  };
+  template <class P, class Compute>
+  void serve(std::span<const double> u, P* out, std::vector<Entry<P>>& cache, const Compute& compute) const {
+    for (const Entry<P>& entry : cache)
+      if (entry.u.size() == u.size() && std::equal(u.begin(), u.end(), entry.u.begin())) {
+        std::copy(entry.points.begin(), entry.points.end(), out);
+        return;
+      }
+    compute(out);
+    if (!frozen_) cache.push_back({{u.begin(), u.end()}, {out, out + u.size()}});
+  }
+  std::unique_ptr<Column<S>> column_;
+  mutable std::vector<Entry<OpticalPoint<S>>> values_;
+  mutable std::vector<Entry<OpticalPoint<Slope<S>>>> slopes_;
+  bool frozen_ = false;
+};
+
+}  // namespace birefit

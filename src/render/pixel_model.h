@@ -1,0 +1,78 @@
+#pragma once
+// What the image assembly needs of a scene: the intensity at points of the image, for any scalar.
+
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include "birefit/render.h"
+#include "core/scalar.h"
+
+namespace birefit {
+
+/// Theta as scalars S: entry active[j] carries derivative j.
+template <class S>
+class Values {
+ public:
+  Values(const Theta& theta, std::vector<int> active) : theta_(theta), active_(std::move(active)) {}
+  S operator()(ParameterRef ref) const {
+    S value(theta_.at(static_cast<std::size_t>(ref.index)));
+    if constexpr (ScalarTraits<S>::derivatives > 0) {
+      for (std::size_t j = 0; j < active_.size(); ++j)
+        if (active_[j] == ref.index) value.d[j] = PlainOf<S>(1.0);
+    }
+    return value;
+  }
+  S get(ParameterRef ref, double fallback) const { return ref ? (*this)(ref) : S(fallback); }
+  S radians(ParameterRef ref, double fallback_deg = 0) const {
+    return get(ref, fallback_deg) * (std::numbers::pi / 180);
+  }
+
+ private:
+  const Theta& theta_;
+  std::vector<int> active_;
+};
+
+template <class S>
+inline constexpr int kLanesOf = std::is_same_v<PlainOf<S>, Pack> ? kLanes : 1;
+
+/// Intensity at image points (pixel units; docs/conventions.md), one a lane.
+template <class S>
+class PixelModel {
+ public:
+  virtual ~PixelModel() = default;
+  virtual S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const = 0;
+};
+
+/// 2 pi / wavelength in 1/um.
+template <class S>
+S wavenumber_per_um(const Scene& scene, const Values<S>& value) {
+  return (2000 * std::numbers::pi) / value(scene.microscope.wavelength_nm);
+}
+
+template <class S>
+struct Polarizers {
+  S px, py, ax, ay;  ///< unit vectors of polarizer and analyser in the image's x, y
+};
+template <class S>
+Polarizers<S> polarizers(const Scene& scene, const Values<S>& value) {
+  Polarizers<S> r;
+  sin_cos(value.radians(scene.microscope.polarizer_deg), r.py, r.px);
+  sin_cos(value.radians(scene.microscope.analyzer_deg), r.ay, r.ax);
+  return r;
+}
+
+/// One file a sample kind. `plan` must be of the same scene.
+template <class S>
+std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene&, const RenderPlan&, const Values<S>&);
+template <class S>
+std::unique_ptr<PixelModel<S>> make_planar_model(const Scene&, const RenderPlan&, const Values<S>&);
+template <class S>
+std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene&, const RenderPlan&, const Values<S>&);
+template <class S>
+std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene&, const RenderPlan&, const Values<S>&);
+
+/// The same image as render(), one thread, one ray at a time in plain doubles: what lanes are measured against.
+Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& theta);
+
+}  // namespace birefit

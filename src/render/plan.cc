@@ -1,0 +1,399 @@
+// The planner: the cheapest method that holds the requested accuracy, found by measuring a few pilot rays against a
+// converged computation of the same physics, not by rules of thumb. docs/methods.md, "Choosing".
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include <fmt/format.h>
+
+#include "birefit/render.h"
+#include "medium/build.h"
+#include "render/droplet.h"
+#include "render/planar.h"
+#include "render/sampling.h"
+#include "transport/methods.h"
+
+namespace birefit {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// ---- what pilots compare ----------------------------------------------------------------------------------------------
+
+/// Largest error of any polarizer-analyser intensity that two retarders can differ by: 2 |difference|.
+double intensity_distance(const Su2<double>& a, const Su2<double>& b) {
+  return 2 * std::sqrt(square(a.w - b.w) + square(a.x - b.x) + square(a.y - b.y) + square(a.z - b.z));
+}
+/// The same for Jones matrices, whose common phase does not matter.
+double intensity_distance(const Mat2<double>& a, const Mat2<double>& b) {
+  // Align the common phase by the inner product.
+  const Complex<double> inner = conj(a.a) * b.a + conj(a.b) * b.b + conj(a.c) * b.c + conj(a.d) * b.d;
+  const double modulus = std::sqrt(norm(inner));
+  const Complex<double> turn = modulus > 0 ? Complex<double>(inner.re / modulus, -inner.im / modulus) : Complex<double>(1.0);
+  const Mat2<double> d = turn * b - a;
+  return 2 * std::sqrt(norm(d.a) + norm(d.b) + norm(d.c) + norm(d.d)) / std::sqrt(2.0);
+}
+
+std::string sci(double x) { return fmt::format("{:.1e}", x); }
+
+/// Smallest entry of `candidates` whose worst pilot error is within `target`; fills error. Falls back to the last.
+int choose(const std::vector<int>& candidates, double target, const std::function<double(int)>& error_of, double& error) {
+  for (int n : candidates) {
+    error = error_of(n);
+    if (error <= target) return n;
+  }
+  return candidates.back();
+}
+const std::vector<int> kPanels{1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128};
+const std::vector<int> kSteps{4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 192, 256, 384, 512, 1024, 2048, 4096, 8192};
+
+void check_method(const Scene& scene) {
+  if (scene.method == "auto") return;
+  const auto& names = transport_method_names();
+  if (std::find(names.begin(), names.end(), scene.method) == names.end())
+    throw UserError(Where{}, fmt::format("transport method '{}' does not exist", scene.method),
+                    fmt::format("use auto or one of: {}", fmt::join(names, ", ")));
+}
+
+// ---- what no method here models ------------------------------------------------------------------------------------------
+
+void note_illumination(const Scene& scene, const Values<double>& value, double largest_phase, RenderPlan& plan) {
+  const Microscope& m = scene.microscope;
+  if (m.bandwidth_nm > 0) {
+    const double s = largest_phase * m.bandwidth_nm / 2.355 / value(m.wavelength_nm);
+    const double loss = 0.5 * (1 - std::exp(-0.5 * s * s));
+    plan.model_error = std::hypot(plan.model_error, loss);
+    if (loss > 1e-3)
+      plan.warnings.push_back(fmt::format(
+          "The light's bandwidth of {:g} nm is not modelled; at the largest retardance here ({:.3g} rad) it changes the "
+          "intensity by up to {:.2g}.",
+          m.bandwidth_nm, largest_phase, loss));
+  }
+  if (m.condenser_na > 0) {
+    const double s = largest_phase * m.condenser_na * m.condenser_na / 8;  // mean phase shift over the cone, n ~ 1.5
+    const double loss = std::min(0.5, 0.5 * std::abs(s));
+    plan.model_error = std::hypot(plan.model_error, loss);
+    if (loss > 1e-3)
+      plan.warnings.push_back(fmt::format(
+          "The condenser's aperture (NA {:g}) is not modelled; it shifts the phase by about {:.2g} rad.", m.condenser_na, s));
+  }
+}
+
+double reflectance(double n1, double n2) { return square((n1 - n2) / (n1 + n2)); }
+
+// ---- droplets ------------------------------------------------------------------------------------------------------------
+
+/// Retardance phase (rad) of the untwisted droplet's ray at sin psi = x sin psi_max.
+double droplet_phase(const DropletOptics<double>& o, double psi) {
+  const double sin_in = o.ratio * std::sin(psi);
+  if (sin_in >= 1) return 0;
+  const double cos_in = std::sqrt(1 - sin_in * sin_in);
+  const Chord<double> chord(o.radius_um * sin_in, o.radius_um * cos_in, o.radius_um);
+  const RadialLaw<double> law{chord, o.n_o * o.n_o, o.n_e * o.n_e};
+  // 64 midpoints in the clustered coordinate: enough for a planner.
+  double sum = 0;
+  for (int i = 0; i < 64; ++i) {
+    const OpticalPoint<double> p = law.at((i + 0.5) / 64);
+    sum += retardance_per_length(p) * p.depth_slope_um / 64;
+  }
+  return o.k0 * sum;
+}
+
+void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double bins,
+                     const std::function<double(double)>& phase_step) {
+  plan.sampling_center_x_px = center_x;
+  plan.sampling_center_y_px = center_y;
+  plan.sampling_bin_px = 1;
+  plan.samples.clear();
+  for (int i = 0; i < bins; ++i) plan.samples.push_back(samples_for(phase_step(i + 0.5)));
+}
+
+RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
+  RenderPlan plan;
+  const Droplet& droplet = std::get<Droplet>(scene.sample);
+  const DropletOptics<double> o = droplet_optics(scene, value);
+  const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
+  const bool twisted = static_cast<bool>(droplet.director.twist_deg);
+  std::vector<double> pilots{0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97};
+  std::vector<DropletRay<double>> rays;
+  for (double f : pilots) rays.push_back(trace(o, rim, f * rim.rho_max() * o.radius_um));
+
+  const auto worst = [&](const std::string& method, const Mesh& mesh) {
+    const Magnus4<double> reference;
+    double error = 0;
+    for (const DropletRay<double>& r : rays) {
+      const Mesh fine = uniform_mesh(twisted ? 1024 : 512);
+      const Su2<double> exact = droplet_retarder<double>(o, r, reference, fine, twisted);
+      error = std::max(error, intensity_distance(exact, droplet_retarder(o, r, transport_method<double>(method), mesh, twisted)));
+    }
+    return error;
+  };
+  plan.method = scene.method != "auto" ? scene.method : twisted ? "magnus4" : "diagonal";
+  if (plan.method == "diagonal" && twisted)
+    throw UserError(Where{}, "transport.method: diagonal cannot do a twisted director, its modes are coupled",
+                    "use auto or magnus4");
+  const auto& candidates = plan.method == "diagonal" ? kPanels : kSteps;
+  plan.steps = choose(candidates, scene.intensity_accuracy / 2,
+                      [&](int n) { return worst(plan.method, uniform_mesh(n)); }, plan.numerical_error);
+  if (scene.method != "auto")
+    plan.reasons.push_back(fmt::format("method {} was asked for by name", plan.method));
+  else if (twisted)
+    plan.reasons.push_back("the twisted director leaves the plane of the ray: modes couple, so the full 2 x 2 transport is needed");
+  else
+    plan.reasons.push_back("the radial director stays in the meridional plane of every ray: transport is diagonal, one phase integral suffices");
+  plan.reasons.push_back(fmt::format("{} {} hold the intensity to {} on {} pilot rays (asked: {})", plan.steps,
+                                     plan.method == "diagonal" ? "panels of 8 Gauss nodes" : "steps", sci(plan.numerical_error),
+                                     rays.size(), sci(scene.intensity_accuracy)));
+  plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
+
+  const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.radius_um;
+  double largest_phase = 0;
+  const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
+  if (bins > 100000) throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");
+  const auto phase_at = [&](double radius_um) {
+    const double psi = rim.psi_at(std::clamp(radius_um / o.radius_um, 0.0, rim.rho_max()));
+    return droplet_phase(o, psi);
+  };
+  for (int i = 0; i <= 64; ++i) largest_phase = std::max(largest_phase, phase_at(edge * i / 64));
+  sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
+    const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
+    // The cross turns within the innermost pixels; at the rim intensity ends like a root.
+    if (r < 2) return std::max(0.5, std::abs(phase_at(high) - phase_at(low)));
+    if (high > edge - 2 * px && low < edge + px) return 5.0;
+    return std::abs(phase_at(high) - phase_at(low));
+  });
+  const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+  plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel", most));
+  // Outside the droplet one sample is enough.
+  plan.samples.push_back(1);
+
+  const double worst_reflection = std::max(reflectance(o.n_e, o.n_host), reflectance(o.n_o, o.n_host));
+  plan.model_error = 2 * worst_reflection;
+  const double size = 2 * o.radius_um * o.n_host / value(scene.microscope.wavelength_nm) * 1000;
+  if (size < 400)
+    plan.warnings.push_back(fmt::format(
+        "The droplet is {:.3g} wavelengths across: straight rays leave out diffraction and walk-off. Measured on exact "
+        "solutions of 5 to 20 um droplets of birefringence 0.22, ray images differ by 25 to 60 % RMS and a fitted "
+        "birefringence comes out 1 to 7 % low; the error bars do not contain this.",
+        size));
+  note_illumination(scene, value, largest_phase, plan);
+  plan.cost_seconds = 1e-9 * scene.view.width * scene.view.height * (30 + (plan.method == "diagonal" ? 8 * 12 : 45) * plan.steps);
+  return plan;
+}
+
+// ---- cells, plates, slabs ------------------------------------------------------------------------------------------------
+
+std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value) {
+  std::vector<std::pair<double, double>> t;
+  if (const auto* plate = std::get_if<Plate>(&scene.sample)) {
+    const double edge = std::tan(value.radians(plate->half_angle_deg, 15));
+    // Pixels beyond the inscribed circle, up to the corners of the image.
+    const double corner = std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);
+    t.push_back({0.0, 0.0});
+    for (int i = 0; i < 6; ++i)
+      for (double f : {0.5, corner})
+        t.push_back({f * edge * std::cos(i * kPi / 3 + 0.2), f * edge * std::sin(i * kPi / 3 + 0.2)});
+  } else if (!scene.microscope.directions.empty()) {
+    for (const Direction& d : scene.microscope.directions) {
+      const double f = std::tan(d.theta_deg * kPi / 180), a = d.azimuth_deg * kPi / 180;
+      t.push_back({f * std::cos(a), f * std::sin(a)});
+    }
+    if (t.size() > 12) t.resize(12);
+  } else {
+    t.push_back({0.0, 0.0});
+  }
+  return t;
+}
+
+Ray<double> ray_at(const PlanarOptics<double>& o, double tx, double ty) {
+  const double c = 1 / std::sqrt(1 + tx * tx + ty * ty);
+  return {o.k0, o.n_host * c * tx, o.n_host * c * ty, o.continuity};
+}
+
+/// Phase difference of the two modes (rad), a sum over midpoints.
+double planar_phase(const PlanarOptics<double>& o, double tx, double ty, int nodes = 64) {
+  const Ray<double> ray = ray_at(o, tx, ty);
+  std::vector<double> u(static_cast<std::size_t>(nodes));
+  for (int i = 0; i < nodes; ++i) u[static_cast<std::size_t>(i)] = (i + 0.5) / nodes;
+  std::vector<OpticalPoint<double>> p(u.size());
+  o.column->sample(u, p.data());
+  double sum = 0;
+  for (const auto& point : p) {
+    const double eo = point.ordinary, de = point.extraordinary - eo;
+    const double ak = point.axis.x * ray.kx + point.axis.y * ray.ky, kk = ray.kx * ray.kx + ray.ky * ray.ky;
+    const double a = eo + de * square(point.axis.z), b = de * point.axis.z * ak, c = eo * kk + de * ak * ak - eo * point.extraordinary;
+    const double root = b * b - a * c;
+    if (eo <= kk || root <= 0) return 0;
+    sum += ((std::sqrt(root) - b) / a - std::sqrt(eo - kk)) * point.depth_slope_um / nodes;
+  }
+  return o.k0 * sum;
+}
+
+RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
+  RenderPlan plan;
+  const PlanarOptics<double> o = planar_optics(scene, value);
+  const auto directions = pilot_directions(scene, value);
+  const bool plate = std::holds_alternative<Plate>(scene.sample);
+  for (const auto& [tx, ty] : directions) {
+    const Ray<double> ray = ray_at(o, tx, ty);
+    std::vector<double> u{0.0, 0.5, 1.0};
+    OpticalPoint<double> p[3];
+    o.column->sample(u, p);
+    for (const auto& q : p)
+      if (std::min(q.ordinary, q.extraordinary) <= ray.kx * ray.kx + ray.ky * ray.ky)
+        throw UserError(Where{}, "a direction of this scene is totally reflected: its tangential wavevector exceeds an index of the sample",
+                        "lower the angle of incidence or the surround's index");
+  }
+  // Converged truth on the pilots.
+  const double target = scene.intensity_accuracy / 2;
+  const Magnus4<double> magnus;
+  std::vector<Mat2<double>> truth;
+  Mesh finest;
+  for (const auto& [tx, ty] : directions) {
+    const Mesh mesh = adapted_mesh(*o.column, ray_at(o, tx, ty), std::max(target / 20, 1e-13));
+    truth.push_back(planar_jones<double>(o, magnus, mesh, tx, ty));
+    if (mesh.size() > finest.size()) finest = mesh;
+  }
+  const auto worst = [&](const TransportMethod<double>& method, const Mesh& mesh) {
+    double error = 0;
+    for (std::size_t i = 0; i < directions.size(); ++i)
+      error = std::max(error, intensity_distance(truth[i], planar_jones(o, method, mesh, directions[i].first, directions[i].second)));
+    return std::isfinite(error) ? error : 1e300;
+  };
+  const bool slab = std::holds_alternative<Slab>(scene.sample);
+  if (scene.method == "auto" || scene.method == "diagonal") {
+    double error = 1e300;
+    int n = 0;
+    if (o.column->planar || scene.method == "diagonal")
+      n = choose(kPanels, target, [&](int k) { return worst(transport_method<double>("diagonal"), uniform_mesh(k, o.column->breaks)); }, error);
+    if (error <= target || scene.method == "diagonal") {
+      plan.method = "diagonal";
+      plan.steps = n;
+      plan.numerical_error = error;
+      plan.reasons.push_back(fmt::format(
+          "mode coupling is below the accuracy: {} panels of 8 Gauss nodes hold the intensity to {} on {} pilot directions (asked: {})",
+          n, sci(error), directions.size(), sci(scene.intensity_accuracy)));
+      if (error > target)
+        plan.warnings.push_back(fmt::format("The diagonal method, asked for by name, errs by {} here.", sci(error)));
+    }
+  }
+  if (plan.method.empty() && scene.method == "layers_midpoint") {
+    plan.method = scene.method;
+    plan.steps = choose(kSteps, target, [&](int k) { return worst(transport_method<double>(scene.method), uniform_mesh(k, o.column->breaks)); },
+                        plan.numerical_error);
+    plan.reasons.push_back(fmt::format("layers were asked for by name: {} of them err by {}", plan.steps, sci(plan.numerical_error)));
+  }
+  if (plan.method.empty()) {
+    plan.method = "magnus4";
+    plan.mesh = finest;
+    plan.numerical_error = std::min(worst(magnus, finest), target);
+    plan.reasons.push_back(fmt::format("the axis turns out of the ray's plane: full 2 x 2 transport with {} adapted Magnus-4 steps",
+                                       finest.size() - 1));
+  }
+  double largest_phase = 0;
+  for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
+  if (plate) {
+    const Plate& p = std::get<Plate>(scene.sample);
+    const int side = std::min(scene.view.width, scene.view.height);
+    const double scale = std::tan(value.radians(p.half_angle_deg, 15)) * 2 / side;
+    const double cx = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1));
+    const double cy = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
+    const int bins = static_cast<int>(std::ceil(std::hypot(std::max(cx, scene.view.width - cx), std::max(cy, scene.view.height - cy)))) + 1;
+    // The gradient changes slowly with radius: measure it on 24 radii and 12 azimuths, interpolate.
+    std::vector<double> gradient(25);
+    for (int i = 0; i <= 24; ++i)
+      for (int k = 0; k < 12; ++k) {
+        const double r = scale * bins * i / 24, a = k * kPi / 6, h = scale * 0.5;
+        const double x = r * std::cos(a), y = r * std::sin(a);
+        const double gx = planar_phase(o, x + h, y, 24) - planar_phase(o, x - h, y, 24);
+        const double gy = planar_phase(o, x, y + h, 24) - planar_phase(o, x, y - h, 24);
+        gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(gx, gy));
+      }
+    sample_by_phase(plan, cx, cy, bins, [&](double r) {
+      const double f = std::min(23.999, r / bins * 24);
+      const std::size_t i = static_cast<std::size_t>(f);
+      return std::max(gradient[i], gradient[i + 1]);
+    });
+    const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+    plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel: up to {} x {} points a pixel",
+                                       *std::max_element(gradient.begin(), gradient.end()), most, most));
+  } else if (!slab) {
+    plan.reasons.push_back("every pixel sees the same ray: one transfer for the whole image");
+  }
+  OpticalPoint<double> faces[2];
+  const double ends[2] = {0, 1};
+  o.column->sample(ends, faces);
+  double r = 0;
+  for (const auto& f : faces)
+    r = std::max({r, reflectance(std::sqrt(f.ordinary), o.n_host), reflectance(std::sqrt(f.extraordinary), o.n_host)});
+  plan.model_error = r + (scene.ceiling == Ceiling::e_only ? 0.03 : 0.0);
+  if (r > 0.01)
+    plan.warnings.push_back(fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by up to about {:.2g}.", r, r));
+  note_illumination(scene, value, largest_phase, plan);
+  const double per_ray = plan.method == "diagonal" ? 250 + 8.0 * plan.steps * 8 : 400.0 * static_cast<double>(plan.mesh.empty() ? plan.steps : static_cast<int>(plan.mesh.size()));
+  const double rays = plate ? static_cast<double>(scene.view.width) * scene.view.height * 4 : 1;
+  plan.cost_seconds = 1e-9 * rays * per_ray;
+  return plan;
+}
+
+/// Retardance phases at points fixed relative to the sample, for judging how fast fringes move.
+std::vector<double> phases(const Scene& scene, const Theta& theta) {
+  const Values<double> value(theta, {});
+  std::vector<double> result;
+  if (std::holds_alternative<Droplet>(scene.sample)) {
+    const DropletOptics<double> o = droplet_optics(scene, value);
+    for (int i = 1; i < 12; ++i) result.push_back(droplet_phase(o, std::asin(std::min(1.0, 1 / o.ratio)) * i / 12));
+    result.push_back(o.twist_rad);
+  } else if (const auto* crystal = std::get_if<Crystal>(&scene.sample)) {
+    double field = 1;
+    for (ParameterRef c : crystal->field_legendre) field += value(c);
+    result.push_back(kPi * value(crystal->bias_v) / value(crystal->half_wave_voltage_v) * field);
+  } else {
+    const PlanarOptics<double> o = planar_optics(scene, value);
+    for (const auto& [tx, ty] : pilot_directions(scene, value)) result.push_back(planar_phase(o, tx, ty));
+    if (const auto* cell = std::get_if<Cell>(&scene.sample))
+      if (const auto* twisted = std::get_if<TwistedDirector>(&cell->director))
+        result.push_back(2 * value.radians(twisted->twist_deg));
+  }
+  return result;
+}
+
+}  // namespace
+
+RenderPlan plan(const Scene& scene, const Theta& theta) {
+  check_method(scene);
+  const Values<double> value(theta, {});
+  RenderPlan result;
+  if (std::holds_alternative<Droplet>(scene.sample)) {
+    result = plan_droplet(scene, value);
+  } else if (std::holds_alternative<Crystal>(scene.sample)) {
+    if (scene.method != "auto" && scene.method != "diagonal")
+      throw UserError(Where{}, fmt::format("transport method '{}' does not apply to a crystal bar", scene.method),
+                      "leave transport.method at auto");
+    result.method = "closed_form";
+    result.reasons.push_back("a crystal between electrodes is one retarder per pixel: sin^2 in closed form");
+    result.cost_seconds = 5e-9 * scene.view.width * scene.view.height;
+    const Crystal& crystal = std::get<Crystal>(scene.sample);
+    note_illumination(scene, value, std::abs(kPi * value(crystal.bias_v) / value(crystal.half_wave_voltage_v)), result);
+  } else {
+    result = plan_planar(scene, value);
+  }
+  result.physics = scene.ceiling == Ceiling::e_only ? "e_only" : "one_way";
+  return result;
+}
+
+double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index) {
+  const std::size_t i = static_cast<std::size_t>(index);
+  const double h = std::max(1e-6, 1e-5 * std::abs(theta[i]));
+  Theta up = theta, down = theta;
+  up[i] += h;
+  down[i] -= h;
+  const std::vector<double> a = phases(scene, up), b = phases(scene, down);
+  double largest_change = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) largest_change = std::max(largest_change, std::abs(a[k] - b[k]));
+  const double slope = largest_change / (2 * h);
+  return slope > 1e-9 ? slope : 0;
+}
+
+}  // namespace birefit

@@ -1,0 +1,25 @@
+#pragma once
+// One direction of light through a plane-parallel sample.
+
+#include "render/pixel_model.h"
+#include "transport/method.h"
+
+namespace birefit {
+
+template <class S>
+struct PlanarOptics {
+  std::unique_ptr<CachedColumn<S>> column;
+  S k0, n_host;
+  Continuity continuity = Continuity::e_and_h;
+};
+
+template <class S>
+PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value);
+
+/// Jones matrix in the lab's x, y after unrolling s and p by the azimuth, faces included; (tx, ty) = tan(incidence in
+/// the host) times the unit vector of the azimuth.
+template <class S>
+Mat2<S> planar_jones(const PlanarOptics<S>& optics, const TransportMethod<S>& method, const Mesh& mesh, const S& tx,
+                     const S& ty);
+
+}  // namespace birefit

@@ -1,0 +1,78 @@
+#pragma once
+// The interface every transport method implements, and the list of them. Adding a method: one file in methods/ and one
+// line in methods.def.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "medium/column.h"
+#include "transport/matrix.h"
+#include "transport/one_way.h"
+
+namespace birefit {
+
+/// Light through one column.
+template <class S>
+struct Ray {
+  S k0_per_um;  ///< 2 pi / vacuum wavelength
+  S kx, ky;     ///< tangential wavevector in units of k0, constant along the column
+  Continuity continuity = Continuity::e_and_h;
+};
+
+/// Step boundaries in u, 0 = first < .. < last = 1; contains every break of the column.
+using Mesh = std::vector<double>;
+
+/// How a method describes itself to the planner, the charts and the documentation.
+struct MethodInfo {
+  const char* name;
+  int order;              ///< global error ~ steps^-order; 0 = spectral (quadrature)
+  bool needs_planar;      ///< exact only where transport is diagonal
+  const char* summary;    ///< what it is, one line
+  const char* source;
+};
+
+template <class S>
+class TransportMethod {
+ public:
+  virtual ~TransportMethod() = default;
+  virtual const MethodInfo& info() const = 0;
+  /// Transfer matrix of E_t from just inside u = 0 to just inside u = 1, steps of the medium at its breaks included,
+  /// entry and exit faces not.
+  virtual Mat2<S> transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const = 0;
+  /// Normal incidence (kx = ky = 0), lossless, no jumps: the retarder on the flux-normalised field (e_and_h) or on E_t
+  /// (e_only), common phase left out.
+  virtual Su2<S> retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const = 0;
+};
+
+/// All methods for scalar S, in the order of methods.def.
+template <class S>
+std::span<const TransportMethod<S>* const> transport_methods();
+template <class S>
+const TransportMethod<S>& transport_method(const std::string& name);  ///< throws std::logic_error when unknown
+const std::vector<std::string>& transport_method_names();
+
+/// Outside faces: E_t transmitted into the column at u = 0 and out of it at u = 1, host of real index n.
+template <class S>
+Mat2<S> entry_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index);
+template <class S>
+Mat2<S> exit_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index);
+/// exit * transfer * entry.
+template <class S>
+Mat2<S> transmission(const TransportMethod<S>& method, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
+                     const S& host_index);
+
+/// n equal steps between 0 and 1 merged with the column's breaks (each piece gets at least one step).
+Mesh uniform_mesh(int steps, const std::vector<double>& breaks = {});
+/// Steps of magnus4 whose local error (one step against two halves, Frobenius norm) is below tolerance per unit u.
+/// Never fails: stops refining at max_steps and returns what it has; error_estimate receives the sum of local errors.
+Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double tolerance, double* error_estimate = nullptr,
+                  int max_steps = 200000);
+
+// The scalars all kernels are compiled for.
+#define BIREFIT_FOR_EACH_SCALAR(X) X(double) X(Pack) X(Dual1) X(Dual2) X(Dual4)
+using Dual1 = Dual<Pack, 1>;
+using Dual2 = Dual<Pack, 2>;
+using Dual4 = Dual<Pack, 4>;
+
+}  // namespace birefit

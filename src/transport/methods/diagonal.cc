@@ -1,0 +1,160 @@
+#include "transport/methods.h"
+#include "transport/quadrature.h"
+
+namespace birefit {
+namespace {
+
+constexpr MethodInfo kInfo{"diagonal", 0, true, "one phase integral per local mode, 8 Gauss nodes a step, flux factors",
+                           "Born & Wolf 15; flux factors: docs/methods.md"};
+
+/// Normal components and tangential fields of the ordinary and extraordinary waves (columns of `fields`), Steinberg
+/// TOG 2020 eqs. 70, 72. Singular where the axis is parallel to the wavevector: not for such columns.
+template <class T>
+struct Modes {
+  Complex<T> q_o, q_e;
+  Mat2<T> fields;
+};
+template <class T>
+Modes<T> modes(const OpticalPoint<T>& p, const T& kx, const T& ky) {
+  using C = Complex<T>;
+  const C eo{p.ordinary, p.ordinary_im}, ee{p.extraordinary, p.extraordinary_im};
+  const C de = ee - eo;
+  const T ak = p.axis.x * kx + p.axis.y * ky, kk = kx * kx + ky * ky;
+  const C A = eo + (p.axis.z * p.axis.z) * de, B = (p.axis.z * ak) * de;
+  const C Cc = kk * eo + (ak * ak) * de - eo * ee;
+  Modes<T> m;
+  m.q_o = sqrt(eo - C(kk));
+  m.q_e = (sqrt(B * B - A * Cc) - B) / A;
+  const C aw = C(ak) + p.axis.z * m.q_e;
+  const C ux = p.axis.y * m.q_o - C(p.axis.z * ky), uy = C(p.axis.z * kx) - p.axis.x * m.q_o;
+  m.fields = {ux, p.axis.x * eo - kx * aw, uy, p.axis.y * eo - ky * aw};
+  return m;
+}
+
+/// Lossless medium, real fields: mode fields scaled to unit flux, H = w x E / (k0 ..): S_z = (E x H)_z with
+/// E_o = a x w_o and E_e = eo a - (a.w_e) w_e, H_e = eo w_e x a.
+template <class S>
+struct FluxModes {
+  S q_o, q_e;
+  S ox, oy, ex, ey;
+};
+template <class S>
+void normal_components(const OpticalPoint<S>& p, const S& kx, const S& ky, S& q_o, S& q_e) {
+  const S eo = p.ordinary, de = p.extraordinary - eo;
+  const S ak = p.axis.x * kx + p.axis.y * ky, kk = kx * kx + ky * ky;
+  const S A = eo + de * p.axis.z * p.axis.z, B = de * p.axis.z * ak;
+  const S C = eo * kk + de * ak * ak - eo * p.extraordinary;
+  q_o = sqrt(eo - kk);
+  q_e = (sqrt(B * B - A * C) - B) / A;
+}
+template <class S>
+FluxModes<S> flux_modes(const OpticalPoint<S>& p, const S& kx, const S& ky) {
+  FluxModes<S> m;
+  normal_components(p, kx, ky, m.q_o, m.q_e);
+  const auto cross = [](const Vec3<S>& a, const Vec3<S>& b) {
+    return Vec3<S>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  };
+  const Vec3<S> wo{kx, ky, m.q_o}, we{kx, ky, m.q_e};
+  const Vec3<S> eo = cross(p.axis, wo), ho = cross(wo, eo);
+  const S aw = dot(p.axis, we);
+  const Vec3<S> ee = p.ordinary * p.axis + (S(0.0) - aw) * we, he = cross(we, ee);
+  const S fo = 1.0 / sqrt(eo.x * ho.y - eo.y * ho.x), fe = 1.0 / sqrt(ee.x * he.y - ee.y * he.x);
+  m.ox = fo * eo.x, m.oy = fo * eo.y, m.ex = fe * ee.x, m.ey = fe * ee.y;
+  return m;
+}
+
+/// The whole transfer for a lossless medium with E and H continuous: flux-normalised modes couple antisymmetrically,
+/// with zero diagonal, so nothing but the two phases is left between the faces.
+template <class S>
+Mat2<S> lossless_transfer(const Column<S>& column, const Ray<S>& ray, const std::vector<double>& u,
+                          const std::vector<double>& weight) {
+  thread_local std::vector<OpticalPoint<S>> points;
+  points.resize(u.size());
+  column.sample(u, points.data());
+  S phase_o(0.0), phase_e(0.0);
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    S q_o, q_e;
+    normal_components(points[i], ray.kx, ray.ky, q_o, q_e);
+    const S path = points[i].depth_slope_um * weight[i];
+    phase_o = phase_o + path * q_o;
+    phase_e = phase_e + path * q_e;
+  }
+  const double ends[2] = {0.0, 1.0};
+  OpticalPoint<S> face[2];
+  column.sample(ends, face);
+  const FluxModes<S> first = flux_modes(face[0], ray.kx, ray.ky), last = flux_modes(face[1], ray.kx, ray.ky);
+  S so, co, se, ce;
+  sin_cos(ray.k0_per_um * phase_o, so, co);
+  sin_cos(ray.k0_per_um * phase_e, se, ce);
+  const S f = 1.0 / (first.ox * first.ey - first.ex * first.oy);
+  // [o e]_last diag(e^{i phi}) [o e]_first^-1
+  const Complex<S> po{co, so}, pe{ce, se};
+  const S ixx = f * first.ey, ixy = -(f * first.ex), iyx = -(f * first.oy), iyy = f * first.ox;
+  return {(last.ox * ixx) * po + (last.ex * iyx) * pe, (last.ox * ixy) * po + (last.ex * iyy) * pe,
+          (last.oy * ixx) * po + (last.ey * iyx) * pe, (last.oy * ixy) * po + (last.ey * iyy) * pe};
+}
+
+}  // namespace
+
+template <class S>
+const MethodInfo& Diagonal<S>::info() const {
+  return kInfo;
+}
+
+template <class S>
+Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
+  thread_local std::vector<double> u;
+  thread_local std::vector<double> weight;
+  gauss8_nodes(mesh, u, weight);
+  if (!column.absorbing && ray.continuity == Continuity::e_and_h) return lossless_transfer(column, ray, u, weight);
+  thread_local std::vector<OpticalPoint<Slope<S>>> points;
+  points.resize(u.size());
+  column.sample_with_slope(u, points.data());
+  const Slope<S> kx(ray.kx), ky(ray.ky);
+  Complex<S> phase_o, phase_e;
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    const Modes<Slope<S>> m = modes(points[i], kx, ky);
+    const Mat2<S> fields = part(m.fields, false);
+    Mat2<S> change = part(m.fields, true);
+    if (ray.continuity == Continuity::e_and_h) {
+      // generator = i k0 N du/dz - X, so X M = i k0 M diag(q) du/dz - generator M
+      const Complex<S> ik(S(0.0), ray.k0_per_um * points[i].depth_slope_um.value);
+      OpticalPoint<S> q{{points[i].axis.x.value, points[i].axis.y.value, points[i].axis.z.value},
+                        points[i].ordinary.value, points[i].extraordinary.value, points[i].ordinary_im.value,
+                        points[i].extraordinary_im.value, points[i].depth_slope_um.value};
+      const Mat2<S> index = one_way(q, ray.kx, ray.ky).index;
+      const Mat2<S> x = ik * index - generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky);
+      change = change + x * fields;
+    }
+    const Mat2<S> modal = inverse(fields) * change;
+    const Complex<S> ik(S(0.0), ray.k0_per_um * points[i].depth_slope_um.value);
+    const auto value = [](const Complex<Slope<S>>& z) { return Complex<S>{z.re.value, z.im.value}; };
+    phase_o = phase_o + S(weight[i]) * (ik * value(m.q_o) - modal.a);
+    phase_e = phase_e + S(weight[i]) * (ik * value(m.q_e) - modal.d);
+  }
+  const double ends[2] = {0.0, 1.0};
+  OpticalPoint<S> face[2];
+  column.sample(ends, face);
+  const Mat2<S> first = modes(face[0], ray.kx, ray.ky).fields, last = modes(face[1], ray.kx, ray.ky).fields;
+  const Mat2<S> middle{exp(phase_o), Complex<S>(), Complex<S>(), exp(phase_e)};
+  return last * middle * inverse(first);
+}
+
+template <class S>
+Su2<S> Diagonal<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
+  thread_local std::vector<double> u;
+  thread_local std::vector<double> weight;
+  gauss8_nodes(mesh, u, weight);
+  thread_local std::vector<OpticalPoint<S>> points;
+  points.resize(u.size());
+  column.sample(u, points.data());
+  // Generators of a planar column commute: the integral is the whole answer, and nothing needs the axis' azimuth.
+  Vec3<S> v{S(0.0), S(0.0), S(0.0)};
+  for (std::size_t i = 0; i < u.size(); ++i) v = v + S(weight[i]) * su2_generator(points[i], ray.k0_per_um);
+  return su2_exp(v);
+}
+
+#define BIREFIT_INSTANTIATE(S) template class Diagonal<S>;
+BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+}  // namespace birefit

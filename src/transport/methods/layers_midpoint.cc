@@ -1,0 +1,74 @@
+#include "transport/methods.h"
+
+namespace birefit {
+namespace {
+
+constexpr MethodInfo kInfo{"layers_midpoint", 2, false, "homogeneous layers with the medium of their middle",
+                           "Jones, J. Opt. Soc. Am. 38, 671 (1948); interfaces: docs/methods.md"};
+
+void middles(const Mesh& mesh, std::vector<double>& u) {
+  u.resize(mesh.size() - 1);
+  for (std::size_t i = 0; i < u.size(); ++i) u[i] = 0.5 * (mesh[i] + mesh[i + 1]);
+}
+
+}  // namespace
+
+template <class S>
+const MethodInfo& LayersMidpoint<S>::info() const {
+  return kInfo;
+}
+
+template <class S>
+Mat2<S> LayersMidpoint<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
+  thread_local std::vector<double> u;
+  middles(mesh, u);
+  thread_local std::vector<OpticalPoint<S>> layers;
+  layers.resize(u.size());
+  column.sample(u, layers.data());
+  const double ends[2] = {0.0, 1.0};
+  OpticalPoint<S> face[2];
+  column.sample(ends, face);
+  const bool faces = ray.continuity == Continuity::e_and_h;
+  Mat2<S> total = Mat2<S>::identity();
+  OpticalPoint<S> before = face[0];
+  for (std::size_t i = 0; i <= u.size(); ++i) {
+    const OpticalPoint<S>& after = i < u.size() ? layers[i] : face[1];
+    const OneWay<S> forward = one_way(after, ray.kx, ray.ky);
+    if (faces)
+      total = step_factor(one_way(before, ray.kx, ray.ky).admittance, one_way(before, ray.kx, ray.ky, -1.0).admittance,
+                          forward.admittance) *
+              total;
+    if (i == u.size()) break;
+    const S thickness = after.depth_slope_um * (mesh[i + 1] - mesh[i]);
+    total = exp(Complex<S>(S(0.0), ray.k0_per_um * thickness) * forward.index) * total;
+    before = after;
+  }
+  return total;
+}
+
+template <class S>
+Su2<S> LayersMidpoint<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
+  thread_local std::vector<double> u;
+  middles(mesh, u);
+  Su2<S> total = Su2<S>::identity();
+  const auto advance = [&](std::size_t i, const Vec3<S>& v) {
+    total = su2_exp(S(mesh[i + 1] - mesh[i]) * v) * total;
+  };
+  if (ray.continuity == Continuity::e_and_h && !column.planar) {
+    thread_local std::vector<OpticalPoint<Slope<S>>> points;
+    points.resize(u.size());
+    column.sample_with_slope(u, points.data());
+    for (std::size_t i = 0; i < u.size(); ++i) advance(i, su2_generator_e_and_h(points[i], ray.k0_per_um));
+  } else {
+    thread_local std::vector<OpticalPoint<S>> points;
+    points.resize(u.size());
+    column.sample(u, points.data());
+    for (std::size_t i = 0; i < u.size(); ++i) advance(i, su2_generator(points[i], ray.k0_per_um));
+  }
+  return total;
+}
+
+#define BIREFIT_INSTANTIATE(S) template class LayersMidpoint<S>;
+BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+}  // namespace birefit

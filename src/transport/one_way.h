@@ -1,0 +1,139 @@
+#pragma once
+// The one-way operator of a uniaxial medium in closed form, with no degenerate case, and what follows from it.
+//
+//   dE_t/dz = i k0 N E_t,   H_t = Y E_t          forward waves with tangential wavevector kappa (units of k0)
+//
+// from Steinberg TOG 2020 (eqs. 70-82) rewritten for the tangential field: N = q_o I + (c/d) f g^T, a rank-one update
+// whose eigenvalues are the normal components q_o and q_e. Nothing divides by the angle between axis and wavevector.
+// D [I; Y] = [I; Y] N holds for the Berreman matrix D; a law test checks it for random media.
+
+#include "medium/column.h"
+#include "transport/matrix.h"
+
+namespace birefit {
+
+/// What a transport keeps continuous where the medium changes.
+enum class Continuity {
+  e_and_h,  ///< E and H; only the backward wave is dropped: flux is conserved
+  e_only,   ///< tangential E alone: the source paper's transport
+};
+
+template <class S>
+struct OneWay {
+  Mat2<S> index;       ///< N
+  Mat2<S> admittance;  ///< Y
+};
+
+/// Admittance of an isotropic medium for forward waves, q its normal component.
+template <class S>
+Mat2<S> isotropic_admittance(const Complex<S>& permittivity, const Complex<S>& q, const S& kx, const S& ky) {
+  const Complex<S> f = Complex<S>(S(1.0)) / q;
+  const Complex<S> xy = Complex<S>(kx * ky);
+  return {-(f * xy), -(f * (permittivity - Complex<S>(kx * kx))), f * (permittivity - Complex<S>(ky * ky)), f * xy};
+}
+
+/// `direction` +1: forward pair (N, Y); -1: the backward pair (signs of q_o and of the extraordinary root flipped).
+template <class S>
+OneWay<S> one_way(const OpticalPoint<S>& p, const S& kx, const S& ky, double direction = 1.0) {
+  using C = Complex<S>;
+  const C eo{p.ordinary, p.ordinary_im}, ee{p.extraordinary, p.extraordinary_im};
+  const C de = ee - eo;
+  const S ax = p.axis.x, ay = p.axis.y, az = p.axis.z;
+  const S ak = ax * kx + ay * ky, kk = kx * kx + ky * ky;
+  const C qo = S(direction) * sqrt(eo - C(kk));
+  const C A = eo + (az * az) * de;
+  const C B = (az * ak) * de;
+  const C Cc = kk * eo + (ak * ak) * de - eo * ee;
+  const C qm = (-B - S(direction) * sqrt(B * B - A * Cc)) / A;
+  const C c = de / (A * (qo - qm));
+  // u = axis x (kx, ky, qo); u.u without conjugation
+  const C ux = ay * qo - C(az * ky), uy = C(az * kx) - ax * qo, uz = C(ax * ky - ay * kx);
+  const C u2 = ux * ux + uy * uy + uz * uz;
+  const C aw = C(ak) + az * qo;
+  const C d = qo - az * (c * (ky * ux - kx * uy));
+  const C shift = az * (c * u2);
+  const C fx = ax * eo - kx * (aw + shift), fy = ay * eo - ky * (aw + shift);
+  const C gx = -uy, gy = ux;
+  const C cd = c / d;
+  OneWay<S> r;
+  r.index = {qo + cd * fx * gx, cd * fx * gy, cd * fy * gx, qo + cd * fy * gy};
+  const C az_qo = C(az) / qo;
+  const C hx = -(eo * (C(ay) + ky * az_qo)), hy = eo * (C(ax) + kx * az_qo);
+  const Mat2<S> iso = isotropic_admittance(eo, qo, kx, ky);
+  r.admittance = {iso.a + cd * hx * gx, iso.b + cd * hx * gy, iso.c + cd * hy * gx, iso.d + cd * hy * gy};
+  return r;
+}
+
+/// Factor on E_t when light steps from medium `before` into `after`, backward waves dropped.
+template <class S>
+Mat2<S> step_factor(const Mat2<S>& before_forward, const Mat2<S>& before_backward, const Mat2<S>& after_forward) {
+  return inverse(after_forward - before_backward) * (before_forward - before_backward);
+}
+
+/// d(generator)/du of E_t at one point, i.e. dE_t/du = generator E_t.
+template <class S>
+Mat2<S> generator_e_only(const OpticalPoint<S>& p, const S& k0, const S& kx, const S& ky) {
+  const OneWay<S> m = one_way(p, kx, ky);
+  return Complex<S>(S(0.0), k0 * p.depth_slope_um) * m.index;
+}
+
+template <class S>
+Mat2<S> part(const Mat2<Slope<S>>& m, bool slope) {
+  const auto of = [&](const Complex<Slope<S>>& z) {
+    return slope ? Complex<S>{z.re.d[0], z.im.d[0]} : Complex<S>{z.re.value, z.im.value};
+  };
+  return {of(m.a), of(m.b), of(m.c), of(m.d)};
+}
+
+/// E and H continuous: [i k0 N - (Y - Y-)^-1 dY/dz] du/dz.
+template <class S>
+Mat2<S> generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0, const S& kx, const S& ky) {
+  const OneWay<Slope<S>> forward = one_way<Slope<S>>(p, Slope<S>(kx), Slope<S>(ky));
+  const Mat2<S> y = part(forward.admittance, false), dy = part(forward.admittance, true);
+  OpticalPoint<S> q{{p.axis.x.value, p.axis.y.value, p.axis.z.value}, p.ordinary.value,      p.extraordinary.value,
+                    p.ordinary_im.value,                               p.extraordinary_im.value, p.depth_slope_um.value};
+  const Mat2<S> backward = one_way(q, kx, ky, -1.0).admittance;
+  return Complex<S>(S(0.0), k0 * q.depth_slope_um) * part(forward.index, false) - inverse(y - backward) * dy;
+}
+
+// ---- normal incidence, lossless -------------------------------------------------------------------------------------
+
+/// Generator i v.s of the flux-normalised field a = N^(1/2) E_t without its common phase (docs/methods.md, "Normal
+/// incidence"): v_x, v_z from N = n_o + g a_t a_t^T, g = eo de/((eo + de az^2)(n_o + n_eff)); v_y is what keeping H
+/// continuous adds to a turning axis: a_t x a_t' (n_eff - n_o)^2 / (2 sqrt(n_o n_eff)(sqrt n_o + sqrt n_eff)^2 a_t^2).
+template <class S>
+Vec3<S> su2_generator(const OpticalPoint<S>& p, const S& k0) {
+  const S de = p.extraordinary - p.ordinary;
+  const S denominator = p.ordinary + de * p.axis.z * p.axis.z;
+  const S inverse_d = 1.0 / denominator;
+  const S n_o = sqrt(p.ordinary);
+  const S n_eff = n_o * sqrt(p.extraordinary * inverse_d);
+  const S half = 0.5 * k0 * p.depth_slope_um * p.ordinary * de * inverse_d / (n_o + n_eff);
+  return {half * (2.0 * p.axis.x * p.axis.y), S(0.0), half * (p.axis.x * p.axis.x - p.axis.y * p.axis.y)};
+}
+template <class S>
+Vec3<S> su2_generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0) {
+  const S ax = p.axis.x.value, ay = p.axis.y.value, az = p.axis.z.value;
+  const S eo = p.ordinary.value, ee = p.extraordinary.value;
+  const S de = ee - eo;
+  const S inverse_d = 1.0 / (eo + de * az * az);
+  const S n_o = sqrt(eo);
+  const S n_eff = n_o * sqrt(ee * inverse_d);
+  const S g = eo * de * inverse_d / (n_o + n_eff);
+  const S half = 0.5 * k0 * p.depth_slope_um.value * g;
+  const S cross = ax * p.axis.y.d[0] - ay * p.axis.x.d[0];
+  const S roots = sqrt(n_o * n_eff);
+  const S turn = g * g * (ax * ax + ay * ay) * cross / (2.0 * roots * (n_o + n_eff + 2.0 * roots));
+  return {half * (2.0 * ax * ay), turn, half * (ax * ax - ay * ay)};
+}
+/// n_eff - n_o seen by a ray along z: the retardance per length, without cancellation at small birefringence.
+template <class S>
+S retardance_per_length(const OpticalPoint<S>& p) {
+  const S de = p.extraordinary - p.ordinary;
+  const S denominator = p.ordinary + de * p.axis.z * p.axis.z;
+  const S n_o = sqrt(p.ordinary);
+  const S n_eff = n_o * sqrt(p.extraordinary / denominator);
+  return p.ordinary * de * (p.axis.x * p.axis.x + p.axis.y * p.axis.y) / (denominator * (n_o + n_eff));
+}
+
+}  // namespace birefit

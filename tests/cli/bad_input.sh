@@ -1,0 +1,272 @@
+#!/usr/bin/env bash
+# Bad input through the program itself: exit code 2, one message at the place of the mistake, nothing written.
+# usage: bad_input.sh BIREFIT SOURCE_DIR
+set -u
+birefit=$(realpath "$1")
+work=$(mktemp -d)
+trap 'chmod -R u+w "$work"; rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+checks=0
+
+# ---- images, byte by byte --------------------------------------------------------------------------------------------
+
+le16() { local i; for i in "$@"; do printf "\\x$(printf %02x $((i & 255)))\\x$(printf %02x $((i >> 8 & 255)))"; done; }
+le32() { local i; for i in "$@"; do le16 $((i & 65535)) $((i >> 16 & 65535)); done; }
+entry() { le16 "$1" "$2"; le32 "$3" "$4"; } # TIFF tag, type (3 short, 4 long), count, value
+
+# tiff WIDTH HEIGHT BITS SAMPLES PHOTOMETRIC FORMAT DATA_BYTES NEXT_OFFSET < data    one strip, data right after the header
+tiff() {
+  printf 'II'; le16 42; le32 8
+  le16 11
+  entry 256 4 1 "$1"; entry 257 4 1 "$2"; entry 258 3 1 "$3"; entry 259 3 1 1; entry 262 3 1 "$5"
+  entry 273 4 1 146; entry 277 3 1 "$4"; entry 278 4 1 "$2"; entry 279 4 1 "$7"; entry 284 3 1 1; entry 339 3 1 "$6"
+  le32 "${8:-0}"
+  cat
+}
+bytes() { head -c "$1" /dev/zero | tr '\0' "$2"; } # COUNT OCTAL_CHAR
+
+speckle() { # 32 x 32 bytes of a plain image with contrast
+  local i out=""
+  for ((i = 0; i < 1024; ++i)); do out+="\\x$(printf %02x $((20 + (i * 37 + i / 32 * 11) % 180)))"; done
+  printf "$out"
+}
+speckle > speckle.raw
+tiff 32 32 8 1 1 1 1024 < speckle.raw > good.tif
+head -c 600 good.tif > truncated.tif
+: > empty.tif
+tiff 0 0 8 1 1 1 0 < /dev/null > no_pixels.tif
+bytes 128 '\252' | tiff 32 32 1 1 1 1 128 > one_bit.tif
+bytes 100 '\0' | tiff 20000 20000 8 1 1 1 400000000 > huge.tif
+bytes 1024 '\377' | tiff 32 32 8 1 1 1 1024 > saturated.tif
+printf '\0\0\300\177%.0s' {1..1024} | tiff 32 32 32 1 1 3 4096 > nan.tif
+# Two pages: the second directory is a copy of the first behind the data, with the same strip.
+{ tiff 32 32 8 1 1 1 1024 1170 < speckle.raw; tiff 32 32 8 1 1 1 1024 < /dev/null | tail -c +9; } > pages.tif
+# Palette: 256 colours of three 16-bit values behind the data.
+{
+  printf 'II'; le16 42; le32 8; le16 11
+  entry 256 4 1 32; entry 257 4 1 32; entry 258 3 1 8; entry 259 3 1 1; entry 262 3 1 3
+  entry 273 4 1 146; entry 277 3 1 1; entry 278 4 1 32; entry 279 4 1 1024; entry 284 3 1 1; entry 320 3 768 1170
+  le32 0; cat speckle.raw; head -c 1536 speckle.raw speckle.raw 2>/dev/null | head -c 1536
+  bytes 1536 '\100'
+} > palette.tif
+# RGB: bits per sample 8, 8, 8 lie behind the data.
+{
+  printf 'II'; le16 42; le32 8; le16 11
+  entry 256 4 1 32; entry 257 4 1 32; entry 258 3 3 3218; entry 259 3 1 1; entry 262 3 1 2
+  entry 273 4 1 146; entry 277 3 1 3; entry 278 4 1 32; entry 279 4 1 3072; entry 284 3 1 1; entry 274 3 1 1
+  le32 0; cat speckle.raw speckle.raw speckle.raw; le16 8 8 8
+} > colour.tif
+# Animated GIF, 1 x 1, two frames, two colours.
+gif_frame='\x21\xf9\x04\x00\x0a\x00\x00\x00\x2c\x00\x00\x00\x00\x01\x00\x01\x00\x00\x02\x02\x44\x01\x00'
+printf "GIF89a\x01\x00\x01\x00\x80\x00\x00\x00\x00\x00\xff\xff\xff$gif_frame$gif_frame\x3b" > animated.gif
+
+# ---- configs ---------------------------------------------------------------------------------------------------------
+
+# config [SED_EXPRESSION...]: a sound config for good.tif, changed. Line numbers in the expectations count in it.
+config() {
+  cat > base.yaml <<'YAML'
+micrograph:
+  image: good.tif
+  pixel_size_um: 0.5
+  gain: {fit: auto}
+  offset: {fit: auto}
+  center_px: [15.5, 15.5]
+sample:
+  droplet:
+    diameter_um: {value: 9.3, fit: [8.5, 10.0]}
+    director: {radial: {}}
+  material: {ordinary: 1.52, birefringence: 0.2}
+  surround: {index: 1.43}
+microscope:
+  light: {wavelength_nm: 590}
+  polarizer_deg: 0
+  analyzer_deg: 90
+  objective_na: 0.8
+YAML
+  local expression
+  for expression in "$@"; do sed -i "$expression" base.yaml; done
+  mv base.yaml bad.yaml
+}
+
+fail() {
+  echo "FAIL $1"
+  failures=$((failures + 1))
+  sed 's/^/     /' stderr.txt | head -8
+}
+
+# expect NAME PLACE WORDS: runs `fit bad.yaml`; stderr must hold a line that begins with PLACE and has WORDS (grep -E).
+expect() {
+  checks=$((checks + 1))
+  rm -rf out
+  ls -A > before.txt
+  timeout 60 "$birefit" fit bad.yaml --out out > stdout.txt 2> stderr.txt
+  local code=$?
+  [ $code -eq 2 ] || { fail "$1: exit code $code, expected 2"; return; }
+  grep -F -- "$2" stderr.txt | grep -q -E -- "$3" || { fail "$1: no message at $2 with /$3/"; return; }
+  [ -e out ] && { fail "$1: a folder was written"; return; }
+  [ -s stdout.txt ] && { fail "$1: something on stdout"; return; }
+  return 0
+}
+# The same, and it must be the only message.
+expect_one() {
+  expect "$@" || return
+  [ "$(wc -l < stderr.txt)" -eq 1 ] || fail "$1: more than one message"
+}
+
+touch stdout.txt stderr.txt before.txt
+
+for image in missing truncated empty no_pixels one_bit huge saturated nan pages palette colour; do
+  config "s/good.tif/$image.tif/"
+  case $image in
+    missing) words='does not exist' ;;
+    truncated) words='truncated|ends|incomplete|cut|read' ;;
+    empty | no_pixels) words='empty|zero|no pixel|0 bytes|cannot|not' ;;
+    one_bit) words='1.bit|one bit' ;;
+    huge) words='20000' ;;
+    saturated) words='no usable pixel.*saturated' ;;
+    nan) words='no usable pixel.*not finite' ;;
+    pages) words='page' ;;
+    palette) words='palette|indexed' ;;
+    colour) words='channel' ;;
+  esac
+  expect_one "$image image" bad.yaml:2:10: "$words"
+done
+config 's/good.tif/animated.gif/'
+expect_one 'animated image' bad.yaml:2:10: 'animat|frames|images|pages'
+config 's/good.tif/bad.yaml/'
+expect_one 'image that is a text' bad.yaml:2:10: 'image|format'
+
+config '/pixel_size_um/d'
+expect_one 'missing pixel size' bad.yaml:1:1: 'pixel_size_um'
+config 's/gain: .*/gain: {fit: auto/'
+expect_one 'syntax error' bad.yaml: 'syntax error'
+config '5s/offset/gain/'
+expect_one 'duplicate key' bad.yaml:5:3: 'duplicate key gain'
+{ echo 'a: &a [x, x, x, x, x, x, x, x, x]'; for l in b c d e f g h i; do p=$(echo $l | tr b-i a-h); echo "$l: &$l [*$p, *$p, *$p, *$p, *$p, *$p, *$p, *$p, *$p]"; done; } > bad.yaml
+expect_one 'alias bomb' bad.yaml:1: 'alias'
+{ printf 'sample: '; bytes 10000 '['; bytes 10000 ']'; echo; } > bad.yaml
+expect_one '10,000-deep flow nesting' bad.yaml:1: 'deeper than'
+{ printf 'sample:\n  '; for ((i = 0; i < 10000; ++i)); do printf -- '- '; done; echo x; } > bad.yaml
+expect_one '10,000-deep list nesting' bad.yaml:2: 'deeper than'
+awk 'BEGIN { for (i = 0; i < 2500; ++i) { printf "%*sa:\n", i, "" } }' > bad.yaml
+expect_one '2,500-deep block nesting' bad.yaml:65: 'deeper than'
+{ printf 'sample: '; for ((i = 0; i < 10000; ++i)); do printf '{a: '; done; } > bad.yaml
+expect_one '10,000 unclosed maps' bad.yaml:1: 'deeper than'
+: > bad.yaml
+expect_one 'empty config' bad.yaml: 'empty'
+printf 'sample: \xff\xfe\n' > bad.yaml
+expect_one 'binary config' bad.yaml:1:9: 'UTF-8'
+head -c 5000000 /dev/zero | tr '\0' '#' > bad.yaml
+expect_one '5 MB config' bad.yaml: '4 MB'
+config; printf -- '---\na: 1\n' >> bad.yaml
+expect_one 'two documents' bad.yaml: 'second YAML document'
+rm bad.yaml
+expect_one 'missing config' bad.yaml: 'does not exist'
+mkdir bad.yaml
+expect_one 'config is a folder' bad.yaml: 'folder'
+rmdir bad.yaml
+
+config 's/wavelength_nm/wavelenght_nm/'
+expect_one 'unknown key' bad.yaml:14:11: 'unknown key wavelenght_nm.*did you mean wavelength_nm'
+config 's/surround: .*/surround: 1.43/'
+expect 'wrong type' bad.yaml:12:13: 'must be a map'
+config 's/590/green/'
+expect_one 'text for a number' bad.yaml:14:26: 'wavelength_nm must be a number, found green'
+config 's/: {value: 9.3.*/: .nan/'
+expect_one 'NaN' bad.yaml:9:18: 'diameter_um = .nan is not a finite number'
+config 's/: {value: 9.3.*/: -.inf/'
+expect_one 'infinite length' bad.yaml:9:18: 'not a finite number'
+config 's/: {value: 9.3.*/: -3.2/'
+expect_one 'negative length' bad.yaml:9:18: 'diameter_um = -3.2 is outside \(0, 10000\]; did you mean 3.2\?'
+config 's/590/0.59/'
+expect_one 'wavelength in um' bad.yaml:14:26: 'did you mean 590\? the key is in nm'
+config 's/0.5$/500/'
+expect_one 'pixel size in nm' bad.yaml:3:18: 'did you mean 0.5\? the key is in um'
+config 's/: {value: 9.3.*/: 9300/'
+expect_one 'diameter in nm' bad.yaml:9:18: 'field of view.*did you mean 9.3\?'
+config 's/: {value: 9.3.*/: 9.3e-6/'
+expect_one 'diameter in m' bad.yaml:9:18: 'did you mean 9.3\?'
+config 's/objective_na: .*/objective_na: 80/'
+expect_one 'aperture in percent' bad.yaml:17:17: 'did you mean 0.8\?'
+config 's/\[8.5, 10.0\]/[10, 8.5]/'
+expect_one 'bounds reversed' bad.yaml:9:36: 'reversed; did you mean \[8.5, 10\]'
+config 's/value: 9.3/value: 12/'
+expect_one 'start outside bounds' bad.yaml:9:26: 'outside its fit bounds'
+config 's/\[8.5, 10.0\]/[-1, 10]/'
+expect_one 'bound outside range' bad.yaml:9:37: 'bound -1 is outside'
+config 's/0.2}/{value: 0.2, prior_sd: 0.01}}/'
+expect_one 'prior without fit' bad.yaml:11: 'needs a fitted parameter'
+config '10a\  cell: {thickness_um: 5, director: {uniform: {azimuth_deg: 0}}}'
+expect_one 'two sample kinds' bad.yaml:11:3: 'droplet and cell'
+config 's/center_px: .*/center_px: [300, 300]/'
+expect_one 'droplet outside image' bad.yaml:6:15: 'outside'
+config '6a\  roi_px: [0, 0, 64, 32]'
+expect_one 'roi outside image' bad.yaml:7:11: 'outside'
+config 's/wavelength_nm: 590/wavelength_nm: -590/' 's/index: 1.43/index: 143/'
+expect 'all mistakes at once' bad.yaml:12:21: 'index = 143'
+expect 'all mistakes at once' bad.yaml:14:26: 'did you mean 590'
+config '3a\  calibration: {dark: a.tif, parallel: b.tif}'
+expect 'missing calibration frames' bad.yaml:4:23: 'does not exist'
+expect 'missing calibration frames' bad.yaml:4:40: 'does not exist'
+config; echo 'prior: {from: none.json, parameters: [sample.droplet.diameter_um]}' >> bad.yaml
+expect_one 'missing prior' bad.yaml:18:15: 'does not exist'
+
+# ---- output ----------------------------------------------------------------------------------------------------------
+
+config
+checks=$((checks + 1))
+echo mine > taken
+"$birefit" fit bad.yaml --out taken > stdout.txt 2> stderr.txt
+[ $? -eq 2 ] && [ "$(cat taken)" = mine ] && grep -q '^taken: ' stderr.txt || fail 'output folder is a file'
+checks=$((checks + 1))
+"$birefit" fit bad.yaml --out taken/below > stdout.txt 2> stderr.txt
+[ $? -eq 2 ] && grep -q '^taken/below: ' stderr.txt || fail 'output folder below a file'
+checks=$((checks + 1))
+"$birefit" fit bad.yaml --out /proc/birefit > stdout.txt 2> stderr.txt
+[ $? -eq 2 ] && grep -q '^/proc/birefit: ' stderr.txt || fail 'unwritable output folder'
+checks=$((checks + 1))
+"$birefit" render bad.yaml --out image.jpg > stdout.txt 2> stderr.txt
+[ $? -eq 2 ] && [ ! -e image.jpg ] && grep -q 'image.jpg.*\.exr' stderr.txt || fail 'render to an unknown format'
+checks=$((checks + 1))
+"$birefit" render bad.yaml --out none/image.tif > stdout.txt 2> stderr.txt
+[ $? -eq 2 ] && grep -q 'does not exist' stderr.txt || fail 'render into a missing folder'
+# A disk that is full: a mount of a few kilobytes, where the tests may mount (as root in a container).
+mkdir full
+if unshare -m true 2> /dev/null && unshare -m sh -c "mount -t tmpfs -o size=4k none full" 2> /dev/null; then
+  checks=$((checks + 1))
+  unshare -m sh -c "mount -t tmpfs -o size=4k none full && head -c 4096 /dev/zero > full/filler
+    '$birefit' fit bad.yaml --out full > stdout.txt 2> stderr.txt; code=\$?; [ \$code -eq 2 ] && [ \"\$(ls -A full)\" = filler ]" ||
+    fail 'full disk'
+  grep -q 'disk is full\|cannot be written\|No space' stderr.txt || fail 'full disk: message'
+else
+  echo 'SKIP full disk: this user may not mount'
+fi
+checks=$((checks + 1))
+if [ -w /dev/full ]; then
+  "$birefit" new droplet > /dev/full 2> stderr.txt
+  [ $? -eq 2 ] && grep -q 'stdout' stderr.txt || fail 'full stdout'
+fi
+
+# ---- command line ----------------------------------------------------------------------------------------------------
+
+for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml --nonsense' 'new shell' 'new' ''; do
+  checks=$((checks + 1))
+  "$birefit" $arguments > stdout.txt 2> stderr.txt
+  [ $? -eq 2 ] && [ -s stderr.txt ] || fail "arguments: $arguments"
+done
+for arguments in '--help' '--version' 'fit --help' 'new droplet' 'new cell' 'new plate' 'new crystal' 'new slab'; do
+  checks=$((checks + 1))
+  "$birefit" $arguments > stdout.txt 2> stderr.txt
+  [ $? -eq 0 ] && [ -s stdout.txt ] || fail "arguments: $arguments"
+done
+# What `new` prints has no mistake but the files it cannot know.
+for kind in droplet cell plate crystal slab; do
+  checks=$((checks + 1))
+  "$birefit" new $kind > new.yaml
+  "$birefit" explain new.yaml > stdout.txt 2> stderr.txt
+  grep -v 'does not exist' stderr.txt | grep -q . && fail "new $kind has a mistake of its own"
+done
+
+echo "$checks checks, $failures failures"
+[ $failures -eq 0 ]

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# tools/check_modules must be able to fail: a source tree with one violation at a time.
+set -euo pipefail
+check=$1/tools/check_modules
+tree=$(mktemp -d)
+trap 'rm -rf "$tree"' EXIT
+mkdir -p "$tree"/src/{core,medium,transport/methods,fit,io} "$tree"/include/birefit
+echo '#include "birefit/error.h"' >"$tree/src/core/good.cc"
+echo '// nothing' >"$tree/include/birefit/error.h"
+"$check" "$tree" >/dev/null
+
+# file, line that must be refused there
+refuse() {
+  printf '%s\n' "$2" >"$tree/$1"
+  if "$check" "$tree" >/dev/null; then
+    echo "not found: $2 in $1"
+    exit 1
+  fi
+  rm "$tree/$1"
+}
+refuse src/core/bad.cc '#include "medium/column.h"'
+refuse src/core/bad.cc '#include "birefit/scene.h"'
+refuse src/medium/bad.h '# include "birefit/io.h"'
+refuse src/transport/methods/bad.cc '#include <ceres/ceres.h>'
+refuse src/fit/bad.cc '#include <OpenImageIO/imageio.h>'
+refuse src/fit/bad.cc '#include <opencv2/imgproc.hpp>'
+refuse src/io/bad.cc '#include "sibling.h"'
+refuse src/io/bad.cc '#include <ceres/ceres.h>'
+refuse include/birefit/error.h '#include "core/lanes.h"'
+refuse include/birefit/stray.h '// a header of no module'

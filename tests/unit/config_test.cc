@@ -1,0 +1,350 @@
+// What load_config accepts, refuses and makes of a config. Bad input through the whole program: tests/cli/bad_input.sh.
+
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "birefit/io.h"
+
+namespace birefit {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kRender = R"(image_size_px: [64, 48]
+micrograph: {pixel_size_um: 0.25}
+sample:
+  droplet: {diameter_um: {value: 9.3, fit: [8.5, 10]}, director: {radial: {}}}
+  material: {ordinary: 1.52, birefringence: {value: 0.2, fit: [0.1, 0.3], prior_sd: 0.05}}
+  surround: {index: 1.43}
+microscope: {light: {wavelength_nm: 590}, polarizer_deg: 0, analyzer_deg: 90, objective_na: 0.8}
+)";
+
+const std::string kCrystal = R"(micrographs:
+  - {image: a.tif, set: {sample.crystal.bias_v: 200}}
+  - {image: b.tif, set: {sample.crystal.bias_v: {value: 250, fit: [0, 2000]}}}
+micrograph: {roi_px: [2, 4, 30, 28]}
+sample: {crystal: {half_wave_voltage_v: {value: 1500, fit: [800, 3000]}, field_along: y}}
+microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
+)";
+
+class Config : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("birefit-config-" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return folder_ / name;
+  }
+  birefit::Config load(const std::string& text, ConfigUse use = ConfigUse::render) {
+    return load_config(write("config.yaml", text), use);
+  }
+  /// All messages without the folder; "" when the config is sound.
+  std::string mistakes(const std::string& text, ConfigUse use = ConfigUse::render) {
+    try {
+      load(text, use);
+    } catch (const UserError& error) {
+      std::string what = error.what();
+      const std::string prefix = folder_.string() + "/";
+      for (std::size_t at; (at = what.find(prefix)) != std::string::npos;) what.erase(at, prefix.size());
+      return what;
+    }
+    return {};
+  }
+  static std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  }
+  /// A smooth image with contrast and some reproducible noise, in whole counts.
+  static Image counts(double level, unsigned seed, int width = 32, int height = 32) {
+    Image image(width, height);
+    for (double& value : image.values()) {
+      seed = seed * 1664525u + 1013904223u;
+      value = std::round(level + (seed >> 24) / 16.0);
+    }
+    return image;
+  }
+  /// An image file; float TIFF, so that values come back as they are.
+  void save(const std::string& name, const Image& image) { save_image(image, folder_ / name); }
+
+  fs::path folder_;
+};
+
+TEST_F(Config, ReadsTheThreeFormsOfAParameter) {
+  const auto config = load(kRender);
+  const ParameterTable& table = config.job.parameters;
+  const Parameter& known = table[table.find("sample.material.ordinary")];
+  EXPECT_FALSE(known.free);
+  EXPECT_EQ(known.value, 1.52);
+  const Parameter& fitted = table[table.find("sample.droplet.diameter_um")];
+  EXPECT_TRUE(fitted.free);
+  EXPECT_EQ(fitted.value, 9.3);
+  EXPECT_EQ(fitted.lower, 8.5);
+  EXPECT_EQ(fitted.upper, 10);
+  EXPECT_EQ(fitted.unit, "um");
+  EXPECT_EQ(fitted.physical_lower, 0);
+  EXPECT_FALSE(fitted.prior_sd);
+  const Parameter& prior = table[table.find("sample.material.birefringence")];
+  EXPECT_EQ(prior.prior_sd, 0.05);
+}
+
+TEST_F(Config, RemembersWhereAParameterStands) {
+  const auto config = load(kRender);
+  const Parameter& parameter = config.job.parameters[config.job.parameters.find("sample.material.ordinary")];
+  EXPECT_EQ(parameter.where.line, 5);
+  EXPECT_EQ(parameter.where.column, 24);
+}
+
+TEST_F(Config, PutsTheCentreInTheMiddleOfARender) {
+  const auto config = load(kRender);
+  const Theta theta = config.job.parameters.values();
+  EXPECT_EQ(theta[config.scene.view.center_x_px.index], 31.5);
+  EXPECT_EQ(theta[config.scene.view.center_y_px.index], 23.5);
+  EXPECT_EQ(config.scene.view.width, 64);
+  EXPECT_EQ(config.scene.view.height, 48);
+}
+
+TEST_F(Config, AcceptsBothSpellingsOfPolarizerAndAnalyzer) {
+  const auto config = load(replaced(replaced(kRender, "polarizer", "polariser"), "analyzer", "analyser"));
+  EXPECT_TRUE(config.job.parameters.find("microscope.analyzer_deg"));
+  EXPECT_NE(mistakes(replaced(kRender, "polarizer_deg: 0", "polarizer_deg: 0, polariser_deg: 1")).find("same key"),
+            std::string::npos);
+}
+
+TEST_F(Config, NamesTheNearestKnownKey) {
+  EXPECT_EQ(mistakes(replaced(kRender, "diameter_um", "diametr_um")),
+            "config.yaml:4:13: unknown key diametr_um in sample.droplet; did you mean diameter_um?");
+}
+
+TEST_F(Config, SuggestsTheKeyWithItsUnit) {
+  EXPECT_NE(mistakes(replaced(kRender, "diameter_um", "diameter")).find("did you mean diameter_um?"), std::string::npos);
+}
+
+TEST_F(Config, ReportsEveryMistakeOnceFromTopToBottom) {
+  std::string text = replaced(kRender, "[64, 48]", "[0, 48]");
+  text = replaced(text, "9.3, fit", "-9.3, fit");
+  text = replaced(text, "1.43", "14.3");
+  text = replaced(text, "590", "0.59");
+  EXPECT_EQ(mistakes(text),
+            "config.yaml:1:16: image_size_px must be within [1, 16384]\n"
+            "config.yaml:4:34: diameter_um = -9.3 is outside (0, 10000]; did you mean 9.3?\n"
+            "config.yaml:6:21: index = 14.3 is outside [1, 4]\n"
+            "config.yaml:7:37: wavelength_nm = 0.59 is outside [100, 20000]; did you mean 590? the key is in nm");
+}
+
+TEST_F(Config, RefusesNumbersThatAreNone) {
+  for (const char* word : {".nan", "nan", ".inf", "-.inf", "1e999", "0x10", "1_000", "abc", "\"590\"", "true", "[590]", "", "5 90"})
+    EXPECT_NE(mistakes(replaced(kRender, "590", word)).find("wavelength_nm"), std::string::npos) << word;
+}
+
+TEST_F(Config, UnderstandsADecimalCommaAndAUnitInTheValue) {
+  EXPECT_NE(mistakes(replaced(kRender, "{light: {wavelength_nm: 590}", "{light: {wavelength_nm: 590nm}")).find("did you mean 590?"),
+            std::string::npos);
+  const std::string block = "accuracy:\n  intensity: 0,01\n";
+  EXPECT_NE(mistakes(kRender + block).find("did you mean 0.01? write a decimal point"), std::string::npos);
+}
+
+TEST_F(Config, RefusesBoundsThatExcludeTheStart) {
+  EXPECT_NE(mistakes(replaced(kRender, "value: 9.3", "value: 11")).find("diameter_um = 11 is outside its fit bounds [8.5, 10]"),
+            std::string::npos);
+}
+
+TEST_F(Config, AllowsABoundAtThePhysicalLimit) {
+  EXPECT_EQ(mistakes(replaced(kRender, "[8.5, 10]", "[0, 10]")), "");
+}
+
+TEST_F(Config, AsksForAFitWhereThereIsAPrior) {
+  EXPECT_NE(mistakes(replaced(kRender, "fit: [0.1, 0.3], ", "")).find("a prior needs a fitted parameter"), std::string::npos);
+}
+
+TEST_F(Config, RefusesAliases) {
+  EXPECT_NE(mistakes("a: &x 1\nb: *x\n").find("config.yaml:1:4: anchors and aliases are not supported"), std::string::npos);
+}
+
+TEST_F(Config, RefusesDeepNestingOfEveryKind) {
+  for (const std::string& unit : {std::string("["), std::string("{a: "), std::string("- ")}) {
+    std::string text = "sample:\n  ";
+    for (int i = 0; i < 10000; ++i) text += unit;
+    EXPECT_NE(mistakes(text).find("nested deeper than 64 levels"), std::string::npos) << unit;
+  }
+}
+
+TEST_F(Config, CountsNoBracketsInQuotesAndComments) {
+  const std::string brackets(100, '[');
+  EXPECT_EQ(mistakes(kRender + "# " + brackets + "\n"), "");
+  EXPECT_NE(mistakes(kRender + "extra: \"" + brackets + "\"\n").find("unknown key extra"), std::string::npos);
+}
+
+TEST_F(Config, SaysWhatComesLater) {
+  EXPECT_NE(mistakes(kRender + "physics: {ceiling: wave}\n").find("not available yet"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kRender, "ordinary: 1.52, ", "file: a.yml, ")).find("come later"), std::string::npos);
+}
+
+TEST_F(Config, ListsTheKnownMaterials) {
+  const std::string text = R"(image_size_px: [8, 8]
+sample:
+  cell: {thickness_um: 5, director: {uniform: {azimuth_deg: 45}}}
+  material: {name: unobtainium}
+microscope: {light: {wavelength_nm: 590}, polarizer_deg: 0, analyzer_deg: 90}
+)";
+  EXPECT_NE(mistakes(text).find("E44-steinberg2020"), std::string::npos);
+}
+
+TEST_F(Config, NeedsAPixelSizeForADroplet) {
+  EXPECT_NE(mistakes(replaced(kRender, "{pixel_size_um: 0.25}", "{}")).find("pixel_size_um"), std::string::npos);
+}
+
+TEST_F(Config, RefusesADropletOfAnotherScaleThanTheImage) {
+  EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "9300")).find("did you mean 9.3?"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "0.0093")).find("did you mean 9.3?"), std::string::npos);
+}
+
+TEST_F(Config, GivesTheCrystalItsSlowAxisHalfwayFromTheField) {
+  const std::string text = R"(image_size_px: [8, 8]
+sample: {crystal: {half_wave_voltage_v: 1500, bias_v: 700, field_along: x, field_legendre: [0.1, {value: 0, fit: [-1, 1]}]}}
+microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
+)";
+  const auto config = load(text);
+  const auto& crystal = std::get<Crystal>(config.scene.sample);
+  EXPECT_EQ(config.job.parameters[crystal.slow_axis_deg].value, 45);
+  EXPECT_FALSE(crystal.electrode_low_px);
+  EXPECT_TRUE(config.job.parameters[config.job.parameters.find("sample.crystal.field_legendre[2]")].free);
+}
+
+TEST_F(Config, SharesWhatNoMicrographSets) {
+  save("a.tif", counts(100, 1));
+  save("b.tif", counts(200, 2));
+  const auto config = load(kCrystal, ConfigUse::fit);
+  ASSERT_EQ(config.job.micrographs.size(), 2u);
+  const auto& a = config.job.micrographs[0];
+  const auto& b = config.job.micrographs[1];
+  const auto& table = config.job.parameters;
+  const auto &first = std::get<Crystal>(a.scene.sample), &second = std::get<Crystal>(b.scene.sample);
+  EXPECT_EQ(first.half_wave_voltage_v, second.half_wave_voltage_v);
+  EXPECT_EQ(a.gain, b.gain);
+  EXPECT_EQ(table[first.bias_v].value, 200);
+  EXPECT_FALSE(table[first.bias_v].free);
+  EXPECT_EQ(table[second.bias_v].name, "micrographs[1].sample.crystal.bias_v");
+  EXPECT_TRUE(table[second.bias_v].free);
+  EXPECT_EQ(table[second.bias_v].physical_lower, 0);
+  EXPECT_TRUE(table[a.gain].linear && table[a.gain].free && table[a.gain].automatic);
+  // The bar's edges are the electrodes: rows 4..27, edge to edge.
+  EXPECT_EQ(table[first.electrode_low_px].value, 3.5);
+  EXPECT_EQ(table[first.electrode_high_px].value, 27.5);
+  EXPECT_EQ(a.outside_roi, 32 * 32 - 28 * 24);
+}
+
+TEST_F(Config, KnowsTheParametersThatSetMayName) {
+  save("a.tif", counts(100, 1));
+  save("b.tif", counts(200, 2));
+  EXPECT_NE(mistakes(replaced(kCrystal, "set: {sample.crystal.bias_v: 200}", "set: {sample.crystal.bias: 200}"), ConfigUse::fit)
+                .find("did you mean sample.crystal.bias_v?"),
+            std::string::npos);
+}
+
+TEST_F(Config, TurnsCountsIntoTransmission) {
+  Image dark(32, 32, 100), parallel(32, 32, 1100), crossed(32, 32, 120), image(32, 32, 600);
+  parallel(10, 12) = 100;  // no light here
+  for (auto& [name, frame] : {std::pair<const char*, Image&>("d.tif", dark), {"p.tif", parallel}, {"c.tif", crossed}, {"a.tif", image}, {"b.tif", image}})
+    save(name, frame);
+  const auto config = load(kCrystal + "calibration: {dark: d.tif, parallel: p.tif, crossed: c.tif}\n", ConfigUse::fit);
+  const Micrograph& a = config.job.micrographs[0];
+  EXPECT_DOUBLE_EQ(a.values(8, 8), 0.5);
+  EXPECT_DOUBLE_EQ(a.variance_scale(8, 8), 1e-6);
+  EXPECT_EQ(a.mask(10, 12), 0);
+  EXPECT_EQ(a.dead, 1);
+  const Parameter& offset = config.job.parameters[a.offset];
+  EXPECT_DOUBLE_EQ(offset.value, 0.02);
+  ASSERT_TRUE(offset.prior_sd);
+  EXPECT_GT(*offset.prior_sd, 0);
+}
+
+TEST_F(Config, ExcludesAndCountsNonFiniteAndIsolatedPixels) {
+  Image a = counts(100, 1), b = counts(200, 2);
+  a(10, 10) = std::nan("");
+  a(20, 20) = 5000;
+  save("a.tif", a);
+  save("b.tif", b);
+  const auto config = load(kCrystal, ConfigUse::fit);
+  EXPECT_EQ(config.job.micrographs[0].non_finite, 1);
+  EXPECT_EQ(config.job.micrographs[0].dead, 1);
+  EXPECT_EQ(config.job.micrographs[0].mask(20, 20), 0);
+  EXPECT_EQ(config.job.micrographs[1].dead, 0);
+}
+
+TEST_F(Config, KeepsTheCrestsOfFineFringes) {
+  // Rings of four pixels a period on a dark ground, nearly without noise: nothing here is a broken pixel.
+  Image a(96, 96), b = counts(200, 2, 96, 96);
+  for (int y = 0; y < 96; ++y)
+    for (int x = 0; x < 96; ++x) {
+      const double r = std::hypot(x - 47.3, y - 48.1);
+      a(x, y) = 20 + (r < 30 ? 1000 * std::pow(std::sin(M_PI * r / 4), 2) : 0) + (x * 7 + y * 13) % 3;
+    }
+  save("a.tif", a);
+  save("b.tif", b);
+  const auto config = load(replaced(kCrystal, "[2, 4, 30, 28]", "[0, 0, 96, 96]"), ConfigUse::fit);
+  EXPECT_EQ(config.job.micrographs[0].dead, 0);
+}
+
+TEST_F(Config, ReadsAJointPrior) {
+  save("a.tif", counts(100, 1));
+  save("b.tif", counts(200, 2));
+  write("fit.json", R"({"converged": true, "parameters": {"sample.crystal.half_wave_voltage_v": {"value": 1490},
+    "micrograph.gain": {"value": 0.77}}, "degrees_of_freedom_interval": 4,
+    "frame_scatter": {"intensity_sd": 0.01, "degrees_of_freedom": 3},
+    "covariance": {"names": ["micrograph.gain", "sample.crystal.half_wave_voltage_v"], "matrix": [[1e-4, 0.9e-2], [0.9e-2, 1]]}})");
+  const std::string prior = "prior: {from: fit.json, parameters: [sample.crystal.half_wave_voltage_v, micrograph.gain]}\n";
+  const auto config = load(kCrystal + prior, ConfigUse::fit);
+  ASSERT_TRUE(config.job.prior);
+  EXPECT_EQ(config.job.prior->mean[0], 1490);
+  EXPECT_EQ(config.job.prior->covariance(0, 0), 1);
+  EXPECT_EQ(config.job.prior->covariance(1, 0), 0.9e-2);
+  EXPECT_EQ(config.job.prior->degrees_of_freedom, 4);
+  EXPECT_EQ(config.job.prior->frame_scatter->intensity_sd, 0.01);
+  const auto& table = config.job.parameters;
+  EXPECT_EQ(table[table.find("sample.crystal.half_wave_voltage_v")].value, 1490);
+  EXPECT_NE(mistakes(kCrystal + replaced(prior, "micrograph.gain", "micrograph.offset"), ConfigUse::fit)
+                .find("micrograph.offset was not fitted in fit.json"),
+            std::string::npos);
+}
+
+TEST_F(Config, ReadsAProfileInAnyColumnOrder) {
+  write("profile.csv", "n_e,n_o,az,ay,ax,depth_um\n1.7,1.5,0,0,2,1\n1.7,1.5,0,1,1,2.5\n");
+  const auto config = load("sample: {slab: {profile: profile.csv}}\nmicroscope: {light: {wavelength_nm: 590}}\n");
+  const auto& rows = std::get<Slab>(config.scene.sample).profile.rows;
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].ax, 1);
+  EXPECT_DOUBLE_EQ(rows[1].ay, std::sqrt(0.5));
+  EXPECT_EQ(rows[1].depth_um, 2.5);
+  EXPECT_EQ(rows[0].k_e, 0);
+}
+
+TEST_F(Config, NamesTheCellOfABadProfile) {
+  write("profile.csv", "depth_um,ax,ay,az,n_o,n_e\n1,0,0,1,1.5,1.7\n1,0,0,0,1.5,x\n");
+  const std::string text = "sample: {slab: {profile: profile.csv}}\nmicroscope: {light: {wavelength_nm: 590}}\n";
+  EXPECT_EQ(mistakes(text), "profile.csv:3:13: n_e = x is not a finite number");
+  write("profile.csv", "depth_um,ax,ay,az,n_o,n_e\n1,0,0,1,1.5,1.7\n1,0,0,0,1.5,1.7\n");
+  EXPECT_EQ(mistakes(text),
+            "profile.csv:3:1: depth_um = 1 does not grow (the row above has 1)\n"
+            "profile.csv:3:3: the axis (ax, ay, az) = (0, 0, 0) has no direction");
+}
+
+TEST_F(Config, RefusesAnImageOptionBesideMicrographs) {
+  save("a.tif", counts(100, 1));
+  save("b.tif", counts(200, 2));
+  EXPECT_THROW(load_config(write("config.yaml", kCrystal), ConfigUse::fit, folder_ / "a.tif"), UserError);
+}
+
+}  // namespace
+}  // namespace birefit

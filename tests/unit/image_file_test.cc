@@ -1,0 +1,590 @@
+// Every test writes its own files: with OpenImageIO, or by hand where OpenImageIO would not write such a file.
+
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <OpenImageIO/imageio.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "birefit/io.h"
+
+namespace birefit {
+namespace {
+
+namespace fs = std::filesystem;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class ImageFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) /
+              ("birefit_" + std::to_string(getpid()) + "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path path(const std::string& name) const { return folder_ / name; }
+
+  fs::path write_bytes(const std::string& name, const std::string& bytes) const {
+    std::ofstream(path(name), std::ios::binary) << bytes;
+    return path(name);
+  }
+
+  template <class T>
+  fs::path write(const std::string& name, ImageSpec spec, const std::vector<T>& samples) const {
+    auto output = OIIO::ImageOutput::create(name);
+    EXPECT_TRUE(output) << name;
+    EXPECT_TRUE(output->open(path(name).string(), spec)) << output->geterror();
+    EXPECT_TRUE(output->write_image(spec.format, samples.data())) << output->geterror();
+    EXPECT_TRUE(output->close());
+    return path(name);
+  }
+
+  fs::path write_pages(const std::string& name, const std::vector<ImageSpec>& specs) const {
+    auto output = OIIO::ImageOutput::create(name);
+    EXPECT_TRUE(output->open(path(name).string(), static_cast<int>(specs.size()), specs.data()));
+    for (std::size_t i = 0; i < specs.size(); ++i) {
+      if (i > 0) {
+        EXPECT_TRUE(output->open(path(name).string(), specs[i], OIIO::ImageOutput::AppendSubimage));
+      }
+      const std::vector<float> samples(specs[i].image_pixels() * specs[i].nchannels, 0.1f * (i + 1));
+      EXPECT_TRUE(output->write_image(TypeDesc::FLOAT, samples.data()));
+    }
+    EXPECT_TRUE(output->close());
+    return path(name);
+  }
+
+  fs::path truncated(const fs::path& whole, double fraction) const {
+    const std::string bytes = content(whole);
+    return write_bytes("truncated" + whole.extension().string(),
+                       bytes.substr(0, static_cast<std::size_t>(bytes.size() * fraction)));
+  }
+
+  static std::string content(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+
+  fs::path folder_;
+};
+
+LoadedImage load(const fs::path& path, const std::string& channel = {}, std::optional<int> page = {}) {
+  return load_image({path, page, channel, {"job.yaml", 3, 5}});
+}
+
+/// The message of the UserError that `action` throws; "" when it throws none.
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const UserError& error) {
+    EXPECT_EQ(error.problems().size(), 1u);
+    EXPECT_FALSE(error.problems()[0].hint.empty()) << error.what();
+    return error.what();
+  }
+  return {};
+}
+
+std::string refusal(const fs::path& path, const std::string& channel = {}, std::optional<int> page = {}) {
+  const std::string message = message_of([&] { (void)load(path, channel, page); });
+  EXPECT_THAT(message, AllOf(HasSubstr("job.yaml:3:5: "), HasSubstr(path.filename().string())));
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  return message;
+}
+
+std::vector<std::uint16_t> noise(std::size_t count) {
+  std::vector<std::uint16_t> samples(count);
+  std::uint32_t state = 12345;
+  for (auto& sample : samples) {
+    state = state * 1664525u + 1013904223u;
+    sample = static_cast<std::uint16_t>(state >> 16);
+  }
+  return samples;
+}
+
+/// A little-endian TIFF of one strip with the given tags (tag, type 3 or 4, values).
+struct Tag {
+  std::uint16_t id, type;
+  std::vector<std::uint32_t> values;
+};
+std::string tiff_bytes(std::vector<Tag> tags, const std::string& data) {
+  std::string bytes = std::string("II*\0", 4), tail;
+  const auto put16 = [](std::string& to, std::uint32_t v) { to += char(v & 255), to += char(v >> 8 & 255); };
+  const auto put32 = [&](std::string& to, std::uint32_t v) { put16(to, v & 65535), put16(to, v >> 16); };
+  tags.push_back({279, 4, {static_cast<std::uint32_t>(data.size())}});
+  tags.push_back({273, 4, {8}});
+  std::sort(tags.begin(), tags.end(), [](const Tag& a, const Tag& b) { return a.id < b.id; });
+  const std::uint32_t directory = 8 + static_cast<std::uint32_t>(data.size() + data.size() % 2);
+  put32(bytes, directory);
+  bytes += data;
+  bytes.resize(directory);
+  const std::uint32_t tail_at = directory + 2 + 12 * static_cast<std::uint32_t>(tags.size()) + 4;
+  put16(bytes, static_cast<std::uint32_t>(tags.size()));
+  for (const Tag& tag : tags) {
+    put16(bytes, tag.id), put16(bytes, tag.type), put32(bytes, static_cast<std::uint32_t>(tag.values.size()));
+    std::string values;
+    for (const std::uint32_t v : tag.values) tag.type == 3 ? put16(values, v) : put32(values, v);
+    if (values.size() <= 4) {
+      values.resize(4);
+      bytes += values;
+    } else {
+      put32(bytes, tail_at + static_cast<std::uint32_t>(tail.size()));
+      tail += values;
+    }
+  }
+  put32(bytes, 0);
+  return bytes + tail;
+}
+std::vector<Tag> tiff_tags(std::uint32_t width, std::uint32_t height, std::uint32_t bits, std::uint32_t photometric) {
+  return {{256, 4, {width}}, {257, 4, {height}}, {258, 3, {bits}}, {259, 3, {1}}, {262, 3, {photometric}},
+          {277, 3, {1}}, {278, 4, {height}}};
+}
+
+std::uint32_t crc32(const std::string& bytes) {
+  std::uint32_t crc = 0xffffffffu;
+  for (const unsigned char c : bytes) {
+    crc ^= c;
+    for (int i = 0; i < 8; ++i) crc = crc >> 1 ^ (crc & 1 ? 0xedb88320u : 0);
+  }
+  return ~crc;
+}
+std::string png_chunk(const std::string& type, const std::string& data) {
+  const auto put32 = [](std::uint32_t v) {
+    return std::string{char(v >> 24 & 255), char(v >> 16 & 255), char(v >> 8 & 255), char(v & 255)};
+  };
+  return put32(static_cast<std::uint32_t>(data.size())) + type + data + put32(crc32(type + data));
+}
+/// A PNG whose rows (filter bytes included) are stored uncompressed.
+std::string png_bytes(std::uint32_t width, std::uint32_t height, int bits, int colour_type, const std::string& rows,
+                      const std::string& palette = {}, const std::string& before_data = {}) {
+  const auto put32 = [](std::uint32_t v) {
+    return std::string{char(v >> 24 & 255), char(v >> 16 & 255), char(v >> 8 & 255), char(v & 255)};
+  };
+  std::uint32_t a = 1, b = 0;
+  for (const unsigned char c : rows) a = (a + c) % 65521, b = (b + a) % 65521;
+  const std::size_t n = rows.size();
+  std::string zlib = "\x78\x01\x01";
+  zlib += std::string{char(n & 255), char(n >> 8 & 255), char(~n & 255), char(~n >> 8 & 255)} + rows + put32(b << 16 | a);
+  std::string header = put32(width) + put32(height) + char(bits) + char(colour_type) + std::string(3, '\0');
+  return "\x89PNG\r\n\x1a\n" + png_chunk("IHDR", header) + (palette.empty() ? "" : png_chunk("PLTE", palette)) +
+         before_data + png_chunk("IDAT", zlib) + png_chunk("IEND", "");
+}
+
+// ---- values ---------------------------------------------------------------------------------------------------------
+
+TEST_F(ImageFile, KeepsCountsOf8BitPng) {
+  const LoadedImage image = load(write<std::uint8_t>("a.png", {3, 2, 1, TypeDesc::UINT8}, {0, 1, 2, 127, 128, 255}));
+  EXPECT_EQ(image.values.values(), (std::vector<double>{0, 1, 2, 127, 128, 255}));
+  EXPECT_EQ(image.values.width(), 3);
+  EXPECT_EQ(image.bits, 8);
+  EXPECT_EQ(image.top_code, 255);
+  EXPECT_EQ(image.pixel_size_um, 0);
+  EXPECT_THAT(image.notes, IsEmpty());
+}
+
+TEST_F(ImageFile, KeepsCountsOf16BitPngAndTiff) {
+  for (const char* name : {"a.png", "a.tif"}) {
+    const LoadedImage image = load(write<std::uint16_t>(name, {2, 2, 1, TypeDesc::UINT16}, {0, 1, 4095, 65535}));
+    EXPECT_EQ(image.values.values(), (std::vector<double>{0, 1, 4095, 65535})) << name;
+    EXPECT_EQ(image.bits, 16) << name;
+    EXPECT_EQ(image.top_code, 65535) << name;
+  }
+}
+
+TEST_F(ImageFile, KeepsFloatsOfTiffAndExrNanIncluded) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const char* name : {"a.tif", "a.exr"}) {
+    const LoadedImage image = load(write<float>(name, {2, 2, 1, TypeDesc::FLOAT}, {-1.5f, 3e6f, nan, 0.1f}));
+    EXPECT_EQ(image.values(0, 0), -1.5) << name;
+    EXPECT_EQ(image.values(1, 0), 3e6) << name;
+    EXPECT_TRUE(std::isnan(image.values(0, 1))) << name;
+    EXPECT_EQ(image.values(1, 1), double{0.1f}) << name;
+    EXPECT_EQ(image.bits, 32) << name;
+    EXPECT_EQ(image.top_code, 0) << name;
+  }
+}
+
+TEST_F(ImageFile, ReadsHalfFloatExrWithANote) {
+  const LoadedImage image = load(write<float>("a.exr", {2, 1, 1, TypeDesc::FLOAT}, {0.5f, 2}));
+  EXPECT_THAT(image.notes, IsEmpty());
+  ImageSpec half(2, 1, 1, TypeDesc::HALF);
+  auto output = OIIO::ImageOutput::create("h.exr");
+  const std::vector<float> samples = {0.5f, 2};
+  ASSERT_TRUE(output->open(path("h.exr").string(), half) && output->write_image(TypeDesc::FLOAT, samples.data()) &&
+              output->close());
+  const LoadedImage coarse = load(path("h.exr"));
+  EXPECT_EQ(coarse.values.values(), (std::vector<double>{0.5, 2}));
+  EXPECT_THAT(coarse.notes, Contains(HasSubstr("three decimal digits")));
+}
+
+TEST_F(ImageFile, ReadsSignedAndWideIntegersAsFloatWithANote) {
+  const LoadedImage negative = load(write<std::int16_t>("a.tif", {2, 1, 1, TypeDesc::INT16}, {-300, 32767}));
+  EXPECT_EQ(negative.values.values(), (std::vector<double>{-300, 32767}));
+  EXPECT_EQ(negative.bits, 32);
+  EXPECT_EQ(negative.top_code, 0);
+  EXPECT_THAT(negative.notes, Contains(HasSubstr("16-bit signed integer: read as float")));
+  const LoadedImage wide = load(write<std::uint32_t>("b.tif", {2, 1, 1, TypeDesc::UINT32}, {70000, 4294967295u}));
+  EXPECT_EQ(wide.values.values(), (std::vector<double>{70000, 4294967295.0}));
+}
+
+TEST_F(ImageFile, ReadsTiledTiff) {
+  ImageSpec spec(100, 70, 1, TypeDesc::UINT16);
+  const auto samples = noise(7000);
+  spec.tile_width = spec.tile_height = 64;
+  const LoadedImage image = load(write("a.tif", spec, samples));
+  EXPECT_EQ(image.values.values(), std::vector<double>(samples.begin(), samples.end()));
+}
+
+TEST_F(ImageFile, RestoresCountsOfPacked12BitTiff) {
+  ImageSpec spec(64, 64, 1, TypeDesc::UINT16);
+  spec.attribute("oiio:BitsPerSample", 12);
+  std::vector<std::uint16_t> counts(4096), expanded(4096);
+  for (int i = 0; i < 4096; ++i) counts[i] = i, expanded[i] = static_cast<std::uint16_t>(std::lround(i * 65535.0 / 4095));
+  const LoadedImage image = load(write("a.tif", spec, expanded));
+  EXPECT_EQ(image.values.values(), std::vector<double>(counts.begin(), counts.end()));
+  EXPECT_EQ(image.top_code, 4095);
+  EXPECT_THAT(image.notes, Contains(HasSubstr("12-bit samples")));
+}
+
+TEST_F(ImageFile, RestoresCountsOf4BitGreyPng) {
+  const LoadedImage image = load(write_bytes("a.png", png_bytes(2, 2, 4, 0, std::string("\0\x1f\0\x0a", 4))));
+  EXPECT_EQ(image.values.values(), (std::vector<double>{1, 15, 0, 10}));
+  EXPECT_EQ(image.top_code, 15);
+}
+
+TEST_F(ImageFile, InvertsWhiteIsZeroTiffWithANote) {
+  const LoadedImage image = load(write_bytes("a.tif", tiff_bytes(tiff_tags(2, 1, 8, 0), std::string("\x00\xf0", 2))));
+  EXPECT_EQ(image.values.values(), (std::vector<double>{255, 15}));
+  EXPECT_THAT(image.notes, Contains(HasSubstr("white is stored as zero")));
+}
+
+TEST_F(ImageFile, TrustsContentOverExtension) {
+  const fs::path png = write<std::uint8_t>("a.png", {2, 1, 1, TypeDesc::UINT8}, {7, 9});
+  fs::rename(png, path("a.tif"));
+  EXPECT_EQ(load(path("a.tif")).values.values(), (std::vector<double>{7, 9}));
+}
+
+// ---- channels and pages ---------------------------------------------------------------------------------------------
+
+TEST_F(ImageFile, ColourNeedsAChoiceOfChannel) {
+  const fs::path file = write<std::uint8_t>("a.png", {2, 1, 3, TypeDesc::UINT8}, {10, 20, 60, 1, 2, 4});
+  EXPECT_THAT(refusal(file), AllOf(HasSubstr("colour channels (R, G, B) and none is chosen"), HasSubstr("mean")));
+  EXPECT_EQ(load(file, "r").values.values(), (std::vector<double>{10, 1}));
+  EXPECT_EQ(load(file, "g").values.values(), (std::vector<double>{20, 2}));
+  EXPECT_EQ(load(file, "b").values.values(), (std::vector<double>{60, 4}));
+  EXPECT_EQ(load(file, "mean").values(0, 0), 30);
+  EXPECT_NEAR(load(file, "mean").values(1, 0), 7.0 / 3, 1e-15);
+  EXPECT_THAT(message_of([&] { (void)load(file, "y"); }), HasSubstr("'y' is none of r, g, b, mean"));
+}
+
+TEST_F(ImageFile, AlphaIsIgnoredAndDoesNotScaleTheCounts) {
+  for (const char* name : {"a.png", "a.tif"}) {
+    ImageSpec spec(1, 1, 4, TypeDesc::UINT8);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    const LoadedImage image = load(write<std::uint8_t>(name, spec, {100, 150, 200, 10}), "g");
+    EXPECT_EQ(image.values(0, 0), 150) << name;
+    EXPECT_THAT(image.notes, Contains("alpha channel ignored")) << name;
+  }
+}
+
+TEST_F(ImageFile, GreyWithAlphaNeedsNoChannel) {
+  ImageSpec spec(1, 1, 2, TypeDesc::UINT16);
+  spec.channelnames = {"Y", "A"};
+  spec.alpha_channel = 1;
+  spec.attribute("oiio:UnassociatedAlpha", 1);
+  const LoadedImage image = load(write<std::uint16_t>("a.png", spec, {1234, 7}));
+  EXPECT_EQ(image.values(0, 0), 1234);
+  EXPECT_THAT(image.notes, Contains("alpha channel ignored"));
+}
+
+TEST_F(ImageFile, ChannelOfGreyImageHasNoEffectAndSaysSo) {
+  const LoadedImage image = load(write<std::uint8_t>("a.png", {1, 1, 1, TypeDesc::UINT8}, {5}), "g");
+  EXPECT_EQ(image.values(0, 0), 5);
+  EXPECT_THAT(image.notes, Contains(HasSubstr("the image is grey")));
+}
+
+TEST_F(ImageFile, SeveralPagesAreListedWithTheirSizes) {
+  const fs::path file = write_pages("a.tif", {{8, 6, 1, TypeDesc::UINT16}, {4, 3, 1, TypeDesc::FLOAT}});
+  EXPECT_THAT(refusal(file), AllOf(HasSubstr("has 2 pages and none is chosen"), HasSubstr("0: 8 x 6"),
+                                   HasSubstr("1: 4 x 3, 1 channel, 32-bit float"), HasSubstr("`page: 0`")));
+  EXPECT_EQ(load(file, "", 0).values.width(), 8);
+  EXPECT_EQ(load(file, "", 1).values.width(), 4);
+  EXPECT_FLOAT_EQ(load(file, "", 1).values(0, 0), 0.2f);
+  EXPECT_THAT(refusal(file, "", 2), AllOf(HasSubstr("has no page 2"), HasSubstr("2 pages")));
+  EXPECT_THAT(refusal(file, "", -1), HasSubstr("has no page -1"));
+}
+
+TEST_F(ImageFile, PartsOfExrArePages) {
+  ImageSpec first(8, 6, 1, TypeDesc::FLOAT), second(8, 6, 1, TypeDesc::FLOAT);
+  first.attribute("oiio:subimagename", "one");
+  second.attribute("oiio:subimagename", "two");
+  const fs::path file = write_pages("a.exr", {first, second});
+  EXPECT_THAT(refusal(file), HasSubstr("has 2 pages"));
+  EXPECT_FLOAT_EQ(load(file, "", 1).values(3, 3), 0.2f);
+}
+
+TEST_F(ImageFile, PageZeroOfASinglePageIsFine) {
+  EXPECT_EQ(load(write<std::uint8_t>("a.tif", {1, 1, 1, TypeDesc::UINT8}, {5}), "", 0).values(0, 0), 5);
+}
+
+TEST_F(ImageFile, PaletteIsExpandedToColoursWithANote) {
+  const std::string palette("\x10\x20\x30\xff\xff\x00", 6);
+  const fs::path png = write_bytes("a.png", png_bytes(2, 1, 8, 3, std::string("\0\0\1", 3), palette));
+  EXPECT_THAT(refusal(png), AllOf(HasSubstr("colour channels"), HasSubstr("expanded from a palette")));
+  const LoadedImage image = load(png, "g");
+  EXPECT_EQ(image.values.values(), (std::vector<double>{0x20, 0xff}));
+  EXPECT_THAT(image.notes, Contains(HasSubstr("palette")));
+
+  std::vector<Tag> tags = tiff_tags(2, 1, 8, 3);
+  std::vector<std::uint32_t> map(768);
+  for (std::uint32_t i = 0; i < 256; ++i) map[i] = i * 257, map[256 + i] = (255 - i) * 257, map[512 + i] = 0;
+  tags.push_back({320, 3, map});
+  const fs::path tiff = write_bytes("a.tif", tiff_bytes(tags, std::string("\x03\xc8", 2)));
+  EXPECT_THAT(refusal(tiff), HasSubstr("expanded from a palette"));
+  EXPECT_EQ(load(tiff, "r").values.values(), (std::vector<double>{3, 200}));
+  EXPECT_EQ(load(tiff, "g").values.values(), (std::vector<double>{252, 55}));
+  EXPECT_THAT(load(tiff, "g").notes, Contains(HasSubstr("palette")));
+}
+
+// ---- refused --------------------------------------------------------------------------------------------------------
+
+TEST_F(ImageFile, MissingFileFolderAndEmptyFileAreTold) {
+  EXPECT_THAT(refusal(path("none.tif")), HasSubstr("does not exist"));
+  EXPECT_THAT(refusal(folder_), HasSubstr("is a folder"));
+  EXPECT_THAT(refusal(write_bytes("a.tif", "")), HasSubstr("is empty (zero bytes)"));
+  EXPECT_THAT(refusal(write_bytes("b.tif", "hello, this is text")), HasSubstr("no image of a kind birefit reads"));
+  EXPECT_THAT(refusal(write_bytes("c.png", "\x89PNG\r\n\x1a\n")), HasSubstr("truncated"));
+  EXPECT_THAT(refusal(write_bytes("d.tif", std::string("II*\0\xff\xff\xff\x7f", 8))), HasSubstr("truncated or damaged"));
+}
+
+TEST_F(ImageFile, TruncatedAtAnyPlaceIsTruncatedInEveryFormat) {
+  const auto samples = noise(128 * 128);
+  ImageSpec plain(128, 128, 1, TypeDesc::UINT16);
+  std::vector<fs::path> files = {write("a.png", plain, samples), write("z.exr", plain, samples)};
+  for (const char* compression : {"none", "lzw", "zip"}) {
+    plain.attribute("compression", compression);
+    files.push_back(write(std::string(compression) + ".tif", plain, samples));
+  }
+  files.push_back(write("a.jpg", ImageSpec(128, 128, 1, TypeDesc::UINT8),
+                        std::vector<std::uint8_t>(samples.begin(), samples.end())));
+  for (const fs::path& file : files) {
+    EXPECT_EQ(load(file).values.width(), 128) << file;
+    for (const double fraction : {0.02, 0.3, 0.6, 0.9, 0.99})
+      EXPECT_THAT(refusal(truncated(file, fraction)), HasSubstr("truncated")) << file << " cut at " << fraction;
+  }
+}
+
+TEST_F(ImageFile, DamagedDataIsRefused) {
+  const fs::path file = write("a.png", ImageSpec(64, 64, 1, TypeDesc::UINT16), noise(4096));
+  std::string bytes = content(file);
+  bytes[bytes.size() / 2] ^= 0x55;
+  EXPECT_THAT(refusal(write_bytes("b.png", bytes)), HasSubstr("truncated or damaged"));
+}
+
+TEST_F(ImageFile, OneBitIsRefused) {
+  EXPECT_THAT(refusal(write_bytes("a.png", png_bytes(8, 1, 1, 0, std::string("\0\xaa", 2)))), HasSubstr("1 bit per pixel"));
+  EXPECT_THAT(refusal(write_bytes("a.tif", tiff_bytes(tiff_tags(8, 1, 1, 1), "\xaa"))), HasSubstr("1 bit per pixel"));
+}
+
+TEST_F(ImageFile, AnimationsAreRefused) {
+  const std::string animation = png_chunk("acTL", std::string("\0\0\0\2\0\0\0\0", 8));
+  EXPECT_THAT(refusal(write_bytes("a.png", png_bytes(2, 1, 8, 0, std::string("\0\1\2", 3), {}, animation))),
+              HasSubstr("is animated (PNG)"));
+  const ImageSpec frame(16, 16, 3, TypeDesc::UINT8);
+  EXPECT_THAT(refusal(write_pages("a.gif", {frame, frame})), HasSubstr("is animated (GIF)"));
+  std::string webp = "RIFF....WEBPVP8X" + std::string("\x0a\0\0\0\x02\0\0\0\1\0\0\1\0\0", 14) + std::string(16, '\0');
+  EXPECT_THAT(refusal(write_bytes("a.webp", webp)), HasSubstr("is animated (WebP)"));
+}
+
+TEST_F(ImageFile, AStillGifIsAPaletteImage) {
+  const fs::path file = write<std::uint8_t>("a.gif", {2, 2, 3, TypeDesc::UINT8}, std::vector<std::uint8_t>(12, 100));
+  EXPECT_THAT(refusal(file), HasSubstr("palette"));
+  EXPECT_THAT(load(file, "mean").notes, Contains(HasSubstr("palette")));
+}
+
+TEST_F(ImageFile, TooLargeIsRefusedFromTheHeaderAlone) {
+  const std::string png = png_bytes(20000, 20000, 16, 0, std::string(16, '\0'));
+  EXPECT_THAT(refusal(write_bytes("a.png", png)), HasSubstr("is 20000 x 20000 pixels; at most 16384 on a side"));
+  const std::string tiff = tiff_bytes(tiff_tags(16385, 2, 16, 1), std::string(16, '\0'));
+  EXPECT_THAT(refusal(write_bytes("a.tif", tiff)), HasSubstr("is 16385 x 2 pixels"));
+}
+
+TEST_F(ImageFile, HugeHeaderOnFewBytesIsTruncatedNotAllocated) {
+  const std::string tiff = tiff_bytes(tiff_tags(16384, 16384, 16, 1), std::string(16, '\0'));
+  EXPECT_THAT(refusal(write_bytes("a.tif", tiff)), HasSubstr("truncated or damaged"));
+}
+
+TEST_F(ImageFile, CmykIsRefused) {
+  std::vector<Tag> tags = tiff_tags(1, 1, 8, 5);
+  for (Tag& tag : tags) {
+    if (tag.id == 277) tag.values = {4};
+    if (tag.id == 258) tag.values = {8, 8, 8, 8};
+  }
+  EXPECT_THAT(refusal(write_bytes("a.tif", tiff_bytes(tags, "abcd")), "g"), HasSubstr("colour space"));
+}
+
+// ---- pixel size -----------------------------------------------------------------------------------------------------
+
+ImageSpec with_resolution(double x, double y, const std::string& unit, const std::string& description = {}) {
+  ImageSpec spec(2, 2, 1, TypeDesc::UINT8);
+  spec.attribute("XResolution", static_cast<float>(x));
+  spec.attribute("YResolution", static_cast<float>(y));
+  spec.attribute("ResolutionUnit", unit);
+  if (!description.empty()) spec.attribute("ImageDescription", description);
+  return spec;
+}
+
+TEST_F(ImageFile, DotsPerInchMeantForPaperAreNotAPixelSize) {
+  const std::vector<std::uint8_t> samples = {1, 2, 3, 4};
+  for (const double dpi : {72.0, 96.0, 300.0, 600.0})
+    EXPECT_EQ(load(write("a.tif", with_resolution(dpi, dpi, "in"), samples)).pixel_size_um, 0) << dpi;
+  EXPECT_NEAR(load(write("a.tif", with_resolution(254000, 254000, "in"), samples)).pixel_size_um, 0.1, 1e-6);
+  EXPECT_NEAR(load(write("a.tif", with_resolution(200000, 200000, "cm"), samples)).pixel_size_um, 0.05, 1e-6);
+}
+
+TEST_F(ImageFile, ImageJUnitIsTrusted) {
+  const std::vector<std::uint8_t> samples = {1, 2, 3, 4};
+  for (const char* unit : {"micron", "um", "\\u00B5m", "\xc2\xb5m"}) {
+    const std::string description = std::string("ImageJ=1.53t\nunit=") + unit + "\nmin=0\nmax=255\n";
+    const LoadedImage image = load(write("a.tif", with_resolution(20, 20, "none", description), samples));
+    EXPECT_NEAR(image.pixel_size_um, 0.05, 1e-6) << unit;
+    EXPECT_THAT(image.notes, Contains(HasSubstr("ImageJ metadata")));
+  }
+  const std::string nm = "ImageJ=1.53t\nunit=nm\n";
+  EXPECT_NEAR(load(write("a.tif", with_resolution(0.02, 0.02, "none", nm), samples)).pixel_size_um, 0.05, 1e-6);
+  const std::string pixels = "ImageJ=1.53t\nunit=pixel\n";
+  EXPECT_EQ(load(write("a.tif", with_resolution(1, 1, "none", pixels), samples)).pixel_size_um, 0);
+}
+
+TEST_F(ImageFile, OmePhysicalSizeIsTrustedAndItsUnitDefaultsToMicrometres) {
+  const std::vector<std::uint8_t> samples = {1, 2, 3, 4};
+  const auto ome = [](const std::string& attributes) {
+    return "<?xml version=\"1.0\"?><OME xmlns=\"x\"><Image ID=\"Image:0\"><Pixels ID=\"Pixels:0\" " + attributes +
+           " SizeX=\"2\"/></Image></OME>";
+  };
+  const auto size = [&](const std::string& attributes) {
+    return load(write("a.tif", with_resolution(72, 72, "in", ome(attributes)), samples)).pixel_size_um;
+  };
+  EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"0.065\" PhysicalSizeY=\"0.065\""), 0.065);
+  EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"65\" PhysicalSizeXUnit=\"nm\""), 0.065);
+  EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"0.065\" PhysicalSizeXUnit=\"\xc2\xb5m\""), 0.065);
+  EXPECT_EQ(size("PhysicalSizeX=\"1\" PhysicalSizeXUnit=\"pixel\""), 0);
+  EXPECT_EQ(size("PhysicalSizeX=\"0.1\" PhysicalSizeY=\"0.2\""), 0) << "not square";
+}
+
+// ---- writing --------------------------------------------------------------------------------------------------------
+
+Image ramp() {
+  Image image(31, 17);
+  for (std::size_t i = 0; i < image.size(); ++i) image.values()[i] = static_cast<double>(i) / (image.size() - 1);
+  return image;
+}
+
+TEST_F(ImageFile, SavedFloatsAreReadBackExactlyAndAreNotHalf) {
+  Image image = ramp();
+  image(3, 3) = -12345.678f;
+  image(4, 3) = std::numeric_limits<double>::quiet_NaN();
+  for (const char* name : {"a.tif", "a.exr", "b.TIFF"}) {
+    save_image(image, path(name));
+    const LoadedImage loaded = load(path(name));
+    EXPECT_THAT(loaded.notes, IsEmpty()) << name;
+    for (int y = 0; y < image.height(); ++y)
+      for (int x = 0; x < image.width(); ++x) {
+        if (x == 4 && y == 3) continue;
+        ASSERT_EQ(loaded.values(x, y), double{static_cast<float>(image(x, y))}) << name;
+      }
+    EXPECT_TRUE(std::isnan(loaded.values(4, 3))) << name;
+  }
+}
+
+TEST_F(ImageFile, SavedPngIsClampedTo16Bit) {
+  Image image(4, 1);
+  image.values() = {-0.5, 0.5, 1.5, std::numeric_limits<double>::quiet_NaN()};
+  save_image(image, path("a.png"));
+  const LoadedImage loaded = load(path("a.png"));
+  EXPECT_EQ(loaded.values.values(), (std::vector<double>{0, 32768, 65535, 0}));
+  EXPECT_EQ(loaded.bits, 16);
+}
+
+TEST_F(ImageFile, UnknownExtensionListsTheKnownOnes) {
+  EXPECT_THAT(message_of([&] { save_image(ramp(), path("a.bmp")); }),
+              AllOf(HasSubstr("'.bmp'"), HasSubstr(".tif"), HasSubstr(".exr"), HasSubstr(".png")));
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(ImageFile, EncodedPngIsAPng) {
+  const std::vector<unsigned char> samples = {255, 0, 0, 0, 255, 0};
+  const std::vector<unsigned char> png = encode_png(samples, 2, 1, 3);
+  const fs::path file = write_bytes("a.png", std::string(png.begin(), png.end()));
+  EXPECT_EQ(load(file, "r").values.values(), (std::vector<double>{255, 0}));
+  EXPECT_EQ(load(file, "g").values.values(), (std::vector<double>{0, 255}));
+}
+
+TEST_F(ImageFile, UnwritableFolderIsTold) {
+  EXPECT_THAT(message_of([&] { write_file(path("none/a.txt"), "x"); }), HasSubstr("cannot be written: No such file"));
+  EXPECT_THROW(write_file(folder_, "x"), UserError);
+}
+
+TEST_F(ImageFile, FullDeviceIsTold) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  EXPECT_THAT(message_of([&] { write_file("/dev/full", "x"); }), HasSubstr("No space left on device"));
+  EXPECT_TRUE(fs::exists("/dev/full"));
+}
+
+/// Lets no file grow beyond some bytes: what a full disk looks like to one process.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST_F(ImageFile, FailedWriteKeepsTheOldFileAndLeavesNoTemporary) {
+  write_file(path("a.txt"), "old");
+  save_image(ramp(), path("a.tif"));
+  const std::string old_image = content(path("a.tif"));
+  {
+    FileSizeLimit limit(100);
+    EXPECT_THAT(message_of([&] { write_file(path("a.txt"), std::string(1000, 'x')); }), HasSubstr("cannot be written"));
+    EXPECT_THAT(message_of([&] { save_image(Image(64, 64, 0.5), path("a.tif")); }), HasSubstr("cannot be written"));
+  }
+  EXPECT_EQ(content(path("a.txt")), "old");
+  EXPECT_EQ(content(path("a.tif")), old_image);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 2);
+}
+
+TEST_F(ImageFile, WritingThroughALinkKeepsTheLink) {
+  write_file(path("target.txt"), "old");
+  fs::create_symlink("target.txt", path("link.txt"));
+  write_file(path("link.txt"), "new");
+  EXPECT_TRUE(fs::is_symlink(path("link.txt")));
+  EXPECT_EQ(content(path("target.txt")), "new");
+}
+
+}  // namespace
+}  // namespace birefit
