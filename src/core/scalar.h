@@ -10,6 +10,14 @@
 
 #include <xsimd/xsimd.hpp>
 
+// Kernels are long chains of these small functions over wide values; a compiler that leaves one call in the chain
+// passes 64-byte lanes through memory, which costs more than the arithmetic.
+#if defined(__GNUC__)
+#define BIREFIT_INLINE [[gnu::always_inline]] inline
+#else
+#define BIREFIT_INLINE inline
+#endif
+
 namespace birefit {
 
 /// One ray per SIMD lane: 8 doubles with AVX-512, 4 with AVX2, 2 with SSE2 or NEON.
@@ -41,94 +49,95 @@ template <class S>
 using PlainOf = typename ScalarTraits<S>::Plain;
 
 /// Value without derivatives.
-inline double plain(double x) { return x; }
-inline Pack plain(const Pack& x) { return x; }
+BIREFIT_INLINE double plain(double x) { return x; }
+BIREFIT_INLINE Pack plain(const Pack& x) { return x; }
 
 /// lane-wise condition ? a : b. Both sides are computed: never for "x < eps", only for piecewise definitions.
-inline double select(bool condition, double a, double b) { return condition ? a : b; }
-inline Pack select(const Pack::batch_bool_type& condition, const Pack& a, const Pack& b) {
+BIREFIT_INLINE double select(bool condition, double a, double b) { return condition ? a : b; }
+BIREFIT_INLINE Pack select(const Pack::batch_bool_type& condition, const Pack& a, const Pack& b) {
   return xsimd::select(condition, a, b);
 }
-inline double min_of(double a, double b) { return a < b ? a : b; }
-inline double max_of(double a, double b) { return a > b ? a : b; }
-inline Pack min_of(const Pack& a, const Pack& b) { return xsimd::min(a, b); }
-inline Pack max_of(const Pack& a, const Pack& b) { return xsimd::max(a, b); }
-inline double largest(double x) { return x; }
-inline double largest(const Pack& x) {
+BIREFIT_INLINE double min_of(double a, double b) { return a < b ? a : b; }
+BIREFIT_INLINE double max_of(double a, double b) { return a > b ? a : b; }
+BIREFIT_INLINE Pack min_of(const Pack& a, const Pack& b) { return xsimd::min(a, b); }
+BIREFIT_INLINE Pack max_of(const Pack& a, const Pack& b) { return xsimd::max(a, b); }
+BIREFIT_INLINE double largest(double x) { return x; }
+BIREFIT_INLINE double largest(const Pack& x) {
   alignas(64) double lanes[kLanes];
   x.store_aligned(lanes);
   double result = lanes[0];
   for (int i = 1; i < kLanes; ++i) result = lanes[i] > result ? lanes[i] : result;
   return result;
 }
-inline double lane(double x, int) { return x; }
-inline double lane(const Pack& x, int i) { return x.get(static_cast<std::size_t>(i)); }
-inline void sin_cos(double x, double& s, double& c) {
+BIREFIT_INLINE double lane(double x, int) { return x; }
+BIREFIT_INLINE double lane(const Pack& x, int i) { return x.get(static_cast<std::size_t>(i)); }
+BIREFIT_INLINE void sin_cos(double x, double& s, double& c) {
   s = std::sin(x);
   c = std::cos(x);
 }
-inline void sin_cos(const Pack& x, Pack& s, Pack& c) {
+BIREFIT_INLINE void sin_cos(const Pack& x, Pack& s, Pack& c) {
   const auto both = xsimd::sincos(x);
   s = both.first;
   c = both.second;
 }
 template <class T>
-T square(const T& x) {
+BIREFIT_INLINE T square(const T& x) {
   return x * x;
 }
 
 /// Forward-mode derivative number: value and N partial derivatives, over any base scalar (nests).
 template <class B, int N>
 struct Dual {
-  B value{};
-  std::array<B, N> d{};
+  B value;
+  std::array<B, N> d;
 
-  Dual() {
-    value = B(0.0);
-    d.fill(B(0.0));
+  BIREFIT_INLINE Dual() : value(B(0.0)) {
+    for (B& x : d) x = B(0.0);
   }
-  Dual(const B& v) : value(v) { d.fill(B(0.0)); }  // NOLINT: constants mix freely with duals
+  BIREFIT_INLINE Dual(const B& v) : value(v) {  // NOLINT: constants mix freely with duals
+    for (B& x : d) x = B(0.0);
+  }
   template <class T>
     requires(std::is_arithmetic_v<T> && !std::is_same_v<T, B>)
-  Dual(T v) : value(B(static_cast<double>(v))) {  // NOLINT
-    d.fill(B(0.0));
+  BIREFIT_INLINE Dual(T v) : value(B(static_cast<double>(v))) {  // NOLINT
+    for (B& x : d) x = B(0.0);
   }
   /// f(x) with derivative f'(x): the chain rule.
-  Dual chain(const B& f, const B& slope) const {
+  BIREFIT_INLINE Dual chain(const B& f, const B& slope) const {
     Dual r;
     r.value = f;
     for (int i = 0; i < N; ++i) r.d[i] = slope * d[i];
     return r;
   }
-  Dual& operator+=(const Dual& o) { return *this = *this + o; }
-  Dual& operator-=(const Dual& o) { return *this = *this - o; }
-  Dual& operator*=(const Dual& o) { return *this = *this * o; }
+  BIREFIT_INLINE Dual& operator+=(const Dual& o) { return *this = *this + o; }
+  BIREFIT_INLINE Dual& operator-=(const Dual& o) { return *this = *this - o; }
+  BIREFIT_INLINE Dual& operator*=(const Dual& o) { return *this = *this * o; }
 
-  friend Dual operator+(const Dual& a, const Dual& b) {
+  BIREFIT_INLINE friend Dual operator+(const Dual& a, const Dual& b) {
     Dual r;
     r.value = a.value + b.value;
     for (int i = 0; i < N; ++i) r.d[i] = a.d[i] + b.d[i];
     return r;
   }
-  friend Dual operator-(const Dual& a, const Dual& b) {
+  BIREFIT_INLINE friend Dual operator-(const Dual& a, const Dual& b) {
     Dual r;
     r.value = a.value - b.value;
     for (int i = 0; i < N; ++i) r.d[i] = a.d[i] - b.d[i];
     return r;
   }
-  friend Dual operator-(const Dual& a) {
+  BIREFIT_INLINE friend Dual operator-(const Dual& a) {
     Dual r;
     r.value = -a.value;
     for (int i = 0; i < N; ++i) r.d[i] = -a.d[i];
     return r;
   }
-  friend Dual operator*(const Dual& a, const Dual& b) {
+  BIREFIT_INLINE friend Dual operator*(const Dual& a, const Dual& b) {
     Dual r;
     r.value = a.value * b.value;
     for (int i = 0; i < N; ++i) r.d[i] = a.d[i] * b.value + a.value * b.d[i];
     return r;
   }
-  friend Dual operator/(const Dual& a, const Dual& b) {
+  BIREFIT_INLINE friend Dual operator/(const Dual& a, const Dual& b) {
     Dual r;
     const B inverse = B(1.0) / b.value;
     r.value = a.value * inverse;
@@ -136,18 +145,18 @@ struct Dual {
     return r;
   }
   // Constants (double or base) without the work of a full dual.
-  friend Dual operator+(const Dual& a, double b) {
+  BIREFIT_INLINE friend Dual operator+(const Dual& a, double b) {
     Dual r = a;
     r.value = a.value + B(b);
     return r;
   }
-  friend Dual operator+(double a, const Dual& b) { return b + a; }
-  friend Dual operator-(const Dual& a, double b) { return a + (-b); }
-  friend Dual operator-(double a, const Dual& b) { return -b + a; }
-  friend Dual operator*(const Dual& a, double b) { return a.chain(a.value * B(b), B(b)); }
-  friend Dual operator*(double a, const Dual& b) { return b * a; }
-  friend Dual operator/(const Dual& a, double b) { return a * (1.0 / b); }
-  friend Dual operator/(double a, const Dual& b) {
+  BIREFIT_INLINE friend Dual operator+(double a, const Dual& b) { return b + a; }
+  BIREFIT_INLINE friend Dual operator-(const Dual& a, double b) { return a + (-b); }
+  BIREFIT_INLINE friend Dual operator-(double a, const Dual& b) { return -b + a; }
+  BIREFIT_INLINE friend Dual operator*(const Dual& a, double b) { return a.chain(a.value * B(b), B(b)); }
+  BIREFIT_INLINE friend Dual operator*(double a, const Dual& b) { return b * a; }
+  BIREFIT_INLINE friend Dual operator/(const Dual& a, double b) { return a * (1.0 / b); }
+  BIREFIT_INLINE friend Dual operator/(double a, const Dual& b) {
     const B inverse = B(1.0) / b.value;
     const B f = B(a) * inverse;
     return b.chain(f, -f * inverse);
@@ -160,94 +169,94 @@ struct ScalarTraits<Dual<B, N>> {
   static constexpr int derivatives = N;
 };
 template <class B, int N>
-PlainOf<B> plain(const Dual<B, N>& x) {
+BIREFIT_INLINE PlainOf<B> plain(const Dual<B, N>& x) {
   return plain(x.value);
 }
 template <class C, class B, int N>
-Dual<B, N> select(const C& condition, const Dual<B, N>& a, const Dual<B, N>& b) {
+BIREFIT_INLINE Dual<B, N> select(const C& condition, const Dual<B, N>& a, const Dual<B, N>& b) {
   Dual<B, N> r;
   r.value = select(condition, a.value, b.value);
   for (int i = 0; i < N; ++i) r.d[i] = select(condition, a.d[i], b.d[i]);
   return r;
 }
 template <class B, int N>
-Dual<B, N> min_of(const Dual<B, N>& a, const Dual<B, N>& b) {
+BIREFIT_INLINE Dual<B, N> min_of(const Dual<B, N>& a, const Dual<B, N>& b) {
   return select(plain(a) < plain(b), a, b);
 }
 template <class B, int N>
-Dual<B, N> max_of(const Dual<B, N>& a, const Dual<B, N>& b) {
+BIREFIT_INLINE Dual<B, N> max_of(const Dual<B, N>& a, const Dual<B, N>& b) {
   return select(plain(a) > plain(b), a, b);
 }
 template <class B, int N>
-Dual<B, N> sqrt(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> sqrt(const Dual<B, N>& x) {
   const B root = sqrt(x.value);
   return x.chain(root, B(0.5) / root);
 }
 template <class B, int N>
-Dual<B, N> exp(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> exp(const Dual<B, N>& x) {
   const B e = exp(x.value);
   return x.chain(e, e);
 }
 template <class B, int N>
-Dual<B, N> log(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> log(const Dual<B, N>& x) {
   return x.chain(log(x.value), B(1.0) / x.value);
 }
 template <class B, int N>
-void sin_cos(const Dual<B, N>& x, Dual<B, N>& s, Dual<B, N>& c) {
+BIREFIT_INLINE void sin_cos(const Dual<B, N>& x, Dual<B, N>& s, Dual<B, N>& c) {
   B sv, cv;
   sin_cos(x.value, sv, cv);
   s = x.chain(sv, cv);
   c = x.chain(cv, -sv);
 }
 template <class B, int N>
-Dual<B, N> sin(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> sin(const Dual<B, N>& x) {
   Dual<B, N> s, c;
   sin_cos(x, s, c);
   return s;
 }
 template <class B, int N>
-Dual<B, N> cos(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> cos(const Dual<B, N>& x) {
   Dual<B, N> s, c;
   sin_cos(x, s, c);
   return c;
 }
 template <class B, int N>
-Dual<B, N> sinh(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> sinh(const Dual<B, N>& x) {
   return x.chain(sinh(x.value), cosh(x.value));
 }
 template <class B, int N>
-Dual<B, N> cosh(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> cosh(const Dual<B, N>& x) {
   return x.chain(cosh(x.value), sinh(x.value));
 }
 template <class B, int N>
-Dual<B, N> asinh(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> asinh(const Dual<B, N>& x) {
   return x.chain(asinh(x.value), B(1.0) / sqrt(x.value * x.value + B(1.0)));
 }
 template <class B, int N>
-Dual<B, N> erfc(const Dual<B, N>& x) {
+BIREFIT_INLINE Dual<B, N> erfc(const Dual<B, N>& x) {
   return x.chain(erfc(x.value), B(-1.1283791670955126) * exp(-(x.value * x.value)));
 }
 
 // Oracles such as ceres::Jet bring no sin_cos, select, ... of their own; these serve any scalar that has sin and cos.
 template <class S>
   requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-void sin_cos(const S& x, S& s, S& c) {
+BIREFIT_INLINE void sin_cos(const S& x, S& s, S& c) {
   s = sin(x);
   c = cos(x);
 }
 template <class S>
   requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-S select(bool condition, const S& a, const S& b) {
+BIREFIT_INLINE S select(bool condition, const S& a, const S& b) {
   return condition ? a : b;
 }
 template <class S>
   requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-S max_of(const S& a, const S& b) {
+BIREFIT_INLINE S max_of(const S& a, const S& b) {
   return a > b ? a : b;
 }
 template <class S>
   requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-S min_of(const S& a, const S& b) {
+BIREFIT_INLINE S min_of(const S& a, const S& b) {
   return a < b ? a : b;
 }
 
@@ -262,7 +271,7 @@ struct CosSinc {
   S cos_sq, sinc_sq;
 };
 template <class B>
-B sinc_slope(const B& q, const B& cos_sq, const B& sinc_sq) {
+BIREFIT_INLINE B sinc_slope(const B& q, const B& cos_sq, const B& sinc_sq) {
   // (cos_sq - sinc_sq)/(2q) = -1/6 + q/60 - q^2/1680 + q^3/90720 - q^4/7983360: next term below 1e-12 for q < 0.03.
   const B series = B(-1.0 / 6) + q * (B(1.0 / 60) + q * (B(-1.0 / 1680) + q * (B(1.0 / 90720) - q * B(1.0 / 7983360))));
   const auto small = plain(q) < PlainOf<B>(0.03);
@@ -271,14 +280,14 @@ B sinc_slope(const B& q, const B& cos_sq, const B& sinc_sq) {
 }
 template <class S>
   requires(ScalarTraits<S>::derivatives == 0)
-CosSinc<S> cos_sinc_sq(const S& q) {
+BIREFIT_INLINE CosSinc<S> cos_sinc_sq(const S& q) {
   const S root = sqrt(max_of(q, S(1e-40)));
   S s, c;
   sin_cos(root, s, c);
   return {c, s / root};
 }
 template <class B, int N>
-CosSinc<Dual<B, N>> cos_sinc_sq(const Dual<B, N>& q) {
+BIREFIT_INLINE CosSinc<Dual<B, N>> cos_sinc_sq(const Dual<B, N>& q) {
   const CosSinc<B> f = cos_sinc_sq(q.value);
   return {q.chain(f.cos_sq, f.sinc_sq * B(-0.5)), q.chain(f.sinc_sq, sinc_slope(q.value, f.cos_sq, f.sinc_sq))};
 }
@@ -290,19 +299,19 @@ struct Vec3 {
   S x, y, z;
 };
 template <class S>
-Vec3<S> operator+(const Vec3<S>& a, const Vec3<S>& b) {
+BIREFIT_INLINE Vec3<S> operator+(const Vec3<S>& a, const Vec3<S>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <class S>
-Vec3<S> operator*(const S& s, const Vec3<S>& a) {
+BIREFIT_INLINE Vec3<S> operator*(const S& s, const Vec3<S>& a) {
   return {s * a.x, s * a.y, s * a.z};
 }
 template <class S>
-S dot(const Vec3<S>& a, const Vec3<S>& b) {
+BIREFIT_INLINE S dot(const Vec3<S>& a, const Vec3<S>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class S>
-Vec3<S> normalized(const Vec3<S>& a) {
+BIREFIT_INLINE Vec3<S> normalized(const Vec3<S>& a) {
   return (S(1.0) / sqrt(dot(a, a))) * a;
 }
 
@@ -348,7 +357,7 @@ Complex<S> conj(const Complex<S>& a) {
   return {a.re, -a.im};
 }
 template <class S>
-S norm(const Complex<S>& a) {
+BIREFIT_INLINE S norm(const Complex<S>& a) {
   return a.re * a.re + a.im * a.im;
 }
 template <class S>

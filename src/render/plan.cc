@@ -160,7 +160,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
     const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
     // The cross turns within the innermost pixels; at the rim intensity ends like a root.
     if (r < 2) return std::max(0.5, std::abs(phase_at(high) - phase_at(low)));
-    if (high > edge - 2 * px && low < edge + px) return 5.0;
+    if (high > edge - px && low < edge + px) return 3.0;
     return std::abs(phase_at(high) - phase_at(low));
   });
   const int most = *std::max_element(plan.samples.begin(), plan.samples.end());

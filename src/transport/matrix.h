@@ -117,19 +117,19 @@ struct Su2 {
 };
 /// a after b. (i u.s)(i v.s) = -u.v - i (u x v).s
 template <class S>
-Su2<S> operator*(const Su2<S>& a, const Su2<S>& b) {
+BIREFIT_INLINE Su2<S> operator*(const Su2<S>& a, const Su2<S>& b) {
   return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w - (a.y * b.z - a.z * b.y),
           a.w * b.y + a.y * b.w - (a.z * b.x - a.x * b.z), a.w * b.z + a.z * b.w - (a.x * b.y - a.y * b.x)};
 }
 /// exp(i v.s)
 template <class S>
-Su2<S> su2_exp(const Vec3<S>& v) {
+BIREFIT_INLINE Su2<S> su2_exp(const Vec3<S>& v) {
   const CosSinc<S> f = cos_sinc_sq(dot(v, v));
   return {f.cos_sq, f.sinc_sq * v.x, f.sinc_sq * v.y, f.sinc_sq * v.z};
 }
 /// As a matrix: [[w + i z, y + i x], [-y + i x, w - i z]].
 template <class S>
-Mat2<S> matrix(const Su2<S>& u) {
+BIREFIT_INLINE Mat2<S> matrix(const Su2<S>& u) {
   return {{u.w, u.z}, {u.y, u.x}, {-u.y, u.x}, {u.w, -u.z}};
 }
 

@@ -102,7 +102,7 @@ Mat2<S> generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0, const S&
 /// incidence"): v_x, v_z from N = n_o + g a_t a_t^T, g = eo de/((eo + de az^2)(n_o + n_eff)); v_y is what keeping H
 /// continuous adds to a turning axis: a_t x a_t' (n_eff - n_o)^2 / (2 sqrt(n_o n_eff)(sqrt n_o + sqrt n_eff)^2 a_t^2).
 template <class S>
-Vec3<S> su2_generator(const OpticalPoint<S>& p, const S& k0) {
+BIREFIT_INLINE Vec3<S> su2_generator(const OpticalPoint<S>& p, const S& k0) {
   const S de = p.extraordinary - p.ordinary;
   const S denominator = p.ordinary + de * p.axis.z * p.axis.z;
   const S inverse_d = 1.0 / denominator;
@@ -112,7 +112,7 @@ Vec3<S> su2_generator(const OpticalPoint<S>& p, const S& k0) {
   return {half * (2.0 * p.axis.x * p.axis.y), S(0.0), half * (p.axis.x * p.axis.x - p.axis.y * p.axis.y)};
 }
 template <class S>
-Vec3<S> su2_generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0) {
+BIREFIT_INLINE Vec3<S> su2_generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0) {
   const S ax = p.axis.x.value, ay = p.axis.y.value, az = p.axis.z.value;
   const S eo = p.ordinary.value, ee = p.extraordinary.value;
   const S de = ee - eo;
@@ -128,7 +128,7 @@ Vec3<S> su2_generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0) {
 }
 /// n_eff - n_o seen by a ray along z: the retardance per length, without cancellation at small birefringence.
 template <class S>
-S retardance_per_length(const OpticalPoint<S>& p) {
+BIREFIT_INLINE S retardance_per_length(const OpticalPoint<S>& p) {
   const S de = p.extraordinary - p.ordinary;
   const S denominator = p.ordinary + de * p.axis.z * p.axis.z;
   const S n_o = sqrt(p.ordinary);

@@ -1,11 +1,14 @@
 // Every test writes its own files: with OpenImageIO, or by hand where OpenImageIO would not write such a file.
 
+#include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -464,8 +467,8 @@ TEST_F(ImageFile, ImageJUnitIsTrusted) {
     EXPECT_NEAR(image.pixel_size_um, 0.05, 1e-6) << unit;
     EXPECT_THAT(image.notes, Contains(HasSubstr("ImageJ metadata")));
   }
-  const std::string nm = "ImageJ=1.53t\nunit=nm\n";
-  EXPECT_NEAR(load(write("a.tif", with_resolution(0.02, 0.02, "none", nm), samples)).pixel_size_um, 0.05, 1e-6);
+  const std::string mm = "ImageJ=1.53t\nunit=mm\n";
+  EXPECT_NEAR(load(write("a.tif", with_resolution(20000, 20000, "none", mm), samples)).pixel_size_um, 0.05, 1e-6);
   const std::string pixels = "ImageJ=1.53t\nunit=pixel\n";
   EXPECT_EQ(load(write("a.tif", with_resolution(1, 1, "none", pixels), samples)).pixel_size_um, 0);
 }

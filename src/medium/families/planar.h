@@ -8,7 +8,7 @@ namespace birefit {
 
 /// Tilt from the layer plane towards +z, azimuth from +x counter-clockwise (radians).
 template <class S>
-Vec3<S> axis_from_angles(const S& tilt_rad, const S& azimuth_rad) {
+BIREFIT_INLINE Vec3<S> axis_from_angles(const S& tilt_rad, const S& azimuth_rad) {
   S st, ct, sa, ca;
   sin_cos(tilt_rad, st, ct);
   sin_cos(azimuth_rad, sa, ca);
@@ -21,7 +21,7 @@ struct UniformLaw {
   Vec3<S> axis;
   S ordinary, extraordinary, thickness_um;
   template <class T>
-  OpticalPoint<T> at(const T&) const {
+  BIREFIT_INLINE OpticalPoint<T> at(const T&) const {
     return {{T(axis.x), T(axis.y), T(axis.z)}, T(ordinary), T(extraordinary), T(0.0), T(0.0), T(thickness_um)};
   }
 };
@@ -32,7 +32,7 @@ struct TwistedLaw {
   S azimuth_rad, twist_rad, tilt_rad;
   S ordinary, extraordinary, thickness_um;
   template <class T>
-  OpticalPoint<T> at(const T& u) const {
+  BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
     return {axis_from_angles<T>(T(tilt_rad), T(azimuth_rad) + T(twist_rad) * u), T(ordinary), T(extraordinary),
             T(0.0), T(0.0), T(thickness_um)};
   }
@@ -44,7 +44,7 @@ struct HeatedLaw {
   Vec3<S> axis;
   S fourier_number, cold_k, hot_k, thickness_um;
   template <class T>
-  OpticalPoint<T> at(const T& u) const {
+  BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
     const T temperature = T(cold_k) + T(hot_k - cold_k) * heat_fraction<T>(u, T(fourier_number));
     const T ne = e44_steinberg2020_extraordinary(temperature);
     return {{T(axis.x), T(axis.y), T(axis.z)}, T(kE44Steinberg2020Ordinary * kE44Steinberg2020Ordinary), ne * ne,

@@ -20,7 +20,7 @@ struct Chord {
   }
   /// Depth along the ray from the chord's middle and its slope.
   template <class T>
-  void place(const T& u, T& s_um, T& slope_um) const {
+  BIREFIT_INLINE void place(const T& u, T& s_um, T& slope_um) const {
     const T e = exp((2.0 * u - 1.0) * T(span));
     const T inverse = 1.0 / e;
     s_um = T(beta) * (e - inverse) * 0.5;
@@ -34,7 +34,7 @@ struct RadialLaw {
   Chord<S> chord;
   S ordinary, extraordinary;
   template <class T>
-  OpticalPoint<T> at(const T& u) const {
+  BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
     T s, slope;
     chord.place(u, s, slope);
     const T b = T(chord.impact_um);
@@ -52,7 +52,7 @@ struct TwistedRadialLaw {
   S twist_rad;
   S ordinary, extraordinary;
   template <class T>
-  OpticalPoint<T> at(const T& u) const {
+  BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
     T s, slope;
     chord.place(u, s, slope);
     const T b = T(chord.impact_um), sd = T(sin_deflection), cd = T(cos_deflection);

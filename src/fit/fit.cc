@@ -1,0 +1,682 @@
+#include "birefit/fit.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "fit/least_squares.h"
+#include "fit/noise.h"
+#include "fit/scan.h"
+#include "fit/statistics.h"
+#include "fit/verdict.h"
+
+namespace birefit {
+namespace {
+
+using namespace estimation;
+
+/// Pixels the mask leaves and whose value and weight are numbers.
+std::vector<std::array<int, 2>> usable_pixels(const Micrograph& micrograph, const Image& sigma) {
+  std::vector<std::array<int, 2>> pixels;
+  for (int y = 0; y < micrograph.values.height(); ++y)
+    for (int x = 0; x < micrograph.values.width(); ++x)
+      if (micrograph.mask(x, y) && std::isfinite(micrograph.values(x, y)) && std::isfinite(sigma(x, y)) &&
+          sigma(x, y) > 0)
+        pixels.push_back({x, y});
+  return pixels;
+}
+
+PixelSet pixel_set(const Micrograph& micrograph, const Image& sigma, std::vector<std::array<int, 2>> pixels) {
+  PixelSet set;
+  set.pixels = std::move(pixels);
+  const auto n = static_cast<Eigen::Index>(set.pixels.size());
+  set.value.resize(n);
+  set.sigma.resize(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    set.value[i] = micrograph.values(set.pixels[i][0], set.pixels[i][1]);
+    set.sigma[i] = sigma(set.pixels[i][0], set.pixels[i][1]);
+  }
+  return set;
+}
+
+/// A fixed part of the pixels that meets every region: multiples of the golden section leave no gap longer than
+/// 2.6 times the mean (Knuth, TAOCP 6.4) and, unlike a stride, cannot lock to a row length.
+std::vector<std::array<int, 2>> subsample(const std::vector<std::array<int, 2>>& pixels, std::size_t wanted) {
+  if (pixels.size() <= wanted) return pixels;
+  constexpr double kGolden = 0.6180339887498949;
+  std::vector<std::size_t> chosen(wanted);
+  for (std::size_t i = 0; i < wanted; ++i) {
+    const double turn = kGolden * static_cast<double>(i + 1);
+    chosen[i] = std::min(pixels.size() - 1,
+                         static_cast<std::size_t>((turn - std::floor(turn)) * static_cast<double>(pixels.size())));
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  std::vector<std::array<int, 2>> part;
+  for (const std::size_t i : chosen) part.push_back(pixels[i]);
+  return part;
+}
+
+/// A plan that resolves more than the one the solver worked with, or resolves it elsewhere.
+bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
+  if (now.method != before.method || now.steps > before.steps || now.mesh.size() > before.mesh.size()) return true;
+  const double moved = std::hypot(now.sampling_center_x_px - before.sampling_center_x_px,
+                                  now.sampling_center_y_px - before.sampling_center_y_px);
+  if (now.samples != before.samples && moved > before.sampling_bin_px) return true;
+  for (std::size_t i = 0; i < now.samples.size(); ++i)
+    if (now.samples[i] > (i < before.samples.size() ? before.samples[i] : 1)) return true;
+  return false;
+}
+
+/// One fit from start to report. The stages are in run()'s order; each leaves the state better than before, so that an
+/// interruption anywhere has something to report.
+class Fit {
+ public:
+  explicit Fit(const FitJob& job)
+      : job_(job), unknowns_(Unknowns::of(job)), frames_(static_cast<int>(job.micrographs.size())) {}
+
+  FitResult run() {
+    const auto begin = std::chrono::steady_clock::now();
+    prepare();
+    find_minima();
+    settle_weights();
+    settle_plans();
+    settle_misfit();
+    weigh_rivals();
+    report();
+    result_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return std::move(result_);
+  }
+
+ private:
+  bool interrupted() const { return job_.options.interrupted && job_.options.interrupted->load(); }
+  void say(const std::string& line) const {
+    if (job_.options.progress) job_.options.progress(line);
+  }
+
+  void prepare();
+  void find_minima();
+  void settle_weights();
+  void settle_plans();
+  void settle_misfit();
+  void weigh_rivals();
+  void report();
+
+  void rebuild_problem();
+  SolveSummary solve(Eigen::VectorXd& searched, const std::string& label, int max_iterations = 0);
+  void solve_main(const std::string& label);
+  double gain_of(int g) const {
+    const ParameterRef ref = job_.micrographs[g].gain;
+    return ref ? theta_[ref.index] : 1.0;
+  }
+  double offset_of(int g) const {
+    const ParameterRef ref = job_.micrographs[g].offset;
+    return ref ? theta_[ref.index] : 0.0;
+  }
+  std::vector<Misfit> assess_misfit();
+  std::vector<Misfit> prior_misfit() const;
+  Image fitted_image(int g) const;
+  bool shows_signal(double chi_square) const;
+  void report_parameters(const Inverse& inverse);
+  void report_micrographs();
+  void collect_warnings();
+  std::string covariance_words() const;
+
+  const FitJob& job_;
+  Unknowns unknowns_;
+  int frames_;
+  FitResult result_;
+
+  std::vector<RenderPlan> plans_;
+  std::vector<NoiseModel> noise_;
+  std::vector<Image> sigma_;
+  std::vector<std::vector<std::array<int, 2>>> pixels_;
+  std::unique_ptr<LeastSquares> problem_;
+  Eigen::VectorXd start_, best_;
+  std::vector<Eigen::VectorXd> rivals_;
+  Theta theta_;
+  int scan_points_ = 0, evaluations_ = 0;
+  bool stopped_ = false;
+
+  // What settle_misfit() found.
+  double frame_sd_ = 0;          ///< of the model intensity, common to a frame
+  double frame_dof_ = 0;         ///< degrees of freedom behind it
+  bool frames_scatter_ = false;  ///< measured between this fit's own frames
+  double largest_area_ = 1;      ///< pixels that share one misfit
+  bool misfit_ = false;          ///< more than noise in some micrograph
+};
+
+void Fit::prepare() {
+  if (job_.micrographs.empty()) throw UserError(Where{}, "there is no image to fit");
+  result_.warnings = job_.warnings;
+  theta_ = job_.parameters.values();
+  // What an earlier fit knows is a better start than the config's.
+  if (job_.prior)
+    for (std::size_t i = 0; i < job_.prior->names.size(); ++i)
+      if (const ParameterRef ref = job_.parameters.find(job_.prior->names[i]); ref && job_.parameters[ref].free)
+        theta_[ref.index] = std::clamp(job_.prior->mean[static_cast<Eigen::Index>(i)], job_.parameters[ref].lower,
+                                       job_.parameters[ref].upper);
+  start_.resize(static_cast<Eigen::Index>(unknowns_.searched.size()));
+  for (std::size_t j = 0; j < unknowns_.searched.size(); ++j)
+    start_[static_cast<Eigen::Index>(j)] = theta_[unknowns_.searched[j]];
+  best_ = start_;
+  std::size_t used = 0;
+  for (const Micrograph& micrograph : job_.micrographs) {
+    plans_.push_back(plan(micrograph.scene, theta_));
+    noise_.push_back(micrograph.noise ? *micrograph.noise : estimate_noise(micrograph));
+    sigma_.push_back(standard_deviation(micrograph, noise_.back(), smoothed(micrograph)));
+    pixels_.push_back(usable_pixels(micrograph, sigma_.back()));
+    if (pixels_.back().empty())
+      throw UserError(Where{}, micrograph.name + " has no usable pixel", "check mask, roi_px and saturation_counts");
+    used += pixels_.back().size();
+  }
+  if (used <= static_cast<std::size_t>(unknowns_.size()))
+    throw UserError(Where{}, fmt::format("{} usable pixels cannot determine {} parameters", used, unknowns_.size()),
+                    "check mask and roi_px");
+}
+
+void Fit::rebuild_problem() {
+  std::vector<PixelSet> sets;
+  for (int g = 0; g < frames_; ++g) sets.push_back(pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]));
+  const std::vector<Misfit> misfit = problem_ ? problem_->misfit() : prior_misfit();
+  if (problem_) evaluations_ += problem_->evaluations();
+  problem_ = std::make_unique<LeastSquares>(job_, unknowns_, plans_, std::move(sets));
+  problem_->set_misfit(misfit);
+}
+
+SolveSummary Fit::solve(Eigen::VectorXd& searched, const std::string& label, int max_iterations) {
+  SolveOptions options;
+  options.max_iterations = max_iterations > 0 ? max_iterations : job_.options.max_iterations;
+  options.interrupted = job_.options.interrupted;
+  options.progress = job_.options.progress;
+  options.label = label;
+  if (!label.empty()) options.iterations = &result_.iterations;
+  const SolveSummary summary = problem_->solve(searched, options);
+  stopped_ = stopped_ || summary.interrupted;
+  return summary;
+}
+
+void Fit::solve_main(const std::string& label) {
+  const SolveSummary summary = solve(best_, label);
+  result_.converged = summary.converged && !stopped_;
+  result_.solver_report = summary.report;
+  theta_ = problem_->theta();
+}
+
+/// A single frame through the prior of a calibration: its mean has the misfit the calibration's frames had.
+std::vector<Misfit> Fit::prior_misfit() const {
+  std::vector<Misfit> misfit(frames_);
+  if (job_.prior && job_.prior->frame_scatter)
+    for (int g = 0; g < frames_; ++g) {
+      misfit[g].mean_sd = job_.prior->frame_scatter->intensity_sd * std::abs(gain_of(g));
+      misfit[g].mean_follows_shape = false;
+    }
+  return misfit;
+}
+
+void Fit::find_minima() {
+  std::vector<double> phase(unknowns_.searched.size(), 0.0);
+  for (std::size_t j = 0; j < phase.size(); ++j) {
+    const int index = unknowns_.searched[j];
+    const Parameter& parameter = job_.parameters[index];
+    // The rate may change across the bounds: take the fastest of both ends and the start.
+    for (const double at : {theta_[index], parameter.lower, parameter.upper}) {
+      if (!std::isfinite(at)) continue;
+      Theta probe = theta_;
+      probe[index] = at;
+      for (int g = 0; g < frames_; ++g) {
+        const double rate = fringe_phase_per_unit(job_.micrographs[g].scene, probe, index);
+        if (std::isfinite(rate)) phase[j] = std::max(phase[j], std::abs(rate));
+      }
+    }
+  }
+  std::vector<PixelSet> part;
+  const std::size_t share = std::max<std::size_t>(50, job_.options.scan_pixels / std::max(1, frames_));
+  for (int g = 0; g < frames_; ++g)
+    part.push_back(pixel_set(job_.micrographs[g], sigma_[g], subsample(pixels_[g], share)));
+  LeastSquares sample(job_, unknowns_, plans_, std::move(part));
+  sample.set_misfit(prior_misfit());
+  ScanResult found = scan(sample, job_, unknowns_, start_, phase);
+  evaluations_ += sample.evaluations();
+  stopped_ = stopped_ || found.interrupted;
+  result_.scans = std::move(found.traces);
+  scan_points_ = found.points;
+  best_ = found.candidates.front().searched;
+
+  rebuild_problem();
+  if (stopped_) {
+    problem_->evaluate(best_, true);
+    theta_ = problem_->theta();
+    return;
+  }
+  // On all pixels: the best, and whatever a subsample of this size cannot exclude (the difference of two chi-squares
+  // scatters by twice its root).
+  const double reduced =
+      std::max(1.0, found.candidates.front().objective / std::max<double>(1, static_cast<double>(sample.pixel_rows())));
+  constexpr double kPlausible = 30;
+  struct Minimum {
+    Eigen::VectorXd searched;
+    double objective;
+    bool converged;
+    std::string report;
+  };
+  std::vector<Minimum> minima;
+  for (std::size_t i = 0; i < found.candidates.size(); ++i) {
+    if (i > 0 && found.candidates[i].objective - found.candidates[0].objective > kPlausible * reduced) break;
+    Eigen::VectorXd x = found.candidates[i].searched;
+    const SolveSummary summary = solve(x, i == 0 ? "fit" : "", i == 0 ? 0 : 30);
+    minima.push_back({x, problem_->objective(), summary.converged, summary.report});
+    if (stopped_) break;
+  }
+  const auto lowest = std::min_element(minima.begin(), minima.end(), [](const Minimum& a, const Minimum& b) {
+    return a.objective < b.objective;
+  });
+  best_ = lowest->searched;
+  result_.converged = lowest->converged && !stopped_;
+  result_.solver_report = lowest->report;
+  for (auto i = minima.begin(); i != minima.end(); ++i)
+    if (i != lowest) rivals_.push_back(i->searched);
+  problem_->evaluate(best_, true);
+  theta_ = problem_->theta();
+}
+
+Image Fit::fitted_image(int g) const {
+  Image image = render(job_.micrographs[g].scene, plans_[g], theta_, {}, job_.options.threads).intensity;
+  const double gain = gain_of(g), offset = offset_of(g);
+  for (double& value : image.values()) value = gain * value + offset;
+  return image;
+}
+
+/// Poisson weights from the data themselves pull a fit low (bright outliers get small weights): the variance must
+/// come from the fitted signal.
+void Fit::settle_weights() {
+  for (int pass = 0; pass < 3 && !stopped_; ++pass) {
+    if (pass > 0 && std::all_of(noise_.begin(), noise_.end(), [](const NoiseModel& n) { return n.counts_per_photon == 0; }))
+      return;  // the weights do not depend on the signal
+    for (int g = 0; g < frames_; ++g)
+      sigma_[g] = standard_deviation(job_.micrographs[g], noise_[g], fitted_image(g));
+    const Candidate before{best_, 0, projected_information(*problem_)};
+    rebuild_problem();
+    solve_main("reweighted");
+    constexpr double kStill = 0.02;  // standard errors
+    if (separation(before, best_) < kStill) break;
+  }
+}
+
+void Fit::settle_plans() {
+  for (int round = 0; round < 2 && !stopped_; ++round) {
+    bool grown = false;
+    for (int g = 0; g < frames_; ++g) {
+      RenderPlan now = plan(job_.micrographs[g].scene, theta_);
+      if (!asks_for_more(now, plans_[g])) continue;
+      plans_[g] = std::move(now);
+      grown = true;
+    }
+    if (!grown) return;
+    say("the model needs finer steps here: solving once more");
+    rebuild_problem();
+    solve_main("replanned");
+  }
+}
+
+/// Frame by frame: how much larger than noise the misfit is, over how many pixels it is shared, and how the frames'
+/// means scatter. The scatter is a random effect with equal variance for every frame: each frame's mean residual is
+/// one observation, its variance solves sum e_g^2 / (tau^2 + s_g^2) = degrees of freedom (Mandel & Paule, Anal. Chem.
+/// 42, 1194 (1970)), and the t quantile counts frames. A cluster-robust sandwich (Liang & Zeger, Biometrika 73, 13
+/// (1986)) of five frames and three parameters would be half its size too small: the normal equations make its scores
+/// nearly zero.
+std::vector<Misfit> Fit::assess_misfit() {
+  std::vector<Misfit> misfit = prior_misfit();
+  const double pixels = static_cast<double>(problem_->pixel_rows());
+  std::vector<LeastSquares::FrameMisfit> frames;
+  for (int g = 0; g < frames_; ++g) frames.push_back(problem_->frame_misfit(g));
+
+  // Degrees of freedom left to the frames' means.
+  double dof = 0;
+  if (frames_ > 1) {
+    const Eigen::MatrixXd covariance = invert_normal_equations(problem_->factor()).covariance;
+    for (int g = 0; g < frames_; ++g) {
+      const Misfit& now = problem_->misfit()[g];
+      const double ratio = now.mean_sd / frames[g].mean_noise_sd;
+      const double factor = now.mean_follows_shape ? 1 / now.shape_variance : 1 / (1 + ratio * ratio);
+      const Eigen::VectorXd& row = frames[g].mean_jacobian_whitened;
+      dof += 1 - std::clamp(factor * row.dot(covariance * row), 0.0, 1.0);
+    }
+  }
+  constexpr double kEnoughFrames = 0.9;  // one degree of freedom, to rounding of leverages
+  const bool own_scatter = dof >= kEnoughFrames;
+
+  misfit_ = false;
+  largest_area_ = 1;
+  for (int g = 0; g < frames_; ++g) {
+    const double n = frames[g].mean_noise_sd > 0 ? static_cast<double>(problem_->pixels(g).value.size()) : 0;
+    const bool mean_known = own_scatter || !misfit[g].mean_follows_shape;
+    const double mean_part = mean_known ? frames[g].mean_whitened * frames[g].mean_whitened : 0;
+    const double reduced = (frames[g].chi_square - mean_part) / std::max(1.0, n * (1 - unknowns_.size() / pixels));
+    // White noise stays below this in all but 1 of 3 million images: exact errors stay exact.
+    const double sampling = std::sqrt(2 / n);
+    if (!(reduced > 1 + 5 * sampling)) continue;
+    misfit_ = true;
+    misfit[g].shape_variance = reduced;
+    constexpr double kClearly = 0.1;  // smaller excesses are a noise model a little off
+    if (reduced > 1 + std::max(kClearly, 5 * sampling)) {
+      const Micrograph& micrograph = job_.micrographs[g];
+      Image whitened(micrograph.values.width(), micrograph.values.height());
+      Mask mask(whitened.width(), whitened.height());
+      const PixelSet& set = problem_->pixels(g);
+      Eigen::VectorXd residual = problem_->noise_whitened_residual(g);
+      if (mean_known) residual.array() -= frames[g].mean_residual / set.sigma.array();
+      for (Eigen::Index i = 0; i < residual.size(); ++i) {
+        whitened(set.pixels[i][0], set.pixels[i][1]) = residual[i];
+        mask(set.pixels[i][0], set.pixels[i][1]) = 1;
+      }
+      const double area = std::min(correlation_area(whitened, mask), n / 4);
+      misfit[g].shape_variance *= std::max(1.0, area);
+      largest_area_ = std::max(largest_area_, area);
+    }
+  }
+
+  frames_scatter_ = false;
+  if (own_scatter) {
+    double sum = 0;
+    for (const auto& frame : frames) sum += frame.mean_whitened * frame.mean_whitened;
+    constexpr double kSignificant = 0.999;
+    frames_scatter_ = sum > dof && (misfit_ || sum > chi_square_quantile(kSignificant, dof));
+    frame_sd_ = 0;
+    if (frames_scatter_) {
+      const auto excess = [&](double sd) {
+        double total = -dof;
+        for (int g = 0; g < frames_; ++g) {
+          const double ratio = sd * std::abs(gain_of(g)) / frames[g].mean_noise_sd;
+          total += frames[g].mean_whitened * frames[g].mean_whitened / (1 + ratio * ratio);
+        }
+        return total;
+      };
+      double high = 1e-9;
+      while (excess(high) > 0 && high < 1e9) high *= 2;
+      double low = 0;
+      for (int i = 0; i < 100; ++i) {
+        const double middle = 0.5 * (low + high);
+        (excess(middle) > 0 ? low : high) = middle;
+      }
+      frame_sd_ = 0.5 * (low + high);
+    }
+    frame_dof_ = dof;
+    for (int g = 0; g < frames_; ++g) {
+      misfit[g].mean_sd = frame_sd_ * std::abs(gain_of(g));
+      misfit[g].mean_follows_shape = false;
+    }
+  }
+  return misfit;
+}
+
+void Fit::settle_misfit() {
+  for (int pass = 0; pass < 8; ++pass) {
+    const double before = frame_sd_;
+    const std::vector<Misfit> misfit = assess_misfit();
+    problem_->set_misfit(misfit);
+    // Weights common to all rows of a single image move no minimum; against a prior or between frames they do.
+    const bool moves = frames_ > 1 || problem_->prior_rows() > 0;
+    if (!moves || stopped_) {
+      problem_->evaluate(best_, true);
+      return;
+    }
+    solve_main("misfit weighed");
+    constexpr double kSettled = 0.002;
+    if (pass > 0 && std::abs(frame_sd_ - before) <= kSettled * frame_sd_) return;
+  }
+}
+
+/// Minima that survived the scan, with the weights of the final problem: misfit is paid for in the odds as well.
+void Fit::weigh_rivals() {
+  if (!stopped_ && !rivals_.empty()) {
+    Candidate main{best_, problem_->objective(), projected_information(*problem_)};
+    std::vector<Candidate> others;
+    for (Eigen::VectorXd x : rivals_) {
+      solve(x, "", 30);
+      Candidate rival{x, problem_->objective(), projected_information(*problem_)};
+      if (stopped_) break;
+      // Far apart in the rival's own standard errors, or else they are two places of one valley.
+      if (separation(main, x) < 5 || separation(rival, main.searched) < 5) {
+        if (rival.objective < main.objective) std::swap(main, rival);
+        continue;
+      }
+      if (rival.objective < main.objective) std::swap(main, rival);
+      const bool known = std::any_of(others.begin(), others.end(), [&](const Candidate& other) {
+        return separation(other, rival.searched) < 5;
+      });
+      if (!known) others.push_back(std::move(rival));
+    }
+    for (const Candidate& rival : others) {
+      RivalMinimum minimum;
+      minimum.odds = std::exp(-0.5 * std::max(0.0, rival.objective - main.objective));
+      if (!(minimum.odds > 1e-3)) continue;
+      problem_->evaluate(rival.searched, false);
+      minimum.theta = problem_->theta();
+      for (int g = 0; g < frames_; ++g) minimum.chi_square += problem_->frame_misfit(g).chi_square;
+      minimum.chi_square += problem_->prior_chi_square();
+      if (minimum.odds > 0.05) result_.ambiguous = true;
+      result_.rivals.push_back(std::move(minimum));
+    }
+    std::stable_sort(result_.rivals.begin(), result_.rivals.end(),
+                     [](const RivalMinimum& a, const RivalMinimum& b) { return a.odds > b.odds; });
+    best_ = main.searched;
+  }
+  problem_->evaluate(best_, true);
+  theta_ = problem_->theta();
+}
+
+/// Is a constant image as good? Compared in units of the misfit (an F test), with what the freedom of the model and
+/// the number of places the scan looked at gain by chance.
+bool Fit::shows_signal(double chi_square) const {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (int g = 0; g < frames_; ++g) {
+    const auto [l, h] = problem_->intensity_range(g);
+    low = std::min(low, l);
+    high = std::max(high, h);
+  }
+  constexpr double kUniform = 1e-9;
+  if (!(high - low > kUniform)) return true;  // a uniform model is a constant image: nothing to compare
+  double null_chi_square = 0;
+  std::set<int> done;
+  for (int g = 0; g < frames_; ++g) {
+    const int group = job_.micrographs[g].offset.index;
+    if (!done.insert(group).second) continue;
+    double w = 0, wy = 0, wyy = 0;
+    for (int other = 0; other < frames_; ++other) {
+      if (job_.micrographs[other].offset.index != group) continue;
+      const PixelSet& set = problem_->pixels(other);
+      for (Eigen::Index i = 0; i < set.value.size(); ++i) {
+        const double weight = 1 / (set.sigma[i] * set.sigma[i]);
+        w += weight, wy += weight * set.value[i], wyy += weight * set.value[i] * set.value[i];
+      }
+    }
+    null_chi_square += std::max(0.0, wyy - wy * wy / w);
+  }
+  const double reduced = std::max(1.0, chi_square / static_cast<double>(problem_->pixel_rows()));
+  const double by_chance = 25 + 2 * unknowns_.size() + 2 * std::log(std::max(1, scan_points_));
+  return (null_chi_square - chi_square) / reduced > by_chance;
+}
+
+std::string Fit::covariance_words() const {
+  std::string words;
+  double largest = 1;
+  for (const Misfit& misfit : problem_->misfit()) largest = std::max(largest, misfit.shape_variance);
+  if (frames_scatter_)
+    words = fmt::format("clustered by image: the frames scatter by {:.2g} of the model intensity about the joint fit",
+                        frame_sd_);
+  else if (job_.prior && job_.prior->frame_scatter)
+    words = fmt::format("frame misfit of {:.2g} of the model intensity from the prior's fit included",
+                        job_.prior->frame_scatter->intensity_sd);
+  if (misfit_) {
+    if (!words.empty()) words += "; ";
+    words += largest_area_ > 1.5
+                 ? fmt::format("scaled by reduced chi-square {:.3g} and the {:.3g} pixels that share one misfit",
+                               largest / largest_area_, largest_area_)
+                 : fmt::format("scaled by reduced chi-square {:.3g}", largest);
+  }
+  return words.empty() ? "white noise: the noise model explains the residuals" : words;
+}
+
+void Fit::report_parameters(const Inverse& inverse) {
+  const Eigen::VectorXd gradient = problem_->gradient();
+  const double t = student_t_quantile(0.975, result_.interval_degrees_of_freedom);
+  for (int j = 0; j < unknowns_.size(); ++j) {
+    const int index = unknowns_.table_index(j);
+    const Parameter& parameter = job_.parameters[index];
+    ParameterEstimate estimate;
+    estimate.name = parameter.name;
+    estimate.unit = parameter.unit;
+    estimate.value = theta_[index];
+    estimate.stderr_ = std::sqrt(inverse.covariance(j, j));
+    estimate.start = parameter.value;
+    estimate.lower = parameter.lower;
+    estimate.upper = parameter.upper;
+    estimate.linear = j >= static_cast<int>(unknowns_.searched.size());
+    if (parameter.prior_sd) {
+      estimate.prior_value = parameter.value;
+      estimate.prior_sd = parameter.prior_sd;
+    } else if (job_.prior) {
+      for (std::size_t k = 0; k < job_.prior->names.size(); ++k)
+        if (job_.prior->names[k] == parameter.name) {
+          const auto at = static_cast<Eigen::Index>(k);
+          estimate.prior_value = job_.prior->mean[at];
+          estimate.prior_sd = std::sqrt(job_.prior->covariance(at, at));
+        }
+    }
+    estimate.interval95_low = estimate.value - t * estimate.stderr_;
+    estimate.interval95_high = estimate.value + t * estimate.stderr_;
+    const double width = parameter.upper - parameter.lower;
+    const double close = std::isfinite(width) ? 1e-6 * width : 1e-9 * std::abs(estimate.value);
+    const bool at_lower = estimate.value <= parameter.lower + close && gradient[j] >= 0;
+    const bool at_upper = estimate.value >= parameter.upper - close && gradient[j] <= 0;
+    if (at_lower || at_upper) {
+      estimate.at_bound = true;
+      const bool physical = at_lower ? parameter.lower == parameter.physical_lower : parameter.upper == parameter.physical_upper;
+      if (!physical) result_.pinned = true;
+      if (physical && std::isfinite(estimate.stderr_) && estimate.stderr_ > 0) {
+        // The likelihood is the tail of a normal whose top lies `outside` standard errors beyond the limit; with a flat
+        // prior on the allowed side 95 % of that tail lie within `reach`.
+        const double outside = std::min(30.0, 0.5 * std::abs(gradient[j]) * estimate.stderr_);
+        const double reach = -normal_quantile(0.05 * normal_cdf(-outside)) - outside;
+        estimate.limit = at_lower ? "upper" : "lower";
+        estimate.limit_value = estimate.value + (at_lower ? 1 : -1) * reach * estimate.stderr_;
+        estimate.interval95_low = std::min(estimate.value, estimate.limit_value);
+        estimate.interval95_high = std::max(estimate.value, estimate.limit_value);
+      }
+    }
+    result_.names.push_back(parameter.name);
+    result_.parameters.push_back(std::move(estimate));
+  }
+}
+
+void Fit::report_micrographs() {
+  for (int g = 0; g < frames_; ++g) {
+    const Micrograph& micrograph = job_.micrographs[g];
+    MicrographResult out;
+    out.name = micrograph.name;
+    out.fitted = fitted_image(g);
+    out.sigma = sigma_[g];
+    out.noise = noise_[g];
+    out.plan = plans_[g];
+    out.used = static_cast<int>(pixels_[g].size());
+    out.chi_square = problem_->frame_misfit(g).chi_square;
+    out.residual = Image(micrograph.values.width(), micrograph.values.height(), std::numeric_limits<double>::quiet_NaN());
+    double squares = 0, low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const auto [x, y] : pixels_[g]) {
+      const double fitted = out.fitted(x, y);
+      const double residual = micrograph.values(x, y) - fitted;
+      out.residual(x, y) = residual;
+      squares += residual * residual;
+      low = std::min(low, fitted);
+      high = std::max(high, fitted);
+    }
+    out.residual_rms = std::sqrt(squares / out.used);
+    out.signal_range = high - low;
+    result_.micrographs.push_back(std::move(out));
+  }
+}
+
+void Fit::collect_warnings() {
+  std::vector<std::string>& warnings = result_.warnings;
+  const auto warn = [&](std::string text) {
+    if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(std::move(text));
+  };
+  double range_low = std::numeric_limits<double>::infinity(), range_high = -range_low;
+  for (const MicrographResult& micrograph : result_.micrographs)
+    for (const auto& set : {micrograph.fitted})
+      for (const double value : set.values()) range_low = std::min(range_low, value), range_high = std::max(range_high, value);
+  for (int g = 0; g < frames_; ++g) {
+    const MicrographResult& micrograph = result_.micrographs[g];
+    for (const std::string& warning : micrograph.plan.warnings) warn(warning);
+    const double reduced = micrograph.chi_square / std::max(1, micrograph.used);
+    // A uniform frame has no range of its own: then that of all frames, then its own level, is the yardstick.
+    double range = micrograph.signal_range;
+    if (!(range > 1e-6 * (range_high - range_low))) range = range_high - range_low;
+    if (!(range > 1e-9 * std::abs(range_high))) range = std::abs(range_high);
+    const double percent = range > 0 ? 100 * micrograph.residual_rms / range : 0;
+    if (reduced > 2) {
+      warn(fmt::format("{}: the model does not describe the image within its noise (reduced chi-square {:.3g}, residual "
+                       "{:.2g} % of the signal range){}",
+                       micrograph.name, reduced, percent,
+                       percent > 15 ? ": so large a misfit means that the model is wrong or incomplete; do not trust the values."
+                                    : "; the errors allow for it as far as the residuals show it."));
+    }
+  }
+  for (const ParameterEstimate& estimate : result_.parameters)
+    if (estimate.prior_sd && estimate.stderr_ > 0.98 * *estimate.prior_sd)
+      warn(fmt::format("The image adds nothing to the prior on {}.", estimate.name));
+}
+
+void Fit::report() {
+  const Eigen::MatrixXd factor = problem_->factor();
+  const Inverse inverse = invert_normal_equations(factor);
+  result_.theta = theta_;
+  result_.interrupted = stopped_ || interrupted();
+  if (result_.interrupted) result_.converged = false;
+  for (int g = 0; g < frames_; ++g) result_.chi_square += problem_->frame_misfit(g).chi_square;
+  const double data_chi_square = result_.chi_square;
+  // Priors are observations too; those between parameters in a changed weighting keep their own weight.
+  result_.chi_square += problem_->prior_chi_square();
+  result_.degrees_of_freedom =
+      static_cast<int>(problem_->pixel_rows()) + problem_->prior_rows() - unknowns_.size();
+  result_.reduced_chi_square = result_.chi_square / std::max(1, result_.degrees_of_freedom);
+
+  double dof = std::max(1.0, result_.degrees_of_freedom / largest_area_);
+  if (frames_scatter_) {
+    dof = frame_dof_;
+    result_.frame_scatter = JointPrior::FrameScatter{frame_sd_, frame_dof_};
+  }
+  if (job_.prior) {
+    dof = std::min(dof, job_.prior->degrees_of_freedom);
+    if (job_.prior->frame_scatter) dof = std::min(dof, job_.prior->frame_scatter->degrees_of_freedom);
+  }
+  result_.interval_degrees_of_freedom = dof;
+
+  result_.covariance = inverse.covariance;
+  const Eigen::VectorXd inverse_sd =
+      inverse.covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
+  result_.correlation = inverse_sd.asDiagonal() * inverse.covariance * inverse_sd.asDiagonal();
+  result_.correlation.diagonal().setOnes();
+  result_.covariance_kind = covariance_words();
+  report_parameters(inverse);
+  judge_identifiability(result_, job_, unknowns_, factor, inverse);
+  const bool signal = shows_signal(data_chi_square);
+  if (!signal) result_.identifiable = false;
+  report_micrographs();
+  collect_warnings();
+  if (unknowns_.size() == 0) result_.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
+  result_.evaluations = evaluations_ + problem_->evaluations();
+  result_.verdict = verdict(result_, signal);
+}
+
+}  // namespace
+
+FitResult fit(const FitJob& job) { return Fit(job).run(); }
+
+}  // namespace birefit

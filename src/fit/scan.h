@@ -1,0 +1,34 @@
+#pragma once
+// The global part of a fit: which fringe order? Residuals of fringes are full of local minima one order apart, so the
+// fringe-forming parameters are scanned on a grid, on a subsample of pixels, before any solver starts.
+
+#include <vector>
+
+#include "fit/least_squares.h"
+
+namespace birefit::estimation {
+
+/// A minimum of the objective on the subsample.
+struct Candidate {
+  Eigen::VectorXd searched;
+  double objective = 0;
+  Eigen::MatrixXd information;  ///< R of the projected Jacobian there: |R delta| is a distance in standard errors
+};
+
+struct ScanResult {
+  std::vector<Candidate> candidates;  ///< distinct, polished, best first; at least one
+  std::vector<ScanTrace> traces;
+  int points = 0;                     ///< of the grid: how many places the objective was looked at
+  bool interrupted = false;
+};
+
+/// `problem` holds the subsample; `start` is the user's. `phase_per_unit[j]` > 0 marks fringe-forming parameters.
+ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
+                const std::vector<double>& phase_per_unit);
+
+/// |R delta|: how many joint standard errors apart.
+double separation(const Candidate& minimum, const Eigen::VectorXd& other);
+/// R of the searched unknowns with the linear ones following, at the problem's last point.
+Eigen::MatrixXd projected_information(const LeastSquares& problem);
+
+}  // namespace birefit::estimation

@@ -1,0 +1,194 @@
+#include "fit/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace birefit::estimation {
+namespace {
+
+std::string short_name(const std::string& path) {
+  const auto dot = path.rfind('.');
+  return dot == std::string::npos ? path : path.substr(dot + 1);
+}
+
+/// Short names where they are unique among the free parameters, paths otherwise.
+std::string name_of(const FitResult& result, int j) {
+  const std::string name = short_name(result.parameters[j].name);
+  int same = 0;
+  for (const ParameterEstimate& estimate : result.parameters) same += short_name(estimate.name) == name;
+  return same > 1 ? result.parameters[j].name : name;
+}
+
+std::string unit_suffix(const ParameterEstimate& estimate) { return estimate.unit.empty() ? "" : " " + estimate.unit; }
+
+std::string joined(const std::vector<std::string>& parts, const std::string& last = " and ") {
+  std::string text;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == parts.size() ? last : ", ") + parts[i];
+  return text;
+}
+
+/// "fourier_number up 0.0031 with hot_k down 12.4": a step of `length` along `direction` (parameters' own units).
+std::string step_in_words(const FitResult& result, const Eigen::VectorXd& step, const Eigen::VectorXd& scaled) {
+  std::vector<std::string> parts;
+  const double largest = scaled.cwiseAbs().maxCoeff();
+  const double sign = [&] {
+    Eigen::Index at;
+    scaled.cwiseAbs().maxCoeff(&at);
+    return scaled[at] < 0 ? -1.0 : 1.0;
+  }();
+  for (int j = 0; j < step.size(); ++j)
+    if (std::abs(scaled[j]) > 0.1 * largest)
+      parts.push_back(fmt::format("{} {} {:.3g}{}", name_of(result, j), sign * step[j] > 0 ? "up" : "down",
+                                  std::abs(step[j]), unit_suffix(result.parameters[j])));
+  return joined(parts, " with ");
+}
+
+bool in_joint_prior(const FitJob& job, const std::string& name) {
+  return job.prior && std::find(job.prior->names.begin(), job.prior->names.end(), name) != job.prior->names.end();
+}
+
+}  // namespace
+
+std::string with_error(double value, double error) {
+  if (!std::isfinite(error) || !(error > 0)) return fmt::format("{:.6g}", value);
+  const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 12);
+  return fmt::format("{:.{}f} +- {:.2g}", value, digits, error);
+}
+
+void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns& unknowns,
+                           const Eigen::MatrixXd& factor, const Inverse& inverse) {
+  const int n = unknowns.size();
+  if (n == 0) return;
+  // Each parameter in units of what was asked: its bounds' width, or its own size. Offsets may be zero: theirs is the
+  // size of the largest linear parameter.
+  Eigen::VectorXd scale(n);
+  double linear_size = 0;
+  for (int j = 0; j < n; ++j)
+    if (result.parameters[j].linear) linear_size = std::max(linear_size, std::abs(result.parameters[j].value));
+  for (int j = 0; j < n; ++j) {
+    const ParameterEstimate& estimate = result.parameters[j];
+    const double width = estimate.upper - estimate.lower;
+    scale[j] = estimate.linear                               ? linear_size
+               : std::isfinite(width) && width > 0           ? width
+                                                             : std::abs(estimate.value);
+    if (!(scale[j] > 0)) scale[j] = 1;
+  }
+  const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(factor * scale.asDiagonal(), Eigen::ComputeFullV);
+  // What the data cannot narrow below half the range asked for is not determined by them.
+  constexpr double kHalfWidth = 0.5;
+  const double nothing = 1e-12 * svd.singularValues()[0];
+  for (int i = 0; i < n; ++i) {
+    const double sigma = svd.singularValues()[i];
+    FisherDirection direction;
+    direction.stderr_ = sigma > nothing ? 1 / sigma : std::numeric_limits<double>::infinity();
+    const Eigen::VectorXd v = svd.matrixV().col(i);
+    for (int j = 0; j < n; ++j) direction.weights.emplace_back(result.parameters[j].name, v[j]);
+    direction.identifiable = direction.stderr_ <= kHalfWidth;
+    if (!direction.identifiable) {
+      result.identifiable = false;
+      Eigen::Index at;
+      v.cwiseAbs().maxCoeff(&at);
+      if (std::abs(v[at]) > 0.999)
+        direction.words = fmt::format("{} has no measurable influence on the image", name_of(result, static_cast<int>(at)));
+      else
+        direction.words = fmt::format("{} changes the image by less than its noise: only other combinations of them are known",
+                                      step_in_words(result, kHalfWidth * scale.cwiseProduct(v), v));
+      for (int j = 0; j < n; ++j)
+        if (std::abs(v[j]) * std::min(direction.stderr_, 1e3) > kHalfWidth) {
+          result.parameters[j].stderr_ = result.parameters[j].interval95_low = result.parameters[j].interval95_high =
+              std::numeric_limits<double>::quiet_NaN();
+        }
+    }
+    result.directions.push_back(std::move(direction));
+  }
+  for (int j = 0; j < n; ++j)
+    if (inverse.undetermined[j]) {
+      result.identifiable = false;
+      result.parameters[j].stderr_ = result.parameters[j].interval95_low = result.parameters[j].interval95_high =
+          std::numeric_limits<double>::quiet_NaN();
+    }
+
+  // Two parameters that only act together: their own errors are those of a long valley, 50 times what each would have
+  // with the other known. Formally finite, but a small error of the model slides the estimate along the valley.
+  constexpr double kTogether = 0.9999, kValley = 50;
+  for (int a = 0; a < n; ++a)
+    for (int b = a + 1; b < n; ++b) {
+      const ParameterEstimate &pa = result.parameters[a], &pb = result.parameters[b];
+      if (!(std::abs(result.correlation(a, b)) > kTogether)) continue;
+      if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) continue;  // the prior's own correlation
+      const double sa = std::sqrt(result.covariance(a, a)), sb = std::sqrt(result.covariance(b, b));
+      if (!(sa > kValley * inverse.conditional_sd[a] && sb > kValley * inverse.conditional_sd[b])) continue;
+      result.identifiable = false;
+      FisherDirection direction;
+      const double sign = result.correlation(a, b) > 0 ? 1 : -1;
+      Eigen::Vector2d weights(sa / scale[a], sign * sb / scale[b]);
+      direction.stderr_ = weights.norm();
+      weights /= direction.stderr_;
+      direction.weights = {{pa.name, weights[0]}, {pb.name, weights[1]}};
+      direction.identifiable = false;
+      const double across = t * sa * std::sqrt(std::max(0.0, 1 - std::pow(result.correlation(a, b), 2)));
+      direction.words = fmt::format(
+          "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the two "
+          "is determined. Along it the 95 % interval is {0} {7:.5g} to {8:.5g}{2} (with {3} {9:.5g} to {10:.5g}{6}); "
+          "across it, with {3} known, {0} would be known to +-{11:.2g}{2}",
+          name_of(result, a), t * sa, unit_suffix(pa), name_of(result, b), sign > 0 ? "up" : "down", t * sb,
+          unit_suffix(pb), pa.value - t * sa, pa.value + t * sa, pb.value - sign * t * sb, pb.value + sign * t * sb, across);
+      result.directions.push_back(std::move(direction));
+    }
+}
+
+std::string verdict(const FitResult& result, bool signal) {
+  std::vector<std::string> sentences;
+  if (result.interrupted)
+    sentences.push_back("The fit was interrupted: these are the best values so far, not a result.");
+  else if (!result.converged)
+    sentences.push_back("The fit did not converge: the values below are no result.");
+  if (!signal)
+    sentences.push_back(
+        "The image shows no signal of the model: a constant image explains it as well, so that the values mean nothing.");
+  for (const FisherDirection& direction : result.directions)
+    if (!direction.identifiable && !direction.words.empty())
+      sentences.push_back("Not identifiable: " + direction.words + ".");
+  if (result.ambiguous) {
+    std::vector<std::string> others;
+    for (const RivalMinimum& rival : result.rivals)
+      if (rival.odds > 0.05) others.push_back(fmt::format("odds {:.2g}", rival.odds));
+    sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),
+                                    others.size() == 1 ? "um" : "a", joined(others)));
+  }
+  for (const ParameterEstimate& estimate : result.parameters)
+    if (estimate.at_bound) {
+      const std::string name = short_name(estimate.name);
+      if (!estimate.limit.empty())
+        sentences.push_back(fmt::format("{} is at its physical limit {:.6g}{}: {} {:.4g}{} with 95 % confidence.", name,
+                                        estimate.value, unit_suffix(estimate),
+                                        estimate.limit == "upper" ? "at most" : "at least", estimate.limit_value,
+                                        unit_suffix(estimate)));
+      else
+        sentences.push_back(fmt::format("{} ended at its bound {:.6g}{}: the best value lies outside the bounds.", name,
+                                        estimate.value, unit_suffix(estimate)));
+    }
+  std::vector<std::string> values;
+  if (signal)
+    for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
+      const ParameterEstimate& estimate = result.parameters[j];
+      if (estimate.linear || !std::isfinite(estimate.stderr_) || estimate.at_bound) continue;
+      values.push_back(fmt::format("{} = {}{}", name_of(result, j), with_error(estimate.value, estimate.stderr_),
+                                   unit_suffix(estimate)));
+    }
+  if (!values.empty()) sentences.push_back(joined(values) + " (standard errors: " + result.covariance_kind + ").");
+  if (result.has_answer())
+    sentences.push_back(fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
+                                    result.reduced_chi_square > 2 ? ": the model does not describe the image within its noise"
+                                                                  : ""));
+  std::string text;
+  for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
+  return text;
+}
+
+}  // namespace birefit::estimation

@@ -1,0 +1,20 @@
+#pragma once
+// Which directions of parameter space the image determines, and the whole result in plain words.
+
+#include "fit/least_squares.h"
+#include "fit/statistics.h"
+
+namespace birefit::estimation {
+
+/// Fills directions, identifiable and the NaN standard errors from the factor of the whitened Jacobian (priors
+/// included). Needs result.parameters, covariance, correlation and interval_degrees_of_freedom.
+void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns& unknowns,
+                           const Eigen::MatrixXd& factor, const Inverse& inverse);
+
+/// The paragraph, from everything else in the result. `signal` = false: a constant image explains the data as well.
+std::string verdict(const FitResult& result, bool signal);
+
+/// A value rounded to two digits of its error, "0.2200 +- 0.0013".
+std::string with_error(double value, double error);
+
+}  // namespace birefit::estimation

@@ -1,0 +1,288 @@
+// What a fit leaves behind: fit.json, images, config echo, log and the summary on stdout.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "birefit/io.h"
+#include "io/file.h"
+#include "io/report_format.h"
+
+namespace birefit {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kNotableCorrelation = 0.5;
+constexpr std::size_t kListedCorrelations = 12;
+
+/// JSON has no NaN and no infinity: null.
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json matrix(const std::vector<std::string>& names, const Eigen::MatrixXd& values) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < values.cols(); ++j) row.push_back(number(values(i, j)));
+    rows.push_back(std::move(row));
+  }
+  return {{"names", names}, {"matrix", std::move(rows)}};
+}
+
+Json parameter_json(const ParameterEstimate& p) {
+  Json json = {{"value", number(p.value)},
+               {"stderr", number(p.stderr_)},
+               {"unit", p.unit},
+               {"start", number(p.start)},
+               {"bounds", {number(p.lower), number(p.upper)}},
+               {"at_bound", p.at_bound},
+               {"limit", nullptr},
+               {"interval_95", {number(p.interval95_low), number(p.interval95_high)}},
+               {"prior", nullptr},
+               {"linear", p.linear}};
+  if (!p.limit.empty()) json["limit"] = {{"side", p.limit}, {"value", number(p.limit_value)}};
+  if (p.prior_sd) json["prior"] = {{"value", number(p.prior_value.value_or(p.start))}, {"sd", number(*p.prior_sd)}};
+  return json;
+}
+
+Json plan_json(const RenderPlan& plan) {
+  return {{"method", plan.method},
+          {"physics", plan.physics},
+          {"reasons", plan.reasons},
+          {"numerical_error", number(plan.numerical_error)},
+          {"model_error", number(plan.model_error)},
+          {"warnings", plan.warnings}};
+}
+
+struct PixelCounts {
+  long used = 0, masked = 0, saturated = 0, dead = 0, non_finite = 0, outside_roi = 0;
+};
+
+PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t i) {
+  PixelCounts counts;
+  if (i < result.micrographs.size()) counts.used = result.micrographs[i].used;
+  if (i < config.job.micrographs.size()) {
+    const Micrograph& m = config.job.micrographs[i];
+    counts.masked = m.masked_by_user;
+    counts.saturated = m.saturated;
+    counts.dead = m.dead;
+    counts.non_finite = m.non_finite;
+    counts.outside_roi = m.outside_roi;
+  }
+  return counts;
+}
+
+Json pixels_json(const PixelCounts& c) {
+  return {{"used", c.used}, {"masked", c.masked}, {"saturated", c.saturated},
+          {"dead", c.dead}, {"non_finite", c.non_finite}, {"outside_roi", c.outside_roi}};
+}
+
+double residual_fraction(const MicrographResult& m) {
+  return m.signal_range > 0 ? m.residual_rms / m.signal_range : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Root mean square over all used pixels, each as a fraction of its micrograph's signal range.
+double overall_residual_rms(const FitResult& result) {
+  double sum = 0, pixels = 0;
+  for (const MicrographResult& m : result.micrographs) {
+    const double fraction = residual_fraction(m);
+    if (!std::isfinite(fraction) || m.used <= 0) continue;
+    sum += m.used * fraction * fraction;
+    pixels += m.used;
+  }
+  return pixels > 0 ? std::sqrt(sum / pixels) : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string unit_suffix(const std::string& unit) { return unit.empty() ? "" : " " + unit; }
+
+std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
+  std::string line = fmt::format("  {:<{}} = ", p.name, name_width);
+  if (!p.limit.empty())
+    line += fmt::format("{} {:.4g}{} (95 % {} limit; best {:.4g})", p.limit == "upper" ? "<" : ">", p.limit_value,
+                        unit_suffix(p.unit), p.limit, p.value);
+  else if (std::isfinite(p.stderr_))
+    line += fmt::format("{} +/- {}{} ({}) [95%: {} .. {}]", format_value(p.value, p.stderr_), format_error(p.stderr_),
+                        unit_suffix(p.unit), p.value != 0 ? format_percent(p.stderr_ / p.value) : "-",
+                        format_value(p.interval95_low, p.stderr_), format_value(p.interval95_high, p.stderr_));
+  else
+    line += fmt::format("{:.6g}{} +/- not known", p.value, unit_suffix(p.unit));
+  if (!p.linear) line += fmt::format(" (start {:.6g})", p.start);
+  if (p.at_bound && p.limit.empty()) line += " AT ITS BOUND";
+  return line;
+}
+
+std::string log_text(const Config& config, const FitResult& result) {
+  std::string text = fmt::format("birefit {}\nconfig: {}\n\n{}\n", BIREFIT_VERSION, config.path.string(), summary(result));
+  for (const MicrographResult& m : result.micrographs) {
+    text += fmt::format("\nmicrograph {}\n  {} pixels used, chi-square {:.6g}, residual rms {:.4g}\n", m.name, m.used,
+                        m.chi_square, m.residual_rms);
+    text += fmt::format("  noise: read {:.4g} counts, {:.4g} counts per photon{}\n", m.noise.read_counts,
+                        m.noise.counts_per_photon, m.noise.estimated ? " (estimated from the image)" : "");
+    text += fmt::format("  method {} ({}), numerical error {:.2g}, model error {:.2g}\n", m.plan.method, m.plan.physics,
+                        m.plan.numerical_error, m.plan.model_error);
+    for (const std::string& reason : m.plan.reasons) text += "    " + reason + "\n";
+  }
+  text += "\nscan\n";
+  for (const ScanTrace& scan : result.scans) {
+    text += "  " + scan.name + "\n";
+    for (std::size_t i = 0; i < std::min(scan.value.size(), scan.chi_square.size()); ++i)
+      text += fmt::format("    {:>14.8g} {:>16.8g}\n", scan.value[i], scan.chi_square[i]);
+  }
+  text += "\niterations\n       chi-square             step\n";
+  for (const Iteration& i : result.iterations)
+    text += fmt::format("  {:>3} {:>16.10g} {:>12.4g}\n", i.number, i.chi_square, i.step);
+  text += fmt::format("\n{} evaluations, {:.3f} s\n\nsolver\n{}\n", result.evaluations, result.seconds, result.solver_report);
+  return text;
+}
+
+}  // namespace
+
+std::string fit_json(const Config& config, const FitResult& result) {
+  Json json;
+  json["version"] = BIREFIT_VERSION;
+  json["config"] = {{"file", config.path.string()}, {"text", config.text}};
+  json["has_answer"] = result.has_answer();
+  json["verdict"] = result.verdict;
+  json["converged"] = result.converged;
+  json["interrupted"] = result.interrupted;
+  json["pinned"] = result.pinned;
+  json["ambiguous"] = result.ambiguous;
+  json["rivals"] = Json::array();
+  for (const RivalMinimum& rival : result.rivals) {
+    Json values = Json::object();
+    for (const ParameterEstimate& p : result.parameters)
+      if (const ParameterRef ref = config.job.parameters.find(p.name); ref && ref.index < std::ssize(rival.theta))
+        values[p.name] = number(rival.theta[ref.index]);
+    json["rivals"].push_back({{"odds", number(rival.odds)}, {"chi_square", number(rival.chi_square)}, {"parameters", values}});
+  }
+  json["identifiable"] = result.identifiable;
+  json["directions"] = Json::array();
+  for (const FisherDirection& direction : result.directions) {
+    Json weights = Json::object();
+    for (const auto& [name, weight] : direction.weights) weights[name] = number(weight);
+    json["directions"].push_back({{"words", direction.words},
+                                  {"identifiable", direction.identifiable},
+                                  {"stderr", number(direction.stderr_)},
+                                  {"weights", weights}});
+  }
+  json["parameters"] = Json::object();
+  for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
+  json["correlation"] = matrix(result.names, result.correlation);
+  json["covariance"] = matrix(result.names, result.covariance);
+  json["covariance_kind"] = result.covariance_kind;
+  json["interval_degrees_of_freedom"] = number(result.interval_degrees_of_freedom);
+  json["frame_scatter"] = nullptr;
+  if (result.frame_scatter)
+    json["frame_scatter"] = {{"intensity_sd", number(result.frame_scatter->intensity_sd)},
+                             {"degrees_of_freedom", number(result.frame_scatter->degrees_of_freedom)}};
+  json["joint_prior"] = nullptr;
+  if (config.job.prior)
+    json["joint_prior"] = {{"source", config.job.prior->source}, {"parameters", config.job.prior->names}};
+  json["chi_square"] = number(result.chi_square);
+  json["reduced_chi_square"] = number(result.reduced_chi_square);
+  json["degrees_of_freedom"] = result.degrees_of_freedom;
+  json["residual_rms"] = number(overall_residual_rms(result));
+
+  PixelCounts total;
+  Json micrographs = Json::array();
+  RenderPlan model;
+  for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
+    const MicrographResult& m = result.micrographs[i];
+    const PixelCounts counts = pixels_of(config, result, i);
+    total.used += counts.used, total.masked += counts.masked, total.saturated += counts.saturated;
+    total.dead += counts.dead, total.non_finite += counts.non_finite, total.outside_roi += counts.outside_roi;
+    if (i == 0) model = m.plan;
+    model.numerical_error = std::max(model.numerical_error, m.plan.numerical_error);
+    model.model_error = std::max(model.model_error, m.plan.model_error);
+    micrographs.push_back({{"name", m.name},
+                           {"width", m.fitted.width()},
+                           {"height", m.fitted.height()},
+                           {"chi_square", number(m.chi_square)},
+                           {"residual_rms", number(m.residual_rms)},
+                           {"residual_rms_fraction", number(residual_fraction(m))},
+                           {"signal_range", number(m.signal_range)},
+                           {"noise",
+                            {{"read_counts", number(m.noise.read_counts)},
+                             {"counts_per_photon", number(m.noise.counts_per_photon)},
+                             {"estimated", m.noise.estimated}}},
+                           {"pixels", pixels_json(counts)},
+                           {"model", plan_json(m.plan)}});
+  }
+  json["pixels"] = pixels_json(total);
+  json["micrographs"] = std::move(micrographs);
+  json["model"] = plan_json(model);
+  json["evaluations"] = result.evaluations;
+  json["seconds"] = number(result.seconds);
+  json["warnings"] = result.warnings;
+  // File names and configs may hold bytes that are no UTF-8.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string summary(const FitResult& result) {
+  std::string text;
+  std::size_t width = 0;
+  for (const ParameterEstimate& p : result.parameters) width = std::max(width, p.name.size());
+  for (const ParameterEstimate& p : result.parameters) text += parameter_line(p, width) + "\n";
+
+  text += fmt::format("  reduced chi-square {:.4g} ({} degrees of freedom), residual rms {} of the signal range\n",
+                      result.reduced_chi_square, result.degrees_of_freedom, format_percent(overall_residual_rms(result)));
+
+  struct Pair {
+    double correlation;
+    std::string names;
+  };
+  std::vector<Pair> pairs;
+  const Eigen::Index count = std::min<Eigen::Index>(result.correlation.rows(), std::ssize(result.names));
+  for (Eigen::Index i = 0; i < count; ++i)
+    for (Eigen::Index j = i + 1; j < count; ++j)
+      if (const double c = result.correlation(i, j); std::abs(c) > kNotableCorrelation)
+        pairs.push_back({c, short_name(result.names[i]) + " and " + short_name(result.names[j])});
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Pair& a, const Pair& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
+  if (!pairs.empty()) text += "  correlations\n";
+  for (std::size_t i = 0; i < std::min(pairs.size(), kListedCorrelations); ++i) {
+    // -0.999998 must not be rounded to -1.
+    const double left = 1 - std::abs(pairs[i].correlation);
+    const int digits = left > 0 && left < 0.005 ? std::min(9, 1 - static_cast<int>(std::floor(std::log10(left)))) : 2;
+    text += fmt::format("    {:+.{}f}  {}\n", pairs[i].correlation, digits, pairs[i].names);
+  }
+  if (pairs.size() > kListedCorrelations)
+    text += fmt::format("    and {} more above {} in fit.json\n", pairs.size() - kListedCorrelations, kNotableCorrelation);
+
+  if (!result.verdict.empty()) text += result.verdict + "\n";
+  for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
+  return text;
+}
+
+void write_results(const std::filesystem::path& folder, const Config& config, const FitResult& result) {
+  std::error_code code;
+  std::filesystem::create_directories(folder, code);
+  if (code || !std::filesystem::is_directory(folder, code))
+    throw UserError({folder.string()}, "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
+                    "choose another --out");
+  std::vector<FileContent> files;
+  for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
+    const std::string number = result.micrographs.size() > 1 ? "_" + std::to_string(i) : "";
+    const auto add = [&](const std::string& name, const Image& image) {
+      if (image.empty()) return;
+      const std::filesystem::path path = folder / (name + number + ".tif");
+      files.push_back({path, encode_image(image, path)});
+    };
+    add("fitted", result.micrographs[i].fitted);
+    add("residual", result.micrographs[i].residual);
+  }
+  files.push_back({folder / "config.yaml", config.text});
+  files.push_back({folder / "log.txt", log_text(config, result)});
+  files.push_back({folder / "report.html", report_html(config, result)});
+  // Last: a script that waits for fit.json finds everything else in place.
+  files.push_back({folder / "fit.json", fit_json(config, result)});
+  write_files(files);
+}
+
+}  // namespace birefit

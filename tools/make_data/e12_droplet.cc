@@ -1,0 +1,25 @@
+// Makes data/e12_droplet/e12_9um.pgm: run from the repository's root,
+//   g++ -std=c++20 -O2 -Itests/support tools/make_data/e12_droplet.cc -o /tmp/make && /tmp/make > data/e12_droplet/e12_9um.pgm
+// 16-bit binary PGM, which any image tool turns into the shipped PNG.
+
+#include <cstdio>
+
+#include "independent_droplet.h"
+
+int main() {
+  using namespace birefit::testing;
+  constexpr int kSize = 256;
+  IndependentDroplet drop;  // E12 in a 1.43 host, 590 nm
+  drop.center_x_px = 129.3;
+  drop.center_y_px = 125.8;
+  std::vector<double> mean;
+  for (int row = 0; row < kSize; ++row)
+    for (int column = 0; column < kSize; ++column) mean.push_back(150 + 3200 * drop.pixel(column, row));
+  const std::vector<double> counts = camera(mean, 0.5, 4.0, 20201);
+  std::printf("P5\n%d %d\n65535\n", kSize, kSize);
+  for (double c : counts) {
+    const unsigned value = static_cast<unsigned>(std::min(4095.0, std::max(0.0, c)));
+    std::putchar(static_cast<int>(value >> 8));
+    std::putchar(static_cast<int>(value & 255));
+  }
+}
