@@ -46,7 +46,8 @@ int choose(const std::vector<int>& candidates, double target, const std::functio
   return candidates.back();
 }
 const std::vector<int> kPanels{1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128};
-const std::vector<int> kSteps{4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 192, 256, 384, 512, 1024, 2048, 4096, 8192};
+// Even, so that the middle of a droplet's chord is a node.
+const std::vector<int> kSteps{4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28, 32, 40, 48, 64, 80, 96, 128, 192, 256, 384, 512, 1024, 2048, 4096, 8192};
 
 void check_method(const Scene& scene) {
   if (scene.method == "auto") return;
@@ -115,7 +116,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
   const bool twisted = static_cast<bool>(droplet.director.twist_deg);
-  std::vector<double> pilots{0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97};
+  const std::vector<double> pilots{0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97};
   std::vector<DropletRay<double>> rays;
   for (double f : pilots) rays.push_back(trace(o, rim, f * rim.rho_max() * o.radius_um));
 
@@ -134,7 +135,8 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
     throw UserError(Where{}, "transport.method: diagonal cannot do a twisted director, its modes are coupled",
                     "use auto or magnus4");
   const auto& candidates = plan.method == "diagonal" ? kPanels : kSteps;
-  plan.steps = choose(candidates, scene.intensity_accuracy / 2,
+  // intensity_distance is an upper bound: no further margin.
+  plan.steps = choose(candidates, scene.intensity_accuracy,
                       [&](int n) { return worst(plan.method, uniform_mesh(n)); }, plan.numerical_error);
   if (scene.method != "auto")
     plan.reasons.push_back(fmt::format("method {} was asked for by name", plan.method));

@@ -21,4 +21,17 @@ inline void gauss8_nodes(const std::vector<double>& mesh, std::vector<double>& u
   }
 }
 
+/// The nodes of the mesh used last by this thread: every ray of an image asks for the same.
+struct GaussNodes {
+  std::vector<double> mesh, u, weight;
+};
+inline const GaussNodes& gauss8_nodes(const std::vector<double>& mesh) {
+  thread_local GaussNodes last;
+  if (last.mesh != mesh) {
+    last.mesh = mesh;
+    gauss8_nodes(mesh, last.u, last.weight);
+  }
+  return last;
+}
+
 }  // namespace birefit

@@ -103,9 +103,8 @@ const MethodInfo& Diagonal<S>::info() const {
 
 template <class S>
 Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  thread_local std::vector<double> u;
-  thread_local std::vector<double> weight;
-  gauss8_nodes(mesh, u, weight);
+  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   if (!column.absorbing && ray.continuity == Continuity::e_and_h) return lossless_transfer(column, ray, u, weight);
   thread_local std::vector<OpticalPoint<Slope<S>>> points;
   points.resize(u.size());
@@ -142,9 +141,8 @@ Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const 
 
 template <class S>
 Su2<S> Diagonal<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  thread_local std::vector<double> u;
-  thread_local std::vector<double> weight;
-  gauss8_nodes(mesh, u, weight);
+  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
   points.resize(u.size());
   column.sample(u, points.data());
