@@ -47,7 +47,7 @@ struct TwistedDirector {
 /// Radial hedgehog, n = r/|r|; with twist_deg != 0 the radial field turned about the optical axis by
 /// twist_deg (1 - r/R): homeotropic at the surface, twisted inside (no equilibrium, a fully coupled test scene).
 struct RadialDirector {
-  ParameterRef twist_deg;
+  ParameterRef twist_deg;  ///< not given: no twist, diagonal transport
 };
 
 // ---- samples --------------------------------------------------------------------------------------------------------

@@ -273,9 +273,8 @@ void Fit::find_minima() {
     minima.push_back({x, problem_->objective(), summary.converged, summary.report});
     if (stopped_) break;
   }
-  const auto lowest = std::min_element(minima.begin(), minima.end(), [](const Minimum& a, const Minimum& b) {
-    return a.objective < b.objective;
-  });
+  const auto lowest = std::min_element(minima.begin(), minima.end(),
+                                       [](const Minimum& a, const Minimum& b) { return a.objective < b.objective; });
   best_ = lowest->searched;
   result_.converged = lowest->converged && !stopped_;
   result_.solver_report = lowest->report;
@@ -296,10 +295,10 @@ Image Fit::fitted_image(int g) const {
 /// come from the fitted signal.
 void Fit::settle_weights() {
   for (int pass = 0; pass < 3 && !stopped_; ++pass) {
-    if (pass > 0 && std::all_of(noise_.begin(), noise_.end(), [](const NoiseModel& n) { return n.counts_per_photon == 0; }))
+    if (pass > 0 &&
+        std::all_of(noise_.begin(), noise_.end(), [](const NoiseModel& n) { return n.counts_per_photon == 0; }))
       return;  // the weights do not depend on the signal
-    for (int g = 0; g < frames_; ++g)
-      sigma_[g] = standard_deviation(job_.micrographs[g], noise_[g], fitted_image(g));
+    for (int g = 0; g < frames_; ++g) sigma_[g] = standard_deviation(job_.micrographs[g], noise_[g], fitted_image(g));
     const Candidate before{best_, 0, projected_information(*problem_)};
     rebuild_problem();
     solve_main("reweighted");
@@ -447,9 +446,8 @@ void Fit::weigh_rivals() {
         continue;
       }
       if (rival.objective < main.objective) std::swap(main, rival);
-      const bool known = std::any_of(others.begin(), others.end(), [&](const Candidate& other) {
-        return separation(other, rival.searched) < 5;
-      });
+      const bool known = std::any_of(others.begin(), others.end(),
+                                     [&](const Candidate& other) { return separation(other, rival.searched) < 5; });
       if (!known) others.push_back(std::move(rival));
     }
     for (const Candidate& rival : others) {
@@ -557,7 +555,8 @@ void Fit::report_parameters(const Inverse& inverse) {
     const bool at_upper = estimate.value >= parameter.upper - close && gradient[j] <= 0;
     if (at_lower || at_upper) {
       estimate.at_bound = true;
-      const bool physical = at_lower ? parameter.lower == parameter.physical_lower : parameter.upper == parameter.physical_upper;
+      const bool physical =
+          at_lower ? parameter.lower == parameter.physical_lower : parameter.upper == parameter.physical_upper;
       if (!physical) result_.pinned = true;
       if (physical && std::isfinite(estimate.stderr_) && estimate.stderr_ > 0) {
         // The likelihood is the tail of a normal whose top lies `outside` standard errors beyond the limit; with a flat
@@ -586,7 +585,8 @@ void Fit::report_micrographs() {
     out.plan = plans_[g];
     out.used = static_cast<int>(pixels_[g].size());
     out.chi_square = problem_->frame_misfit(g).chi_square;
-    out.residual = Image(micrograph.values.width(), micrograph.values.height(), std::numeric_limits<double>::quiet_NaN());
+    out.residual =
+        Image(micrograph.values.width(), micrograph.values.height(), std::numeric_limits<double>::quiet_NaN());
     double squares = 0, low = std::numeric_limits<double>::infinity(), high = -low;
     for (const auto [x, y] : pixels_[g]) {
       const double fitted = out.fitted(x, y);
@@ -610,7 +610,8 @@ void Fit::collect_warnings() {
   double range_low = std::numeric_limits<double>::infinity(), range_high = -range_low;
   for (const MicrographResult& micrograph : result_.micrographs)
     for (const auto& set : {micrograph.fitted})
-      for (const double value : set.values()) range_low = std::min(range_low, value), range_high = std::max(range_high, value);
+      for (const double value : set.values())
+        range_low = std::min(range_low, value), range_high = std::max(range_high, value);
   for (int g = 0; g < frames_; ++g) {
     const MicrographResult& micrograph = result_.micrographs[g];
     for (const std::string& warning : micrograph.plan.warnings) warn(warning);
@@ -621,11 +622,12 @@ void Fit::collect_warnings() {
     if (!(range > 1e-9 * std::abs(range_high))) range = std::abs(range_high);
     const double percent = range > 0 ? 100 * micrograph.residual_rms / range : 0;
     if (reduced > 2) {
-      warn(fmt::format("{}: the model does not describe the image within its noise (reduced chi-square {:.3g}, residual "
-                       "{:.2g} % of the signal range){}",
-                       micrograph.name, reduced, percent,
-                       percent > 15 ? ": so large a misfit means that the model is wrong or incomplete; do not trust the values."
-                                    : "; the errors allow for it as far as the residuals show it."));
+      warn(fmt::format(
+          "{}: the model does not describe the image within its noise (reduced chi-square {:.3g}, residual "
+          "{:.2g} % of the signal range){}",
+          micrograph.name, reduced, percent,
+          percent > 15 ? ": so large a misfit means that the model is wrong or incomplete; do not trust the values."
+                       : "; the errors allow for it as far as the residuals show it."));
     }
   }
   for (const ParameterEstimate& estimate : result_.parameters)
@@ -643,8 +645,7 @@ void Fit::report() {
   const double data_chi_square = result_.chi_square;
   // Priors are observations too; those between parameters in a changed weighting keep their own weight.
   result_.chi_square += problem_->prior_chi_square();
-  result_.degrees_of_freedom =
-      static_cast<int>(problem_->pixel_rows()) + problem_->prior_rows() - unknowns_.size();
+  result_.degrees_of_freedom = static_cast<int>(problem_->pixel_rows()) + problem_->prior_rows() - unknowns_.size();
   result_.reduced_chi_square = result_.chi_square / std::max(1, result_.degrees_of_freedom);
 
   double dof = std::max(1.0, result_.degrees_of_freedom / largest_area_);

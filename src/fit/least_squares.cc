@@ -31,13 +31,12 @@ Eigen::MatrixXd whitening_root(const Eigen::MatrixXd& covariance) {
 /// Solution of a small positive semi-definite system; directions without information stay at zero.
 Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
   constexpr double kUnseen = 1e-14;
-  const Eigen::VectorXd scale =
-      matrix.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
+  const Eigen::VectorXd scale = matrix.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * matrix * scale.asDiagonal());
   const double cut = kUnseen * std::max(eigen.eigenvalues().cwiseAbs().maxCoeff(), 1e-300);
   const Eigen::VectorXd inverse = eigen.eigenvalues().unaryExpr([&](double v) { return v > cut ? 1 / v : 0.0; });
-  return scale.asDiagonal() *
-         (eigen.eigenvectors() * (inverse.asDiagonal() * (eigen.eigenvectors().transpose() * (scale.asDiagonal() * right))));
+  return scale.asDiagonal() * (eigen.eigenvectors() * (inverse.asDiagonal() * (eigen.eigenvectors().transpose() *
+                                                                               (scale.asDiagonal() * right))));
 }
 
 int position(const std::vector<int>& indices, int index) {
@@ -143,8 +142,9 @@ void LeastSquares::set_priors() {
         const int column = ref ? column_of(ref.index) : -1;
         if (column >= 0) row[column] += root(i, static_cast<Eigen::Index>(k));
         // A parameter that is known here conditions the others on its value.
-        else mean -= root(i, static_cast<Eigen::Index>(k)) *
-                     (ref ? job_.parameters[ref].value : prior.mean[static_cast<Eigen::Index>(k)]);
+        else
+          mean -= root(i, static_cast<Eigen::Index>(k)) *
+                  (ref ? job_.parameters[ref].value : prior.mean[static_cast<Eigen::Index>(k)]);
       }
       rows.push_back(row);
       target.push_back(mean);
@@ -238,7 +238,8 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
       cross += prior_root_.rightCols(l).transpose() * prior_root_.leftCols(p);
     }
     const Eigen::MatrixXd solved = solve_semidefinite(gram(moving, moving), cross(moving, Eigen::all));
-    for (std::size_t j = 0; j < moving.size(); ++j) projection_.row(moving[j]) = solved.row(static_cast<Eigen::Index>(j));
+    for (std::size_t j = 0; j < moving.size(); ++j)
+      projection_.row(moving[j]) = solved.row(static_cast<Eigen::Index>(j));
   }
   has_derivatives_ = true;
 }
@@ -479,7 +480,8 @@ class Watch : public ceres::IterationCallback {
       options_.iterations->push_back(
           {static_cast<int>(options_.iterations->size()), 2 * summary.cost, summary.step_norm});
     if (options_.progress && !options_.label.empty())
-      options_.progress(fmt::format("{}, iteration {}: chi-square {:.6g}", options_.label, summary.iteration, 2 * summary.cost));
+      options_.progress(
+          fmt::format("{}, iteration {}: chi-square {:.6g}", options_.label, summary.iteration, 2 * summary.cost));
     if (options_.interrupted && options_.interrupted->load()) {
       stopped = true;
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
@@ -499,7 +501,8 @@ SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& 
   const int p = searched_size();
   if (p == 0) {
     evaluate(searched, true);
-    if (options.iterations) options.iterations->push_back({static_cast<int>(options.iterations->size()), objective(), 0});
+    if (options.iterations)
+      options.iterations->push_back({static_cast<int>(options.iterations->size()), objective(), 0});
     result.converged = true;
     result.report = "Only linear parameters: solved exactly, without iterations.";
     return result;
@@ -535,7 +538,7 @@ SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& 
   solver.line_search_interpolation_type = ceres::QUADRATIC;
   solver.num_threads = 1;
   solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = 1e-12;
+  solver.function_tolerance = options.function_tolerance;
   solver.parameter_tolerance = 1e-10;
   solver.gradient_tolerance = 1e-12;
   solver.logging_type = ceres::SILENT;

@@ -40,13 +40,14 @@ struct PixelSet {
 /// gets the variance of the noise plus `mean_sd`^2, everything else its variance times `shape_variance`. In a fit of
 /// frames the mean of each frame is one observation, however many pixels it has.
 struct Misfit {
-  double mean_sd = 0;         ///< units of the values
+  double mean_sd = 0;  ///< units of the values
   double shape_variance = 1;
   bool mean_follows_shape = true;  ///< nothing is known of the mean's misfit: it is scaled like the rest
 };
 
 struct SolveOptions {
   int max_iterations = 100;
+  double function_tolerance = 1e-12;  ///< relative change of the objective
   const std::atomic<bool>* interrupted = nullptr;
   std::function<void(const std::string&)> progress;
   std::vector<Iteration>* iterations = nullptr;  ///< appended to
@@ -61,7 +62,8 @@ struct SolveSummary {
 /// Whitened rows in a fixed order (micrograph by micrograph, then priors), evaluated at one point at a time.
 class LeastSquares {
  public:
-  LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vector<RenderPlan> plans, std::vector<PixelSet> pixels);
+  LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vector<RenderPlan> plans,
+               std::vector<PixelSet> pixels);
 
   int searched_size() const { return static_cast<int>(unknowns_.searched.size()); }
   void set_misfit(const std::vector<Misfit>& misfit);
@@ -78,10 +80,10 @@ class LeastSquares {
   int evaluations() const { return evaluations_; }
   /// Noise-whitened residual sums of one micrograph, its misfit weights not applied.
   struct FrameMisfit {
-    double chi_square = 0;   ///< sum of (residual / noise sd)^2
-    double mean_whitened = 0;  ///< generalised mean residual over its noise standard deviation
-    double mean_noise_sd = 0;  ///< that standard deviation, units of the values
-    double mean_residual = 0;  ///< units of the values
+    double chi_square = 0;                   ///< sum of (residual / noise sd)^2
+    double mean_whitened = 0;                ///< generalised mean residual over its noise standard deviation
+    double mean_noise_sd = 0;                ///< that standard deviation, units of the values
+    double mean_residual = 0;                ///< units of the values
     Eigen::VectorXd mean_jacobian_whitened;  ///< d mean_whitened / d unknown (searched first)
   };
   FrameMisfit frame_misfit(int micrograph) const;
@@ -114,7 +116,7 @@ class LeastSquares {
     Eigen::VectorXd inverse_sigma;
     double inverse_sigma_norm = 0;
     Eigen::Index begin = 0, count = 0;
-    int gain = -1, offset = -1;  ///< index among the linear unknowns, -1 = known
+    int gain = -1, offset = -1;                ///< index among the linear unknowns, -1 = known
     double shape_factor = 1, mean_factor = 1;  ///< whitening of the parts across and along the mean
     double intensity_low = 0, intensity_high = 0;
   };
@@ -135,7 +137,7 @@ class LeastSquares {
   Eigen::VectorXd prior_target_;  ///< prior_root_ * means
 
   Theta theta_;
-  Eigen::VectorXd intensity_;     ///< raw
+  Eigen::VectorXd intensity_;  ///< raw
   Eigen::VectorXd whitened_value_, whitened_intensity_, whitened_one_;
   Eigen::VectorXd residual_;
   Eigen::MatrixXd searched_columns_;  ///< d whitened model / d searched, gain and offset held

@@ -95,7 +95,8 @@ NoiseModel estimate_noise(const Micrograph& micrograph) {
   std::vector<Bin> bins;
   const std::size_t number = std::clamp<std::size_t>(samples.size() / 100, 1, 24);
   // Bins of equal width in signal see the bright and the dark end alike; those with too few samples are skipped.
-  const double low = samples[samples.size() / 200].signal, high = samples[samples.size() - 1 - samples.size() / 200].signal;
+  const double low = samples[samples.size() / 200].signal,
+               high = samples[samples.size() - 1 - samples.size() / 200].signal;
   std::vector<std::vector<double>> absolute(number);
   std::vector<double> signal_sum(number, 0.0);
   for (const Sample& sample : samples) {

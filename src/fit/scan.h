@@ -18,7 +18,7 @@ struct Candidate {
 struct ScanResult {
   std::vector<Candidate> candidates;  ///< distinct, polished, best first; at least one
   std::vector<ScanTrace> traces;
-  int points = 0;                     ///< of the grid: how many places the objective was looked at
+  int points = 0;  ///< of the grid: how many places the objective was looked at
   bool interrupted = false;
 };
 

@@ -167,8 +167,7 @@ double correlation_area(const Image& whitened, const Mask& mask) {
   const auto reach = [&](bool along_x) {
     const int limit = std::max(1, (along_x ? width : height) / 3);
     int lag = 1;
-    while (lag < limit && correlation(along_x ? lag : 0, along_x ? 0 : lag) > floor)
-      lag += std::max(1, lag / 4);
+    while (lag < limit && correlation(along_x ? lag : 0, along_x ? 0 : lag) > floor) lag += std::max(1, lag / 4);
     return std::min(lag, limit);
   };
   const int reach_x = reach(true), reach_y = reach(false);

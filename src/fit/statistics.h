@@ -14,7 +14,7 @@ double normal_cdf(double x);
 double normal_quantile(double probability);
 double student_t_cdf(double t, double dof);
 double student_t_quantile(double probability, double dof);
-/// Wilson & Hilferty 1931, within 1 % from two degrees of freedom upwards: enough to decide on significance.
+/// Wilson & Hilferty 1931, within 3 % from two degrees of freedom upwards: enough to decide on significance.
 double chi_square_quantile(double probability, double dof);
 
 /// Triangular factor of a tall matrix that arrives in row blocks (Golub & Van Loan, Matrix Computations, 5.2): never
@@ -32,10 +32,10 @@ class TallQr {
 /// (R^T R)^-1 by singular values of the column-normalised factor. Columns without any influence and directions the
 /// rows do not see are left out of the inverse and reported.
 struct Inverse {
-  Eigen::MatrixXd covariance;         ///< of the determined subspace; zero rows for columns without influence
-  std::vector<bool> no_influence;     ///< zero column
-  std::vector<bool> undetermined;     ///< takes part in a direction the rows do not see (zero columns included)
-  Eigen::VectorXd conditional_sd;     ///< one over the column's norm given all others fixed; infinity for zero columns
+  Eigen::MatrixXd covariance;      ///< of the determined subspace; zero rows for columns without influence
+  std::vector<bool> no_influence;  ///< zero column
+  std::vector<bool> undetermined;  ///< takes part in a direction the rows do not see (zero columns included)
+  Eigen::VectorXd conditional_sd;  ///< one over the column's norm given all others fixed; infinity for zero columns
 };
 Inverse invert_normal_equations(const Eigen::MatrixXd& factor);
 

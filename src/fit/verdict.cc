@@ -26,8 +26,7 @@ std::string unit_suffix(const ParameterEstimate& estimate) { return estimate.uni
 
 std::string joined(const std::vector<std::string>& parts, const std::string& last = " and ") {
   std::string text;
-  for (std::size_t i = 0; i < parts.size(); ++i)
-    text += (i == 0 ? "" : i + 1 == parts.size() ? last : ", ") + parts[i];
+  for (std::size_t i = 0; i < parts.size(); ++i) text += (i == 0 ? "" : i + 1 == parts.size() ? last : ", ") + parts[i];
   return text;
 }
 
@@ -72,9 +71,7 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
   for (int j = 0; j < n; ++j) {
     const ParameterEstimate& estimate = result.parameters[j];
     const double width = estimate.upper - estimate.lower;
-    scale[j] = estimate.linear                               ? linear_size
-               : std::isfinite(width) && width > 0           ? width
-                                                             : std::abs(estimate.value);
+    scale[j] = estimate.linear ? linear_size : std::isfinite(width) && width > 0 ? width : std::abs(estimate.value);
     if (!(scale[j] > 0)) scale[j] = 1;
   }
   const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
@@ -94,10 +91,12 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
       Eigen::Index at;
       v.cwiseAbs().maxCoeff(&at);
       if (std::abs(v[at]) > 0.999)
-        direction.words = fmt::format("{} has no measurable influence on the image", name_of(result, static_cast<int>(at)));
+        direction.words =
+            fmt::format("{} has no measurable influence on the image", name_of(result, static_cast<int>(at)));
       else
-        direction.words = fmt::format("{} changes the image by less than its noise: only other combinations of them are known",
-                                      step_in_words(result, kHalfWidth * scale.cwiseProduct(v), v));
+        direction.words =
+            fmt::format("{} changes the image by less than its noise: only other combinations of them are known",
+                        step_in_words(result, kHalfWidth * scale.cwiseProduct(v), v));
       for (int j = 0; j < n; ++j)
         if (std::abs(v[j]) * std::min(direction.stderr_, 1e3) > kHalfWidth) {
           result.parameters[j].stderr_ = result.parameters[j].interval95_low = result.parameters[j].interval95_high =
@@ -133,11 +132,13 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
       direction.identifiable = false;
       const double across = t * sa * std::sqrt(std::max(0.0, 1 - std::pow(result.correlation(a, b), 2)));
       direction.words = fmt::format(
-          "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the two "
+          "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the "
+          "two "
           "is determined. Along it the 95 % interval is {0} {7:.5g} to {8:.5g}{2} (with {3} {9:.5g} to {10:.5g}{6}); "
           "across it, with {3} known, {0} would be known to +-{11:.2g}{2}",
           name_of(result, a), t * sa, unit_suffix(pa), name_of(result, b), sign > 0 ? "up" : "down", t * sb,
-          unit_suffix(pb), pa.value - t * sa, pa.value + t * sa, pb.value - sign * t * sb, pb.value + sign * t * sb, across);
+          unit_suffix(pb), pa.value - t * sa, pa.value + t * sa, pb.value - sign * t * sb, pb.value + sign * t * sb,
+          across);
       result.directions.push_back(std::move(direction));
     }
 }
@@ -150,7 +151,8 @@ std::string verdict(const FitResult& result, bool signal) {
     sentences.push_back("The fit did not converge: the values below are no result.");
   if (!signal)
     sentences.push_back(
-        "The image shows no signal of the model: a constant image explains it as well, so that the values mean nothing.");
+        "The image shows no signal of the model: a constant image explains it as well, so that the values mean "
+        "nothing.");
   for (const FisherDirection& direction : result.directions)
     if (!direction.identifiable && !direction.words.empty())
       sentences.push_back("Not identifiable: " + direction.words + ".");
@@ -183,9 +185,9 @@ std::string verdict(const FitResult& result, bool signal) {
     }
   if (!values.empty()) sentences.push_back(joined(values) + " (standard errors: " + result.covariance_kind + ").");
   if (result.has_answer())
-    sentences.push_back(fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
-                                    result.reduced_chi_square > 2 ? ": the model does not describe the image within its noise"
-                                                                  : ""));
+    sentences.push_back(
+        fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
+                    result.reduced_chi_square > 2 ? ": the model does not describe the image within its noise" : ""));
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
   return text;

@@ -150,13 +150,11 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   if (one_kind(reader, director, {"radial"}, {"bipolar", "axial"}) == "radial") {
     // `radial:` with nothing behind it is as clear as `radial: {}`.
     const YamlNode* node = director.find("radial");
-    if (node->kind == YamlNode::Kind::null) {
-      droplet.director.twist_deg = reader.constant("sample.droplet.director.radial.twist_deg", angle(), 0);
-      return droplet;
-    }
+    if (node->kind == YamlNode::Kind::null) return droplet;
   }
   const Block radial = reader.block(director, "radial", {"twist_deg"}, false);
-  droplet.director.twist_deg = reader.number(radial, "twist_deg", angle(), 0);
+  // No twist is a simpler scene, not a twist of zero: its transport is diagonal.
+  if (radial.find("twist_deg")) droplet.director.twist_deg = reader.number(radial, "twist_deg", angle(), 0);
   return droplet;
 }
 

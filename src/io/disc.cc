@@ -12,8 +12,8 @@
 namespace birefit {
 namespace {
 
-constexpr int kWorkingSide = 512;      // larger images are box-averaged: a centre to 1/10 of a working pixel is plenty
-constexpr double kMadToSd = 1.4826;    // of a normal distribution
+constexpr int kWorkingSide = 512;    // larger images are box-averaged: a centre to 1/10 of a working pixel is plenty
+constexpr double kMadToSd = 1.4826;  // of a normal distribution
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -54,8 +54,7 @@ double noise_sd(const Field& field) {
   for (int y = 0; y < field.value.rows; ++y)
     for (int x = 1; x + 1 < field.value.cols; ++x)
       if (field.used(y, x - 1) && field.used(y, x) && field.used(y, x + 1))
-        differences.push_back(
-            std::abs(field.value(y, x) - 0.5 * (field.value(y, x - 1) + field.value(y, x + 1))));
+        differences.push_back(std::abs(field.value(y, x) - 0.5 * (field.value(y, x - 1) + field.value(y, x + 1))));
   return kMadToSd * median(std::move(differences)) / std::sqrt(1.5);
 }
 
@@ -195,7 +194,8 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       if (!field.used(y, x)) continue;
-      signal(y, x) = field.value(y, x) - plane[0] - plane[1] * (2.0 * x / width - 1) - plane[2] * (2.0 * y / height - 1);
+      signal(y, x) =
+          field.value(y, x) - plane[0] - plane[1] * (2.0 * x / width - 1) - plane[2] * (2.0 * y / height - 1);
       weight(y, x) = 1;
     }
 
@@ -251,8 +251,8 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
                                       std::hypot(x - best_x, y - best_y) < 3 * (radius + best_radius));
   }
 
-  // Outline: for every direction the outermost member pixel as seen from the middle; those on the image's edge or beside
-  // masked pixels are where the picture ends, not the droplet.
+  // Outline: for every direction the outermost member pixel as seen from the middle; those on the image's edge or
+  // beside masked pixels are where the picture ends, not the droplet.
   double middle_x = 0, middle_y = 0, mass = 0;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
@@ -267,8 +267,7 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
       for (int x = 0; x < width; ++x) {
         if (labels(y, x) == 0 || !member[labels(y, x)]) continue;
         const double dx = x - circle.x, dy = y - circle.y, distance = std::hypot(dx, dy);
-        const int direction =
-            static_cast<int>((std::atan2(dy, dx) / (2 * CV_PI) + 0.5) * kDirections) % kDirections;
+        const int direction = static_cast<int>((std::atan2(dy, dx) / (2 * CV_PI) + 0.5) * kDirections) % kDirections;
         if (distance > reach[direction]) reach[direction] = distance, outermost[direction] = {double(x), double(y)};
       }
     std::vector<cv::Point2d> outline;

@@ -23,14 +23,23 @@ namespace fs = std::filesystem;
   switch (error) {
     case ENOSPC:
     case EDQUOT:
-    case EFBIG: hint = "free some space or choose another folder"; break;
+    case EFBIG:
+      hint = "free some space or choose another folder";
+      break;
     case EACCES:
     case EPERM:
-    case EROFS: hint = "choose a folder you may write to"; break;
+    case EROFS:
+      hint = "choose a folder you may write to";
+      break;
     case ENOENT:
-    case ENOTDIR: hint = "create the folder first, or choose another one"; break;
-    case ENAMETOOLONG: hint = "choose a shorter name"; break;
-    default: break;
+    case ENOTDIR:
+      hint = "create the folder first, or choose another one";
+      break;
+    case ENAMETOOLONG:
+      hint = "choose a shorter name";
+      break;
+    default:
+      break;
   }
   throw UserError({path.string()}, std::string("cannot be written: ") + std::strerror(error), hint);
 }

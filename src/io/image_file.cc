@@ -37,9 +37,9 @@ constexpr double kLargestCrediblePixelUm = 20;  // 72, 96 and 300 dpi are 353, 2
 /// Facts that OpenImageIO does not pass on. Only the formats named here are opened: the type follows from the content,
 /// so that a wrong extension neither confuses nor hands an untrusted file to some rarely used decoder.
 struct Signature {
-  std::string format;        ///< OpenImageIO's name; "" = none of ours
-  std::string format_name;   ///< for people
-  int stored_bits = 0;       ///< per sample or palette index, when the header says; 0 = ask OpenImageIO
+  std::string format;       ///< OpenImageIO's name; "" = none of ours
+  std::string format_name;  ///< for people
+  int stored_bits = 0;      ///< per sample or palette index, when the header says; 0 = ask OpenImageIO
   bool palette = false;
   bool animated = false;
   bool truncated = false;
@@ -170,7 +170,8 @@ double stated_pixel_size_um(const OIIO::ImageSpec& spec, const std::string& desc
   if (description.find("<OME") != std::string::npos || description.find("<ome:OME") != std::string::npos) {
     double x = 0, y = 0;
     bool several = false;
-    for (std::size_t at = description.find("Pixels"); at != std::string::npos; at = description.find("Pixels", at + 6)) {
+    for (std::size_t at = description.find("Pixels"); at != std::string::npos;
+         at = description.find("Pixels", at + 6)) {
       if (at == 0 || (description[at - 1] != '<' && description[at - 1] != ':')) continue;
       const std::string tag = description.substr(at, description.find('>', at) - at);
       const auto length = [&](const std::string& name) {
@@ -218,8 +219,9 @@ std::string decoder_message(OIIO::ImageInput& input) {
 }
 
 [[noreturn]] void refuse_damaged(const ImageRequest& request, const Signature& signature, const std::string& detail) {
-  refuse(request, fmt::format("is truncated or damaged: it starts like a {} file but cannot be read completely{}",
-                              signature.format_name, detail),
+  refuse(request,
+         fmt::format("is truncated or damaged: it starts like a {} file but cannot be read completely{}",
+                     signature.format_name, detail),
          "copy it again from its source, or export it again");
 }
 
@@ -284,12 +286,14 @@ std::vector<int> chosen_channels(const ImageRequest& request, const OIIO::ImageS
   }
   if (colours.size() == 3 && std::count(rgb.begin(), rgb.end(), -1) == 3) std::copy_n(colours.begin(), 3, rgb.begin());
   if (std::count(rgb.begin(), rgb.end(), -1) > 0)
-    refuse(request, fmt::format("has {} channels ({}) that are neither grey nor red, green and blue", spec.nchannels, names),
+    refuse(request,
+           fmt::format("has {} channels ({}) that are neither grey nor red, green and blue", spec.nchannels, names),
            "save the one to be fitted as a grey image");
   if (choice.empty())
-    refuse(request, fmt::format("has colour channels ({}{}) and none is chosen", names,
-                                palette ? ", expanded from a palette" : ""),
-           "add `channel: r`, `g`, `b` or `mean` (their plain average)");
+    refuse(
+        request,
+        fmt::format("has colour channels ({}{}) and none is chosen", names, palette ? ", expanded from a palette" : ""),
+        "add `channel: r`, `g`, `b` or `mean` (their plain average)");
   if (choice == "mean") return {rgb[0], rgb[1], rgb[2]};
   return {rgb[choice == "r" ? 0 : choice == "g" ? 1 : 2]};
 }
@@ -341,16 +345,33 @@ Image read_samples(const ImageRequest& request, const Signature& signature, OIIO
     if (!read || input.has_error()) refuse_damaged(request, signature, decoder_message(input));
     if (values.empty()) values = Image(spec.width, spec.height);
     switch (type.basetype) {
-      case TypeDesc::UINT8: add_samples<std::uint8_t>(bytes, last - first, offsets, row, rows, values); break;
-      case TypeDesc::INT8: add_samples<std::int8_t>(bytes, last - first, offsets, row, rows, values); break;
-      case TypeDesc::UINT16: add_samples<std::uint16_t>(bytes, last - first, offsets, row, rows, values); break;
-      case TypeDesc::INT16: add_samples<std::int16_t>(bytes, last - first, offsets, row, rows, values); break;
-      case TypeDesc::UINT32: add_samples<std::uint32_t>(bytes, last - first, offsets, row, rows, values); break;
-      case TypeDesc::INT32: add_samples<std::int32_t>(bytes, last - first, offsets, row, rows, values); break;
-      case TypeDesc::FLOAT: add_samples<float>(bytes, last - first, offsets, row, rows, values); break;
-      case TypeDesc::DOUBLE: add_samples<double>(bytes, last - first, offsets, row, rows, values); break;
+      case TypeDesc::UINT8:
+        add_samples<std::uint8_t>(bytes, last - first, offsets, row, rows, values);
+        break;
+      case TypeDesc::INT8:
+        add_samples<std::int8_t>(bytes, last - first, offsets, row, rows, values);
+        break;
+      case TypeDesc::UINT16:
+        add_samples<std::uint16_t>(bytes, last - first, offsets, row, rows, values);
+        break;
+      case TypeDesc::INT16:
+        add_samples<std::int16_t>(bytes, last - first, offsets, row, rows, values);
+        break;
+      case TypeDesc::UINT32:
+        add_samples<std::uint32_t>(bytes, last - first, offsets, row, rows, values);
+        break;
+      case TypeDesc::INT32:
+        add_samples<std::int32_t>(bytes, last - first, offsets, row, rows, values);
+        break;
+      case TypeDesc::FLOAT:
+        add_samples<float>(bytes, last - first, offsets, row, rows, values);
+        break;
+      case TypeDesc::DOUBLE:
+        add_samples<double>(bytes, last - first, offsets, row, rows, values);
+        break;
       default:
-        refuse(request, fmt::format("has samples of type {}", type.c_str()), "save it as 8- or 16-bit integers or float");
+        refuse(request, fmt::format("has samples of type {}", type.c_str()),
+               "save it as 8- or 16-bit integers or float");
     }
   }
   return values;
@@ -372,13 +393,13 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(signature.format);
   if (!input) {
     (void)OIIO::geterror();
-    refuse(request, "cannot be read: this OpenImageIO has no " + signature.format_name + " support", "convert it to TIFF");
+    refuse(request, "cannot be read: this OpenImageIO has no " + signature.format_name + " support",
+           "convert it to TIFF");
   }
   OIIO::ImageSpec settings, spec;
   settings.attribute("oiio:UnassociatedAlpha", 1);
   settings.attribute("bmp:monochrome_detect", 1);
-  if (!input->open(request.path.string(), spec, settings))
-    refuse_damaged(request, signature, decoder_message(*input));
+  if (!input->open(request.path.string(), spec, settings)) refuse_damaged(request, signature, decoder_message(*input));
 
   const bool several = input->seek_subimage(1, 0);
   (void)input->geterror();
@@ -387,8 +408,9 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   int page = 0;
   if (several && !request.page) {
     const int pages = count_pages(*input);
-    refuse(request, fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
-                                list_pages(*input, pages)),
+    refuse(request,
+           fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
+                       list_pages(*input, pages)),
            "add `page: 0` for the first");
   }
   if (request.page) {
@@ -396,8 +418,9 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     if (page < 0 || !input->seek_subimage(page, 0)) {
       (void)input->geterror();
       const int pages = count_pages(*input);
-      refuse(request, fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
-                                  list_pages(*input, pages)),
+      refuse(request,
+             fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
+                         list_pages(*input, pages)),
              "pages count from 0");
     }
   }
@@ -407,7 +430,8 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   // From the header, before anything of the image's size is allocated.
   if (spec.width < 1 || spec.height < 1) refuse_damaged(request, signature, " (it has no pixels)");
   if (spec.width > kLargestSide || spec.height > kLargestSide)
-    refuse(request, fmt::format("is {} x {} pixels; at most {} on a side can be read", spec.width, spec.height, kLargestSide),
+    refuse(request,
+           fmt::format("is {} x {} pixels; at most {} on a side can be read", spec.width, spec.height, kLargestSide),
            "crop it to the object, or bin it");
   if (spec.depth > 1 || spec.deep)
     refuse(request, spec.deep ? "is a deep image" : "is a volume, not an image", "export one plane of it");
@@ -426,8 +450,7 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     refuse(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
   if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
     refuse(request, "is stored in the print colour space " + space, "save it as grey or RGB");
-  if (bits == 24 && !is_float && tiff)
-    refuse(request, "has 24 bits per sample", "save it as 16-bit integers or float");
+  if (bits == 24 && !is_float && tiff) refuse(request, "has 24 bits per sample", "save it as 16-bit integers or float");
   if (!spec.channelformats.empty())
     for (const TypeDesc& type : spec.channelformats)
       if (!type.is_floating_point())
@@ -455,14 +478,16 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
       loaded.notes.push_back("16-bit float samples hold three decimal digits only");
   }
   if (palette)
-    loaded.notes.push_back("palette image: its colours, not its indices, are the intensities; fit the original if you can");
+    loaded.notes.push_back(
+        "palette image: its colours, not its indices, are the intensities; fit the original if you can");
   if (signature.lossy || photometric == kSubsampledColour)
     loaded.notes.push_back("lossy compression has changed the counts and their noise; fit the original if you can");
   if (photometric == kWhiteIsZero)
     loaded.notes.push_back("white is stored as zero: values inverted on reading, larger is brighter");
   if (const int orientation = spec.get_int_attribute("Orientation", 1); orientation > 1 && orientation <= 8)
     loaded.notes.push_back(fmt::format("orientation tag {} ignored: rows and columns are as stored", orientation));
-  if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width || spec.height != spec.full_height)
+  if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width ||
+      spec.height != spec.full_height)
     loaded.notes.push_back("the stored pixels are a window of a larger canvas: (0, 0) is the first stored pixel");
   if (const double stack = number_or_zero(imagej_value(description, "images")); stack > 1 && !several) {
     const std::string found = fmt::format("is an ImageJ stack of {:.0f} images with a single TIFF page", stack);

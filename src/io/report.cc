@@ -72,6 +72,7 @@ td { text-align: right; padding: 4px 9px; border-bottom: 1px solid var(--line); 
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 table.full { width: 100%; }
 td.name { font-weight: 500; }
+td.file { white-space: normal; overflow-wrap: anywhere; min-width: 9em; }
 td.name small { display: block; font-weight: 400; color: var(--soft); font-size: 11px; }
 td.left, th.left { text-align: left; }
 td.value { font-weight: 600; }
@@ -102,7 +103,7 @@ footer { margin-top: 44px; padding-top: 10px; border-top: 1px solid var(--line);
   dl.facts { grid-template-columns: minmax(0, 1fr); gap: 0; }
   dl.facts dd { margin-bottom: 6px; }
   table.full td:first-child, table.full th:first-child { position: sticky; left: 0; background: var(--paper); padding-right: 12px;
-    border-right: 1px solid var(--line); max-width: 46vw; white-space: normal; overflow-wrap: anywhere; }
+    border-right: 1px solid var(--line); min-width: 132px; max-width: 46vw; white-space: normal; overflow-wrap: anywhere; }
 }
 @media print {
   @page { size: A4; margin: 15mm 14mm; }
@@ -235,8 +236,10 @@ Profile line_profile(const Frame& frame, const FitResult& result) {
   const int width = frame.measured.width(), height = frame.measured.height();
   int cx = width / 2, cy = height / 2;
   if (frame.scene != nullptr) {
-    if (const auto x = theta_of(result, frame.scene->view.center_x_px); x && *x > 0 && *x < width - 1) cx = int(std::lround(*x));
-    if (const auto y = theta_of(result, frame.scene->view.center_y_px); y && *y > 0 && *y < height - 1) cy = int(std::lround(*y));
+    if (const auto x = theta_of(result, frame.scene->view.center_x_px); x && *x > 0 && *x < width - 1)
+      cx = int(std::lround(*x));
+    if (const auto y = theta_of(result, frame.scene->view.center_y_px); y && *y > 0 && *y < height - 1)
+      cy = int(std::lround(*y));
   }
   struct Way {
     int dx, dy;
@@ -288,7 +291,8 @@ Profile line_profile(const Frame& frame, const FitResult& result) {
 
 Profile profile_of(const Frame& frame, const FitResult& result) {
   if (frame.scene != nullptr)
-    if (const Crystal* crystal = std::get_if<Crystal>(&frame.scene->sample)) return mean_profile(frame, crystal->field_along_y);
+    if (const Crystal* crystal = std::get_if<Crystal>(&frame.scene->sample))
+      return mean_profile(frame, crystal->field_along_y);
   return line_profile(frame, result);
 }
 
@@ -304,7 +308,10 @@ double residual_limit(const Image& normalised) {
   return 10 * power;
 }
 
-std::string plain(double value) { return html_number(fmt::format("{:.4g}", value)); }
+std::string plain(double value) {
+  const bool large = std::abs(value) >= 1e4 && std::abs(value) < 1e7;
+  return html_number(large ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value));
+}
 
 std::string frame_section(const Frame& frame, const FitResult& result, int& figure, int largest_side) {
   const Profile profile = profile_of(frame, result);
@@ -313,7 +320,8 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
   low = std::fmin(low, quantile(frame.result->fitted, mask, 0.0));
   high = std::fmax(high, quantile(frame.result->fitted, mask, 1.0));
   if (!std::isfinite(low) || !std::isfinite(high)) low = 0, high = 1;
-  if (!(high > low)) low -= 0.5 * std::max(std::abs(low), 1.0) * 1e-3, high += 0.5 * std::max(std::abs(high), 1.0) * 1e-3;
+  if (!(high > low))
+    low -= 0.5 * std::max(std::abs(low), 1.0) * 1e-3, high += 0.5 * std::max(std::abs(high), 1.0) * 1e-3;
   const double limit = residual_limit(frame.normalised);
   const bool stack = frame.measured.width() > 2.2 * frame.measured.height();
 
@@ -334,6 +342,7 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
   panel.values = &frame.result->fitted;
   panel.title = "fitted image";
   panel.line.reset();
+  panel.pixel_size_um = 0;
   out += "<div><h4>Fitted</h4>" + svg(panel) + "</div>\n";
   panel.values = &frame.normalised;
   panel.colours = Colours::diverging;
@@ -343,16 +352,20 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
   out += "<div><h4>Residual</h4>" + svg(panel) + "</div>\n</div>\n";
 
   const int factor = shrink_factor(frame.measured, largest_side);
-  const bool hatched = std::find(frame.used.values().begin(), frame.used.values().end(), 0) != frame.used.values().end();
-  out += fmt::format("<figcaption><b>Figure {}.</b> Measured and fitted image on one grey scale, and measured minus fitted in units "
-                     "of the noise\u2019s standard deviation \u03c3 of each pixel{}.{} {} \u00d7 {} pixels{}; residual rms {} {}{}.</figcaption>\n",
-                     figure++, limit > 3 ? fmt::format(" (scale \u00b1{})", plain(limit)) : "",
-                     hatched ? " Hatched: pixels left out of the fit." : "", frame.measured.width(), frame.measured.height(),
-                     factor > 1 ? fmt::format(", {0} \u00d7 {0} averaged for display", factor) : "",
-                     plain(frame.result->residual_rms), frame.unit,
-                     frame.result->signal_range > 0
-                         ? fmt::format(" ({} of the signal range)", format_percent(frame.result->residual_rms / frame.result->signal_range))
-                         : "");
+  const bool hatched =
+      std::find(frame.used.values().begin(), frame.used.values().end(), 0) != frame.used.values().end();
+  out += fmt::format(
+      "<figcaption><b>Figure {}.</b> Measured and fitted image on one grey scale, and measured minus fitted in units "
+      "of the noise\u2019s standard deviation \u03c3 of each pixel{}.{} {} \u00d7 {} pixels{}; residual rms {} "
+      "{}{}.</figcaption>\n",
+      figure++, limit > 3 ? fmt::format(" (scale \u00b1{})", plain(limit)) : "",
+      hatched ? " Hatched: pixels left out of the fit." : "", frame.measured.width(), frame.measured.height(),
+      factor > 1 ? fmt::format(", {0} \u00d7 {0} averaged for display", factor) : "", plain(frame.result->residual_rms),
+      frame.unit,
+      frame.result->signal_range > 0
+          ? fmt::format(" ({} of the signal range)",
+                        format_percent(frame.result->residual_rms / frame.result->signal_range))
+          : "");
   out += "</figure>\n";
 
   Chart chart;
@@ -374,13 +387,15 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
   const double end = profile.mean ? std::max(1.15 * largest, 1e-3) : std::max(1.1 * largest, 3.3);
   residuals.y_range = {-end, end};
   if (!profile.mean || end > 1) residuals.bands = {{-2, 2, kBand2}, {-1, 1, kBand1}};
-  residuals.series.push_back({Series::Kind::line, "", {profile.position.front(), profile.position.back()}, {0, 0}, "#8a919b", 0.9});
+  residuals.series.push_back(
+      {Series::Kind::line, "", {profile.position.front(), profile.position.back()}, {0, 0}, "#8a919b", 0.9});
   residuals.series.push_back({Series::Kind::points, "", profile.position, profile.residual, kMeasured, dot});
   chart.panels = {values, residuals};
   out += "<figure>\n" + wide_and_narrow(chart);
-  out += fmt::format("<figcaption><b>Figure {}.</b> Profile: {}. Below, the residual in units of \u03c3{}.</figcaption>\n</figure>\n",
-                     figure++, profile.words,
-                     profile.mean ? " of one pixel, averaged like the profile" : "; the bands are \u00b11 and \u00b12 \u03c3");
+  out += fmt::format(
+      "<figcaption><b>Figure {}.</b> Profile: {}. Below, the residual in units of \u03c3{}.</figcaption>\n</figure>\n",
+      figure++, profile.words,
+      profile.mean ? " of one pixel, averaged like the profile" : "; the bands are \u00b11 and \u00b12 \u03c3");
   return out;
 }
 
@@ -390,7 +405,8 @@ std::string estimate_html(const ParameterEstimate& p) {
   if (!p.limit.empty())
     return fmt::format("{} {}{}", p.limit == "upper" ? "&lt;" : "&gt;", plain(p.limit_value), unit_suffix(p.unit));
   if (!std::isfinite(p.stderr_)) return plain(p.value) + unit_suffix(p.unit) + " <small>\u00b1 not known</small>";
-  return fmt::format("{} <small>\u00b1 {}</small>{}", value_html(p.value, p.stderr_), html_number(format_error(p.stderr_)),
+  return fmt::format("{} <small>\u00b1 {}</small>{}", value_html(p.value, p.stderr_),
+                     html_number(format_error(p.stderr_)),
                      p.unit.empty() ? "" : "<small>" + unit_suffix(p.unit) + "</small>");
 }
 
@@ -415,7 +431,8 @@ std::string key_numbers(const FitResult& result) {
   out += "<div><dt>reduced chi-square</dt><dd>" + plain(result.reduced_chi_square) +
          fmt::format(" <small>{} d.o.f.</small></dd></div>\n", result.degrees_of_freedom);
   if (used > 0 && sum > 0)
-    out += "<div><dt>residual rms</dt><dd>" + format_percent(std::sqrt(sum / used)) + " <small>of signal range</small></dd></div>\n";
+    out += "<div><dt>residual rms</dt><dd>" + format_percent(std::sqrt(sum / used)) +
+           " <small>of signal range</small></dd></div>\n";
   return out + "</dl>\n";
 }
 
@@ -424,30 +441,40 @@ std::string interval_html(double low, double high, double error) {
   return value_html(low, error) + " \u2026 " + value_html(high, error);
 }
 
-std::string bound_html(double bound) { return std::isfinite(bound) ? plain(bound) : bound < 0 ? "\u2212\u221e" : "\u221e"; }
+std::string bound_html(double bound) {
+  return std::isfinite(bound) ? plain(bound) : bound < 0 ? "\u2212\u221e" : "\u221e";
+}
 
 std::string parameter_table(const FitResult& result) {
   std::string out =
-      "<div class=\"scroll\"><table class=\"full\">\n<tr><th>parameter</th><th>value</th><th>std. error</th><th>relative</th>"
+      "<div class=\"scroll\"><table class=\"full\">\n<tr><th>parameter</th><th>value</th><th>std. "
+      "error</th><th>relative</th>"
       "<th>95 % interval</th><th>start</th><th>bounds</th><th>prior</th><th class=\"left\">unit</th></tr>\n";
   for (const ParameterEstimate& p : result.parameters) {
     const double error = p.stderr_;
     const std::string brief = short_name(p.name);
     std::string flags;
     if (!p.limit.empty())
-      flags = fmt::format("<br><span class=\"flag\">95 % {} limit {}</span>", escape_html(p.limit), plain(p.limit_value));
+      flags =
+          fmt::format("<br><span class=\"flag\">95 % {} limit {}</span>", escape_html(p.limit), plain(p.limit_value));
     else if (p.at_bound)
       flags = "<br><span class=\"flag\">at its bound</span>";
-    out += "<tr><td class=\"name\">" + escape_html(brief) + (brief != p.name ? "<small>" + escape_html(p.name) + "</small>" : "") +
-           "</td>";
+    out += "<tr><td class=\"name\">" + escape_html(brief) +
+           (brief != p.name ? "<small>" + escape_html(p.name) + "</small>" : "") + "</td>";
     out += "<td class=\"value\">" + value_html(p.value, error) + flags + "</td>";
     out += "<td>" + html_number(format_error(error)) + "</td>";
     out += "<td>" + (p.value != 0 ? html_number(format_percent(error / p.value)) : "\u2013") + "</td>";
     out += "<td>" + interval_html(p.interval95_low, p.interval95_high, error) + "</td>";
     out += "<td>" + (p.linear ? "\u2013" : plain(p.start)) + "</td>";
-    out += "<td>" + (std::isfinite(p.lower) || std::isfinite(p.upper) ? bound_html(p.lower) + " \u2026 " + bound_html(p.upper) : "none") +
+    out += "<td>" +
+           (std::isfinite(p.lower) || std::isfinite(p.upper) ? bound_html(p.lower) + " \u2026 " + bound_html(p.upper)
+                                                             : "none") +
            "</td>";
-    out += "<td>" + (p.prior_sd ? plain(p.prior_value.value_or(p.start)) + " \u00b1 " + html_number(fmt::format("{:.2g}", *p.prior_sd)) : "\u2013") + "</td>";
+    out += "<td>" +
+           (p.prior_sd
+                ? plain(p.prior_value.value_or(p.start)) + " \u00b1 " + html_number(fmt::format("{:.2g}", *p.prior_sd))
+                : "\u2013") +
+           "</td>";
     out += "<td class=\"left\">" + pretty_unit(p.unit) + "</td></tr>\n";
   }
   return out + "</table></div>\n";
@@ -468,7 +495,8 @@ std::string correlation_table(const FitResult& result) {
     out += fmt::format("<th title=\"{}\">{}</th>", escape_html(result.names[j]), j + 1);
   out += "</tr>\n";
   for (Eigen::Index i = 0; i < count; ++i) {
-    out += fmt::format("<tr><td title=\"{}\">{}&ensp;{}</td>", escape_html(result.names[i]), i + 1, escape_html(short_name(result.names[i])));
+    out += fmt::format("<tr><td title=\"{}\">{}&ensp;{}</td>", escape_html(result.names[i]), i + 1,
+                       escape_html(short_name(result.names[i])));
     for (Eigen::Index j = 0; j < i; ++j) {
       const double c = result.correlation(i, j);
       if (!std::isfinite(c)) {
@@ -503,7 +531,8 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
     const ParameterEstimate* p = find(result, scan.name);
     Chart chart;
     chart.title = "scan of " + scan.name;
-    const std::string unit = p != nullptr && !p->unit.empty() ? " (" + std::string(p->unit == "um" ? "\u00b5m" : p->unit) + ")" : "";
+    const std::string unit =
+        p != nullptr && !p->unit.empty() ? " (" + std::string(p->unit == "um" ? "\u00b5m" : p->unit) + ")" : "";
     chart.x_label = short_name(scan.name) + unit;
     Panel panel;
     panel.y_label = "chi-square";
@@ -520,9 +549,10 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
       panel.markers.push_back({p->start, "start", "#8a919b", true});
     }
     chart.panels = {panel};
-    cells.push_back(fmt::format("<figure>{}<figcaption><b>Figure {}.</b> The scan before the solver: chi-square against {}, the other "
-                                "parameters as the scan had them.</figcaption></figure>\n",
-                                svg(chart), figure++, escape_html(short_name(scan.name))));
+    cells.push_back(fmt::format(
+        "<figure>{}<figcaption><b>Figure {}.</b> The scan before the solver: chi-square against {}, the other "
+        "parameters as the scan had them.</figcaption></figure>\n",
+        svg(chart), figure++, escape_html(short_name(scan.name))));
   }
   if (result.iterations.size() > 1) {
     Chart chart;
@@ -541,9 +571,10 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
     dots.width = 4.5;
     panel.series = {line, dots};
     chart.panels = {panel};
-    cells.push_back(fmt::format("<figure>{}<figcaption><b>Figure {}.</b> Convergence of the solver from the best start of the "
-                                "scan: {} iterations, {} evaluations.</figcaption></figure>\n",
-                                svg(chart), figure++, result.iterations.back().number, result.evaluations));
+    cells.push_back(
+        fmt::format("<figure>{}<figcaption><b>Figure {}.</b> Convergence of the solver from the best start of the "
+                    "scan: {} iterations, {} evaluations.</figcaption></figure>\n",
+                    svg(chart), figure++, result.iterations.back().number, result.evaluations));
   }
 
   constexpr int kBins = 48;
@@ -555,7 +586,8 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
       if (!std::isfinite(r)) continue;
       ++count, sum += r, square += r * r, beyond += std::abs(r) > 3;
       if (std::abs(r) >= kReach) ++outside;
-      histogram[std::clamp(static_cast<int>((r + kReach) / (2 * kReach) * kBins), 0, kBins - 1)] += std::abs(r) < kReach;
+      histogram[std::clamp(static_cast<int>((r + kReach) / (2 * kReach) * kBins), 0, kBins - 1)] +=
+          std::abs(r) < kReach;
     }
   if (count > 0) {
     Chart chart;
@@ -580,12 +612,14 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
     panel.series = {bars, normal};
     chart.panels = {panel};
     const double mean = sum / count;
-    cells.push_back(fmt::format(
-        "<figure>{}<figcaption><b>Figure {}.</b> Residuals of all used pixels: mean {}, standard deviation {}; {} beyond 3 \u03c3 "
-        "(a normal distribution has 0.27 %){}.</figcaption></figure>\n",
-        svg(chart), figure++, html_number(fmt::format("{:.2g}", mean)),
-        html_number(fmt::format("{:.3g}", std::sqrt(std::max(0.0, square / count - mean * mean)))), format_percent(beyond / count),
-        outside > 0 ? fmt::format(", {:.0f} pixels beyond 6 \u03c3 not shown", outside) : ""));
+    cells.push_back(
+        fmt::format("<figure>{}<figcaption><b>Figure {}.</b> Residuals of all used pixels: mean {}, standard deviation "
+                    "{}; {} beyond 3 \u03c3 "
+                    "(a normal distribution has 0.27 %){}.</figcaption></figure>\n",
+                    svg(chart), figure++, html_number(fmt::format("{:.2g}", mean)),
+                    html_number(fmt::format("{:.3g}", std::sqrt(std::max(0.0, square / count - mean * mean)))),
+                    format_percent(beyond / count),
+                    outside > 0 ? fmt::format(", {:.0f} pixels beyond 6 \u03c3 not shown", outside) : ""));
   }
   if (cells.empty()) return {};
   std::string out = "<h2>Search and residuals</h2>\n<div class=\"pair\">\n";
@@ -601,24 +635,31 @@ std::string identifiability(const Config& config, const FitResult& result) {
     out += "<ul>\n";
     for (const FisherDirection& d : result.directions)
       if (!d.words.empty())
-        out += "<li>" + std::string(d.identifiable ? "" : "<span class=\"flag\">not identifiable</span> ") + escape_html(d.words) +
-               "</li>\n";
+        out += "<li>" + std::string(d.identifiable ? "" : "<span class=\"flag\">not identifiable</span> ") +
+               escape_html(d.words) + "</li>\n";
     out += "</ul>\n";
   }
   if (!result.rivals.empty()) {
-    out += "<h3>Rival minima</h3>\n<div class=\"scroll\"><table>\n<tr><th>odds against the reported minimum</th><th>chi-square</th>";
+    out +=
+        "<h3>Rival minima, with their odds against the reported one</h3>\n<div class=\"scroll\"><table>\n<tr><th>odds "
+        "against the reported "
+        "minimum</th><th>chi-square</th>";
     std::vector<const ParameterEstimate*> shown;
     for (const ParameterEstimate& p : result.parameters)
       if (!p.linear && shown.size() < 6) shown.push_back(&p);
     for (const ParameterEstimate* p : shown)
-      out += "<th>" + escape_html(short_name(p->name)) + (p->unit.empty() ? "" : " (" + pretty_unit(p->unit) + ")") + "</th>";
+      out += "<th>" + escape_html(short_name(p->name)) + (p->unit.empty() ? "" : " (" + pretty_unit(p->unit) + ")") +
+             "</th>";
     out += "</tr>\n";
     for (const RivalMinimum& rival : result.rivals) {
-      out += "<tr><td>" + html_number(fmt::format("{:.2g}", rival.odds)) + "</td><td>" + html_number(fmt::format("{:.6g}", rival.chi_square)) +
-             "</td>";
+      out += "<tr><td>" + html_number(fmt::format("{:.2g}", rival.odds)) + "</td><td>" +
+             html_number(fmt::format("{:.6g}", rival.chi_square)) + "</td>";
       for (const ParameterEstimate* p : shown) {
         const ParameterRef ref = config.job.parameters.find(p->name);
-        out += "<td>" + (ref && ref.index < std::ssize(rival.theta) ? value_html(rival.theta[ref.index], p->stderr_) : "\u2013") + "</td>";
+        out +=
+            "<td>" +
+            (ref && ref.index < std::ssize(rival.theta) ? value_html(rival.theta[ref.index], p->stderr_) : "\u2013") +
+            "</td>";
       }
       out += "</tr>\n";
     }
@@ -632,12 +673,16 @@ std::string model_section(const FitResult& result) {
   const RenderPlan* previous = nullptr;
   for (const MicrographResult& m : result.micrographs) {
     const RenderPlan& plan = m.plan;
-    if (previous != nullptr && previous->method == plan.method && previous->physics == plan.physics && previous->reasons == plan.reasons)
+    if (previous != nullptr && previous->method == plan.method && previous->physics == plan.physics &&
+        previous->reasons == plan.reasons)
       continue;  // frames of one series share it
     previous = &plan;
-    if (result.micrographs.size() > 1) out += "<h3>" + escape_html(m.name) + (&m == &result.micrographs[0] ? " and those like it" : "") + "</h3>\n";
-    out += "<dl class=\"facts\">\n" + fact("method", escape_html(plan.method)) + fact("physics", escape_html(plan.physics)) +
-           fact("numerical error", html_number(fmt::format("{:.2g}", plan.numerical_error)) + " of the incident intensity") +
+    if (result.micrographs.size() > 1)
+      out += "<h3>" + escape_html(m.name) + (&m == &result.micrographs[0] ? " and those like it" : "") + "</h3>\n";
+    out += "<dl class=\"facts\">\n" + fact("method", escape_html(plan.method)) +
+           fact("physics", escape_html(plan.physics)) +
+           fact("numerical error",
+                html_number(fmt::format("{:.2g}", plan.numerical_error)) + " of the incident intensity") +
            fact("model error", html_number(fmt::format("{:.2g}", plan.model_error)) +
                                    " of the incident intensity, from what the physics leaves out") +
            "</dl>\n";
@@ -649,21 +694,26 @@ std::string model_section(const FitResult& result) {
 
 std::string data_section(const Config& config, const FitResult& result) {
   std::string out =
-      "<h2>Data</h2>\n<div class=\"scroll\"><table class=\"full\">\n<tr><th>micrograph</th><th>pixels used</th><th>masked</th>"
-      "<th>outside ROI</th><th>saturated</th><th>dead</th><th>not finite</th><th>chi-square / pixel</th><th>read noise</th>"
-      "<th>counts / photon</th></tr>\n";
+      "<h2>Data</h2>\n<p>Pixels used and left out, by reason; noise model in counts.</p>\n<div class=\"scroll\"><table "
+      "class=\"full\">\n<tr><th>micrograph</th><th>used</th><th>masked</th>"
+      "<th>outside<br>ROI</th><th>satu-<br>rated</th><th>dead</th><th>not<br>finite</th><th>chi-square<br>per "
+      "pixel</th>"
+      "<th>read<br>noise</th><th>counts per<br>photon</th></tr>\n";
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
     const MicrographResult& m = result.micrographs[i];
     const Micrograph none;
     const Micrograph& input = i < config.job.micrographs.size() ? config.job.micrographs[i] : none;
-    out += fmt::format("<tr><td class=\"name\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-                       "<td>{}{}</td><td>{}</td></tr>\n",
-                       escape_html(m.name), m.used, input.masked_by_user, input.outside_roi, input.saturated, input.dead,
-                       input.non_finite, m.used > 0 ? plain(m.chi_square / m.used) : "\u2013", plain(m.noise.read_counts),
-                       m.noise.estimated ? "*" : "", plain(m.noise.counts_per_photon));
+    out += fmt::format(
+        "<tr><td class=\"name "
+        "file\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+        "<td>{}{}</td><td>{}</td></tr>\n",
+        escape_html(m.name), m.used, input.masked_by_user, input.outside_roi, input.saturated, input.dead,
+        input.non_finite, m.used > 0 ? plain(m.chi_square / m.used) : "\u2013", plain(m.noise.read_counts),
+        m.noise.estimated ? "*" : "", plain(m.noise.counts_per_photon));
   }
   out += "</table></div>\n";
-  if (std::any_of(result.micrographs.begin(), result.micrographs.end(), [](const auto& m) { return m.noise.estimated; }))
+  if (std::any_of(result.micrographs.begin(), result.micrographs.end(),
+                  [](const auto& m) { return m.noise.estimated; }))
     out += "<p><small>* noise estimated from the image itself</small></p>\n";
   return out;
 }
@@ -687,9 +737,9 @@ std::string statistics_section(const Config& config, const FitResult& result) {
 
 std::string badge(const FitResult& result) {
   if (result.has_answer()) return "<span class=\"badge good\">Answer</span>";
-  const char* reason = result.interrupted    ? "interrupted"
-                       : !result.converged   ? "not converged"
-                       : result.ambiguous    ? "ambiguous"
+  const char* reason = result.interrupted     ? "interrupted"
+                       : !result.converged    ? "not converged"
+                       : result.ambiguous     ? "ambiguous"
                        : !result.identifiable ? "not identifiable"
                                               : "pinned at a bound";
   return fmt::format("<span class=\"badge bad\">No answer: {}</span>", reason);
@@ -704,11 +754,14 @@ std::string report_html(const Config& config, const FitResult& result) {
   const int largest_side = frames.size() <= 2 ? 700 : frames.size() <= 6 ? 480 : 300;
   int figure = 1;
 
-  std::string out = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-                    "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-                    // Even if something were to slip through the escaping, no browser would run or fetch it.
-                    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\n"
-                    "<title>" + escape_html(title) + " \u2013 birefit</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n<main>\n";
+  std::string out =
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      // Even if something were to slip through the escaping, no browser would run or fetch it.
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "
+      "'unsafe-inline'\">\n"
+      "<title>" +
+      escape_html(title) + " \u2013 birefit</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n<main>\n";
   out += "<p class=\"eyebrow\">birefit fit report</p>\n<h1>" + escape_html(title) + "</h1>\n";
   out += "<div class=\"verdict\">" + badge(result) + "<p>" + escape_html(result.verdict) + "</p></div>\n";
   out += key_numbers(result);
@@ -729,7 +782,8 @@ std::string report_html(const Config& config, const FitResult& result) {
          fact("effort", fmt::format("{} evaluations, {:.3g} s", result.evaluations, result.seconds)) + "</dl>\n";
   out += "<details><summary>Config as read</summary>\n<pre>" + escape_html(config.text) + "</pre></details>\n";
   if (!result.solver_report.empty())
-    out += "<details><summary>The solver\u2019s own report</summary>\n<pre>" + escape_html(result.solver_report) + "</pre></details>\n";
+    out += "<details><summary>The solver\u2019s own report</summary>\n<pre>" + escape_html(result.solver_report) +
+           "</pre></details>\n";
   return out + "</main>\n</body>\n</html>\n";
 }
 

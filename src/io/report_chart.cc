@@ -116,8 +116,8 @@ std::string draw_series(const Series& series, const Panel& panel, const Scale& x
                             std::clamp(y(series.y[i]), top - 500, bottom + 500));
         pen_down = true;
       }
-      out = fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"/>", path,
-                        series.colour, series.width);
+      out = fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"/>",
+                        path, series.colour, series.width);
       break;
     }
     case Series::Kind::points: {
@@ -127,8 +127,8 @@ std::string draw_series(const Series& series, const Panel& panel, const Scale& x
         if (drawable(i))
           if (const double v = y(series.y[i]); v >= top && v <= bottom)
             path += fmt::format("M{:.1f} {:.1f}h0", x(series.x[i]), v);
-      out = fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linecap=\"round\"/>", path,
-                        series.colour, series.width);
+      out = fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linecap=\"round\"/>",
+                        path, series.colour, series.width);
       break;
     }
     case Series::Kind::bars: {
@@ -136,8 +136,9 @@ std::string draw_series(const Series& series, const Panel& panel, const Scale& x
       for (std::size_t i = 0; i < count; ++i)
         if (drawable(i) && series.y[i] != 0)
           out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"/>",
-                             x(series.x[i] - half) + 0.4, y(series.y[i]), x(series.x[i] + half) - x(series.x[i] - half) - 0.8,
-                             std::max(0.0, y(0) - y(series.y[i])), series.colour);
+                             x(series.x[i] - half) + 0.4, y(series.y[i]),
+                             x(series.x[i] + half) - x(series.x[i] - half) - 0.8, std::max(0.0, y(0) - y(series.y[i])),
+                             series.colour);
       break;
     }
   }
@@ -149,25 +150,30 @@ std::string draw_legend(const Panel& panel, double left, double top) {
   double at = left;
   const auto entry = [&](const std::string& symbol, const std::string& label) {
     out += symbol;
-    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"{}\">{}</text>", at + 22, top + 4, kInk, escape_html(label));
+    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"{}\">{}</text>", at + 22, top + 4, kInk,
+                       escape_html(label));
     at += 34 + 6.2 * label.size();
   };
   for (const Series& series : panel.series) {
     if (series.label.empty()) continue;
     if (series.kind == Series::Kind::line)
       entry(fmt::format("<path d=\"M{:.1f} {:.1f}h17\" stroke=\"{}\" stroke-width=\"{}\"/>", at, top, series.colour,
-                        series.width), series.label);
+                        series.width),
+            series.label);
     else if (series.kind == Series::Kind::points)
       entry(fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\"/>", at + 10, top,
-                        std::max(series.width / 2, 1.6), series.colour), series.label);
+                        std::max(series.width / 2, 1.6), series.colour),
+            series.label);
     else
       entry(fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"14\" height=\"9\" fill=\"{}\"/>", at + 3, top - 4.5,
-                        series.colour), series.label);
+                        series.colour),
+            series.label);
   }
   for (const Marker& marker : panel.markers)
     if (!marker.label.empty())
       entry(fmt::format("<path d=\"M{:.1f} {:.1f}v11\" stroke=\"{}\" stroke-width=\"1.4\"{}/>", at + 10, top - 5.5,
-                        marker.colour, marker.dashed ? " stroke-dasharray=\"3 2.5\"" : ""), marker.label);
+                        marker.colour, marker.dashed ? " stroke-dasharray=\"3 2.5\"" : ""),
+            marker.label);
   return out;
 }
 
@@ -178,9 +184,10 @@ std::vector<double> nice_ticks(double low, double high, int count) {
   if (!(high > low) || !std::isfinite(high - low) || count < 1) return ticks;
   const double raw = (high - low) / count, power = std::pow(10.0, std::floor(std::log10(raw)));
   const double lead = raw / power;
-  const double step = (lead <= 1.0 + 1e-9 ? 1 : lead <= 2.0 + 1e-9 ? 2 : lead <= 5.0 + 1e-9 ? 5 : 10) * power;
+  const double step = (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10) * power;
   const double first = std::ceil(low / step - 1e-9);
-  for (double k = first; k * step <= high + 1e-9 * step && ticks.size() < 100; ++k) ticks.push_back(k == 0 ? 0.0 : k * step);
+  for (double k = first; k * step <= high + 1e-9 * step && ticks.size() < 100; ++k)
+    ticks.push_back(k == 0 ? 0.0 : k * step);
   return ticks;
 }
 
@@ -207,7 +214,7 @@ std::string svg(const Chart& chart) {
       chart.width, height, escape_html(chart.title));
   int x_power = 0;
   const std::vector<Tick> x_ticks =
-      linear_ticks(x_low, x_high, std::clamp(static_cast<int>((right - kLeft) / 75), 3, 12), x_power);
+      linear_ticks(x_low, x_high, std::clamp(static_cast<int>((right - kLeft) / 70), 3, 12), x_power);
   double top = kTop + kLegend;
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
     const Panel& panel = chart.panels[i];
@@ -215,7 +222,7 @@ std::string svg(const Chart& chart) {
     const auto [y_low, y_high] = range_of_y(panel);
     const Scale y{y_low, y_high, bottom, top, panel.log_y};
     int y_power = 0;
-    const int wanted = std::clamp(panel.height / 38, 2, 8);
+    const int wanted = std::clamp(panel.height / 32, 3, 8);
     const std::vector<Tick> y_ticks =
         panel.log_y ? log_ticks(y_low, y_high, wanted, y_power) : linear_ticks(y_low, y_high, wanted, y_power);
 
@@ -232,15 +239,17 @@ std::string svg(const Chart& chart) {
     for (const Tick& tick : x_ticks) grid += fmt::format("M{:.1f} {:.1f}V{:.1f}", x(tick.value), top, bottom);
     out += fmt::format("<path d=\"{}\" stroke=\"{}\" stroke-width=\"0.7\"/>", grid, kFaint);
     // A nested svg clips without an id, which would have to differ between all charts of a page.
-    out += fmt::format("<svg x=\"{0}\" y=\"{1:.1f}\" width=\"{2}\" height=\"{3}\" viewBox=\"{0} {1:.1f} {2} {3}\">", kLeft,
-                       top, right - kLeft, panel.height);
+    out += fmt::format("<svg x=\"{0}\" y=\"{1:.1f}\" width=\"{2}\" height=\"{3}\" viewBox=\"{0} {1:.1f} {2} {3}\">",
+                       kLeft, top, right - kLeft, panel.height);
     for (const Marker& marker : panel.markers)
-      out += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}\" stroke=\"{}\" stroke-width=\"1.4\"{}/>", x(marker.x), top, bottom,
-                         marker.colour, marker.dashed ? " stroke-dasharray=\"4 3\"" : "");
+      if (std::isfinite(marker.x))
+        out += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}\" stroke=\"{}\" stroke-width=\"1.4\"{}/>", x(marker.x), top,
+                           bottom, marker.colour, marker.dashed ? " stroke-dasharray=\"4 3\"" : "");
     for (const Series& series : panel.series) out += draw_series(series, panel, x, y);
     out += "</svg>";
-    out += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{}\" height=\"{}\" stroke=\"#8a919b\" stroke-width=\"0.9\"/>", kLeft,
-                       top, right - kLeft, panel.height);
+    out +=
+        fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{}\" height=\"{}\" stroke=\"#8a919b\" stroke-width=\"0.9\"/>",
+                    kLeft, top, right - kLeft, panel.height);
     out += fmt::format("<g fill=\"{}\">{}", kInk, labels);
     out += fmt::format("<text transform=\"translate(13 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text></g>",
                        0.5 * (top + bottom), with_power(panel.y_label, y_power));

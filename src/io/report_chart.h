@@ -11,10 +11,10 @@ namespace birefit {
 struct Series {
   enum class Kind { line, points, bars };
   Kind kind = Kind::line;
-  std::string label;    ///< of the legend; "" = not listed
+  std::string label;         ///< of the legend; "" = not listed
   std::vector<double> x, y;  ///< NaN interrupts a line
   std::string colour;
-  double width = 1.6;   ///< of a line, or the diameter of a point
+  double width = 1.6;  ///< of a line, or the diameter of a point
 };
 
 /// A vertical line across the panel.
@@ -32,7 +32,7 @@ struct Band {
 
 struct Panel {
   std::string y_label;
-  int height = 200;                       ///< of the plotting area
+  int height = 200;  ///< of the plotting area
   bool log_y = false;
   std::optional<std::pair<double, double>> y_range;  ///< else from the series
   std::vector<Series> series;
@@ -41,7 +41,7 @@ struct Panel {
 };
 
 struct Chart {
-  std::string title;   ///< for screen readers
+  std::string title;  ///< for screen readers
   std::string x_label;
   std::optional<std::pair<double, double>> x_range;
   std::vector<Panel> panels;  ///< stacked, one x axis

@@ -40,12 +40,17 @@ inline std::string format_error(double error) {
 inline std::string format_percent(double fraction) {
   if (!std::isfinite(fraction)) return "-";
   const double percent = 100 * std::abs(fraction);
-  return percent >= 1000 ? "> 1000 %" : percent >= 10 ? fmt::format("{:.0f} %", percent) : fmt::format("{:.2g} %", percent);
+  return percent >= 1000 ? "> 1000 %"
+         : percent >= 10 ? fmt::format("{:.0f} %", percent)
+                         : fmt::format("{:.2g} %", percent);
 }
 
 /// "sample.droplet.diameter_um" is "diameter_um"; "micrographs[1].gain" keeps its frame: "gain [1]".
 inline std::string short_name(const std::string& name) {
-  std::string text = name.substr(name.rfind('.') + 1);
+  std::size_t dot = name.rfind('.');
+  // A lone "x" says nothing: "center_px.x".
+  if (dot != std::string::npos && dot > 0 && name.size() - dot <= 3) dot = name.rfind('.', dot - 1);
+  std::string text = name.substr(dot == std::string::npos ? 0 : dot + 1);
   if (name.rfind("micrographs[", 0) == 0) {
     const std::size_t end = name.find(']');
     if (end != std::string::npos) text += " " + name.substr(11, end - 10);
@@ -58,11 +63,21 @@ inline std::string escape_html(const std::string& text) {
   std::string out;
   out.reserve(text.size());
   for (const char c : text) switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      case '\'': out += "&#39;"; break;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
       default:
         // Control characters are not allowed in HTML, whatever a config holds.
         if (static_cast<unsigned char>(c) >= 32 || c == '\n' || c == '\t') out += c;
@@ -74,12 +89,14 @@ inline std::string escape_html(const std::string& text) {
 inline std::string html_number(const std::string& number) {
   std::string out;
   std::size_t i = 0;
+  if (number == "nan" || number == "-nan") return "not known";
   if (number == "inf" || number == "-inf") return number[0] == '-' ? "\u2212\u221e" : "\u221e";
   for (; i < number.size() && number[i] != 'e'; ++i) out += number[i] == '-' ? "\u2212" : std::string(1, number[i]);
   if (i >= number.size() || i == 0 || (number[i - 1] != '.' && (number[i - 1] < '0' || number[i - 1] > '9')))
     return out + number.substr(std::min(i, number.size()));
   const int exponent = std::atoi(number.c_str() + i + 1);
-  return out + "\u2009\u00d7\u200910<sup>" + (exponent < 0 ? "\u2212" : "") + std::to_string(std::abs(exponent)) + "</sup>";
+  return out + "\u2009\u00d7\u200910<sup>" + (exponent < 0 ? "\u2212" : "") + std::to_string(std::abs(exponent)) +
+         "</sup>";
 }
 
 /// "um" is written \u00b5m, "deg" \u00b0.

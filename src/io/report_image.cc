@@ -42,7 +42,8 @@ Rgb colour_of(double t, Colours colours) {
   const std::size_t i = std::min(static_cast<std::size_t>(at), kDiverging.size() - 2);
   Rgb rgb;
   for (int c = 0; c < 3; ++c)
-    rgb[c] = static_cast<unsigned char>(std::lround(kDiverging[i][c] + (at - i) * (kDiverging[i + 1][c] - kDiverging[i][c])));
+    rgb[c] = static_cast<unsigned char>(
+        std::lround(kDiverging[i][c] + (at - i) * (kDiverging[i + 1][c] - kDiverging[i][c])));
   return rgb;
 }
 
@@ -51,8 +52,8 @@ std::string base64(const std::vector<unsigned char>& bytes) {
   std::string out;
   out.reserve((bytes.size() + 2) / 3 * 4);
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const unsigned b = bytes[i] << 16 | (i + 1 < bytes.size() ? bytes[i + 1] << 8 : 0) |
-                       (i + 2 < bytes.size() ? bytes[i + 2] : 0);
+    const unsigned b =
+        bytes[i] << 16 | (i + 1 < bytes.size() ? bytes[i + 1] << 8 : 0) | (i + 2 < bytes.size() ? bytes[i + 2] : 0);
     out += kDigits[b >> 18 & 63];
     out += kDigits[b >> 12 & 63];
     out += i + 1 < bytes.size() ? kDigits[b >> 6 & 63] : '=';
@@ -86,7 +87,8 @@ std::string encode_panel(const ImagePanel& panel, int factor) {
         }
       const bool left_out = 2 * used < all;
       const double mean = !left_out ? used_sum / used : finite > 0 ? sum / finite : std::nan("");
-      Rgb colour = std::isfinite(mean) ? colour_of((mean - panel.low) / (panel.high - panel.low), panel.colours) : kHatchLight;
+      Rgb colour =
+          std::isfinite(mean) ? colour_of((mean - panel.low) / (panel.high - panel.low), panel.colours) : kHatchLight;
       if (left_out) {
         coloured = true;
         const Rgb& hatch = (x + y) % kHatchPeriod < kHatchPeriod / 2 ? kHatchDark : kHatchLight;
@@ -146,19 +148,22 @@ std::string svg(const ImagePanel& panel) {
   // Few pixels: each is a square to be seen. Many: let the browser average.
   const bool pixelated = std::max(values.width(), values.height()) / factor < 1.4 * std::max(width, height);
   out += fmt::format(
-      "<image x=\"0\" y=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" preserveAspectRatio=\"none\"{} href=\"{}\"/>", top, width,
-      height, pixelated ? " style=\"image-rendering:pixelated\"" : "", encode_panel(panel, factor));
-  out += fmt::format("<rect x=\"0\" y=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#8a919b\" "
-                     "stroke-width=\"0.8\"/>", top, width, height);
+      "<image x=\"0\" y=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" preserveAspectRatio=\"none\"{} href=\"{}\"/>", top,
+      width, height, pixelated ? " style=\"image-rendering:pixelated\"" : "", encode_panel(panel, factor));
+  out += fmt::format(
+      "<rect x=\"0\" y=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#8a919b\" "
+      "stroke-width=\"0.8\"/>",
+      top, width, height);
 
   if (panel.line) {
     const double s = width / values.width();
     const auto& [x0, y0, x1, y1] = *panel.line;
-    const std::string points = fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}", (x0 + 0.5) * s, top + (y0 + 0.5) * s, (x1 + 0.5) * s,
-                                           top + (y1 + 0.5) * s);
-    out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"#ffffff\" stroke-opacity=\"0.85\" stroke-width=\"1.8\"/>"
-                       "<path d=\"{}\" fill=\"none\" stroke=\"#c0392b\" stroke-width=\"1\" stroke-dasharray=\"5 3\"/>", points,
-                       points);
+    const std::string points = fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}", (x0 + 0.5) * s, top + (y0 + 0.5) * s,
+                                           (x1 + 0.5) * s, top + (y1 + 0.5) * s);
+    out += fmt::format(
+        "<path d=\"{}\" fill=\"none\" stroke=\"#ffffff\" stroke-opacity=\"0.85\" stroke-width=\"1.8\"/>"
+        "<path d=\"{}\" fill=\"none\" stroke=\"#c0392b\" stroke-width=\"1\" stroke-dasharray=\"5 3\"/>",
+        points, points);
   }
 
   if (panel.pixel_size_um > 0) {
@@ -166,37 +171,49 @@ std::string svg(const ImagePanel& panel) {
     const std::vector<double> ticks = nice_ticks(0, field_um, 5);
     if (ticks.size() > 1) {
       const double length_um = ticks[1], length = length_um / field_um * width, x = 8, y = top + height - 9;
-      const std::string label = length_um < 1 ? fmt::format("{:.3g} nm", 1e3 * length_um)
+      const std::string label = length_um < 1       ? fmt::format("{:.3g} nm", 1e3 * length_um)
                                 : length_um >= 1000 ? fmt::format("{:.3g} mm", 1e-3 * length_um)
                                                     : fmt::format("{:.3g} \u00b5m", length_um);
-      out += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"3\" fill=\"#fff\" stroke=\"#000\" "
-                         "stroke-width=\"0.5\"/>", x, y, length);
-      out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"2.2\" "
-                         "paint-order=\"stroke\" stroke-linejoin=\"round\">{}</text>", x, y - 4, label);
+      out += fmt::format(
+          "<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"3\" fill=\"#fff\" stroke=\"#000\" "
+          "stroke-width=\"0.5\"/>",
+          x, y, length);
+      out += fmt::format(
+          "<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"2.2\" "
+          "paint-order=\"stroke\" stroke-linejoin=\"round\">{}</text>",
+          x, y - 4, label);
     }
   }
 
-  out += fmt::format("<image x=\"{:.1f}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\" preserveAspectRatio=\"none\" href=\"{}\"/>", bar_x,
-                     top, bar_width, bar_height, colour_bar_uri(panel.colours));
-  out += fmt::format("<rect x=\"{:.1f}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#8a919b\" "
-                     "stroke-width=\"0.8\"/>", bar_x, top, bar_width, bar_height);
+  out += fmt::format(
+      "<image x=\"{:.1f}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\" preserveAspectRatio=\"none\" href=\"{}\"/>", bar_x,
+      top, bar_width, bar_height, colour_bar_uri(panel.colours));
+  out += fmt::format(
+      "<rect x=\"{:.1f}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#8a919b\" "
+      "stroke-width=\"0.8\"/>",
+      bar_x, top, bar_width, bar_height);
   // A common power of ten keeps the labels short.
   const double largest = std::max(std::abs(panel.low), std::abs(panel.high));
-  const int power = largest >= 1e5 || (largest > 0 && largest < 1e-2) ? static_cast<int>(std::floor(std::log10(largest))) : 0;
+  const int power =
+      largest >= 1e5 || (largest > 0 && largest < 1e-2) ? static_cast<int>(std::floor(std::log10(largest))) : 0;
   const double scale = std::pow(10.0, power);
   const std::vector<double> ticks =
       nice_ticks(panel.low / scale, panel.high / scale, std::clamp(static_cast<int>(bar_height / 36), 2, 6));
   const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 1;
   for (const double tick : ticks) {
     const double y = top + bar_height * (panel.high - tick * scale) / (panel.high - panel.low);
-    out += fmt::format("<path d=\"M{:.1f} {:.1f}h3\" stroke=\"#5b626c\" stroke-width=\"0.8\"/>"
-                       "<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#2b2f36\">{}</text>",
-                       bar_x + bar_width, y, bar_x + bar_width + 5, y + 3.6, html_number(tick_label(tick, step)));
+    out += fmt::format(
+        "<path d=\"M{:.1f} {:.1f}h3\" stroke=\"#5b626c\" stroke-width=\"0.8\"/>"
+        "<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#2b2f36\">{}</text>",
+        bar_x + bar_width, y, bar_x + bar_width + 5, y + 3.6, html_number(tick_label(tick, step)));
   }
   std::string unit = escape_html(panel.unit);
+  const bool long_unit = unit.size() > 8 || power != 0;
   if (power != 0)
-    unit += fmt::format(" \u00d710<tspan dy=\"-4\" font-size=\"8\">{}{}</tspan>", power < 0 ? "\u2212" : "", std::abs(power));
-  out += fmt::format("<text x=\"{:.1f}\" y=\"10\" text-anchor=\"end\" fill=\"#2b2f36\">{}</text></svg>\n", total - 2, unit);
+    unit += fmt::format(" \u00d710<tspan dy=\"-4\" font-size=\"8\">{}{}</tspan>", power < 0 ? "\u2212" : "",
+                        std::abs(power));
+  out += fmt::format("<text x=\"{:.1f}\" y=\"10\" text-anchor=\"{}\" fill=\"#2b2f36\">{}</text></svg>\n",
+                     long_unit ? total - 2 : bar_x, long_unit ? "end" : "start", unit);
   return out;
 }
 

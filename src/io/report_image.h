@@ -17,16 +17,16 @@ enum class Colours {
 
 struct ImagePanel {
   const Image* values = nullptr;
-  const Mask* mask = nullptr;        ///< pixels left out are hatched; may be null
+  const Mask* mask = nullptr;  ///< pixels left out are hatched; may be null
   Colours colours = Colours::grey;
-  double low = 0, high = 1;          ///< of the colour scale; values beyond take the end's colour
-  std::string unit;                  ///< of the colour bar
-  std::string title;                 ///< for screen readers
-  double pixel_size_um = 0;          ///< for the scale bar; 0 = none
+  double low = 0, high = 1;  ///< of the colour scale; values beyond take the end's colour
+  std::string unit;          ///< of the colour bar
+  std::string title;         ///< for screen readers
+  double pixel_size_um = 0;  ///< for the scale bar; 0 = none
   /// Line drawn over the image: x0, y0, x1, y1 in pixels.
   std::optional<std::array<double, 4>> line;
-  int largest_side_px = 700;         ///< larger images are box-averaged
-  bool wide = false;                 ///< the panel has the page's full width to itself
+  int largest_side_px = 700;  ///< larger images are box-averaged
+  bool wide = false;          ///< the panel has the page's full width to itself
 };
 
 std::string svg(const ImagePanel& panel);

@@ -79,7 +79,7 @@ PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t
 }
 
 Json pixels_json(const PixelCounts& c) {
-  return {{"used", c.used}, {"masked", c.masked}, {"saturated", c.saturated},
+  return {{"used", c.used}, {"masked", c.masked},         {"saturated", c.saturated},
           {"dead", c.dead}, {"non_finite", c.non_finite}, {"outside_roi", c.outside_roi}};
 }
 
@@ -118,7 +118,8 @@ std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
 }
 
 std::string log_text(const Config& config, const FitResult& result) {
-  std::string text = fmt::format("birefit {}\nconfig: {}\n\n{}\n", BIREFIT_VERSION, config.path.string(), summary(result));
+  std::string text =
+      fmt::format("birefit {}\nconfig: {}\n\n{}\n", BIREFIT_VERSION, config.path.string(), summary(result));
   for (const MicrographResult& m : result.micrographs) {
     text += fmt::format("\nmicrograph {}\n  {} pixels used, chi-square {:.6g}, residual rms {:.4g}\n", m.name, m.used,
                         m.chi_square, m.residual_rms);
@@ -137,7 +138,8 @@ std::string log_text(const Config& config, const FitResult& result) {
   text += "\niterations\n       chi-square             step\n";
   for (const Iteration& i : result.iterations)
     text += fmt::format("  {:>3} {:>16.10g} {:>12.4g}\n", i.number, i.chi_square, i.step);
-  text += fmt::format("\n{} evaluations, {:.3f} s\n\nsolver\n{}\n", result.evaluations, result.seconds, result.solver_report);
+  text += fmt::format("\n{} evaluations, {:.3f} s\n\nsolver\n{}\n", result.evaluations, result.seconds,
+                      result.solver_report);
   return text;
 }
 
@@ -159,7 +161,8 @@ std::string fit_json(const Config& config, const FitResult& result) {
     for (const ParameterEstimate& p : result.parameters)
       if (const ParameterRef ref = config.job.parameters.find(p.name); ref && ref.index < std::ssize(rival.theta))
         values[p.name] = number(rival.theta[ref.index]);
-    json["rivals"].push_back({{"odds", number(rival.odds)}, {"chi_square", number(rival.chi_square)}, {"parameters", values}});
+    json["rivals"].push_back(
+        {{"odds", number(rival.odds)}, {"chi_square", number(rival.chi_square)}, {"parameters", values}});
   }
   json["identifiable"] = result.identifiable;
   json["directions"] = Json::array();
@@ -230,8 +233,9 @@ std::string summary(const FitResult& result) {
   for (const ParameterEstimate& p : result.parameters) width = std::max(width, p.name.size());
   for (const ParameterEstimate& p : result.parameters) text += parameter_line(p, width) + "\n";
 
-  text += fmt::format("  reduced chi-square {:.4g} ({} degrees of freedom), residual rms {} of the signal range\n",
-                      result.reduced_chi_square, result.degrees_of_freedom, format_percent(overall_residual_rms(result)));
+  text +=
+      fmt::format("  reduced chi-square {:.4g} ({} degrees of freedom), residual rms {} of the signal range\n",
+                  result.reduced_chi_square, result.degrees_of_freedom, format_percent(overall_residual_rms(result)));
 
   struct Pair {
     double correlation;
@@ -253,7 +257,8 @@ std::string summary(const FitResult& result) {
     text += fmt::format("    {:+.{}f}  {}\n", pairs[i].correlation, digits, pairs[i].names);
   }
   if (pairs.size() > kListedCorrelations)
-    text += fmt::format("    and {} more above {} in fit.json\n", pairs.size() - kListedCorrelations, kNotableCorrelation);
+    text +=
+        fmt::format("    and {} more above {} in fit.json\n", pairs.size() - kListedCorrelations, kNotableCorrelation);
 
   if (!result.verdict.empty()) text += result.verdict + "\n";
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
@@ -264,7 +269,8 @@ void write_results(const std::filesystem::path& folder, const Config& config, co
   std::error_code code;
   std::filesystem::create_directories(folder, code);
   if (code || !std::filesystem::is_directory(folder, code))
-    throw UserError({folder.string()}, "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
+    throw UserError({folder.string()},
+                    "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
                     "choose another --out");
   std::vector<FileContent> files;
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {

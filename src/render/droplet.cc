@@ -37,18 +37,24 @@ RimTable::RimTable(double index_ratio, double host_index, double objective_na) :
   psi_max_ = inside;
   rho_max_ = rho_over_radius(psi_max_);
   // psi against t = sqrt(1 - rho / rho_max): smooth through the rim, where rho(psi) has its square-root end.
+  // Newton from the neighbour before; rho(psi) is monotone, and what little error is left is Newton's again in trace().
+  psi_[0] = psi_max_;
   double psi = psi_max_;
-  for (int i = 0; i <= kNodes; ++i) {
+  for (int i = 1; i < kNodes; ++i) {
     const double t = static_cast<double>(i) / kNodes;
     const double target = rho_max_ * (1 - t * t);
-    double low = 0, high = psi;  // psi falls as t grows
-    for (int k = 0; k < 60 && high - low > 1e-15; ++k) {
-      const double middle = 0.5 * (low + high);
-      (rho_over_radius(middle) < target ? low : high) = middle;
+    psi = std::max(psi - (i == 1 ? psi_max_ * 0.5 / kNodes : psi_[static_cast<std::size_t>(i - 2)] - psi), 0.5 * psi);
+    for (int k = 0; k < 6; ++k) {
+      const double s1 = std::sin(psi), c1 = std::cos(psi), s2 = ratio_ * s1, c2 = std::sqrt(std::max(1e-14, 1 - s2 * s2));
+      const double sd = s1 * c2 - c1 * s2, cd = c1 * c2 + s1 * s2, c = 1 - 2 * sd * sd;
+      const double slope = c1 / c + 4 * s1 * sd * cd * (1 - ratio_ * c1 / c2) / (c * c);
+      const double change = (s1 / c - target) / slope;
+      psi = std::clamp(psi - change, 0.5 * psi, psi_[static_cast<std::size_t>(i - 1)]);
+      if (std::abs(change) < 1e-9) break;
     }
-    psi = 0.5 * (low + high);
-    psi_[static_cast<std::size_t>(i)] = i == 0 ? psi_max_ : i == kNodes ? 0.0 : psi;
+    psi_[static_cast<std::size_t>(i)] = psi;
   }
+  psi_[kNodes] = 0;
 }
 
 double RimTable::rho_over_radius(double psi) const {
@@ -67,10 +73,11 @@ double RimTable::psi_at(double rho_over_radius) const {
 template <class S>
 DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho_um) {
   using P = PlainOf<S>;
-  // Start from the table, then one Newton step on the value and one that also carries the derivatives.
+  // The table's linear interpolation is within 1e-5 rad, so one Newton step leaves 1e-10.
+  constexpr int kNewtonSteps = 1;
   P start;
   {
-    const P scaled = plain(rho_um) / plain(o.radius_um);
+    const P scaled = plain(rho_um) * inverse(plain(o.radius_um));
     if constexpr (kLanesOf<S> == 1) {
       start = rim.psi_at(scaled);
     } else {
@@ -87,33 +94,32 @@ DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho
     using T = decltype(psi);
     sin_cos(psi, r.sin_out, r.cos_out);
     r.sin_in = ratio * r.sin_out;
-    r.cos_in = sqrt(max_of(T(1.0) - r.sin_in * r.sin_in, T(1e-14)));
+    r.cos_in = root(max_of(T(1.0) - r.sin_in * r.sin_in, T(1e-14)));
     r.sin_deflection = r.sin_out * r.cos_in - r.cos_out * r.sin_in;
     r.cos_deflection = r.cos_out * r.cos_in + r.sin_out * r.sin_in;
     r.cos_twice = 1.0 - 2.0 * r.sin_deflection * r.sin_deflection;
     const T sin_twice = 2.0 * r.sin_deflection * r.cos_deflection;
-    r.rho_um = radius * r.sin_out / r.cos_twice;
+    const T secant = inverse(r.cos_twice);
+    r.rho_um = radius * r.sin_out * secant;
     // d rho / d psi
-    r.slope_um = radius * (r.cos_out / r.cos_twice + 2.0 * r.sin_out * sin_twice *
-                                                         (1.0 - ratio * r.cos_out / r.cos_in) /
-                                                         (r.cos_twice * r.cos_twice));
+    r.slope_um = radius * secant *
+                 (r.cos_out + 2.0 * r.sin_out * sin_twice * secant * (1.0 - ratio * r.cos_out * inverse(r.cos_in)));
   };
   const P ratio = plain(o.ratio), radius = plain(o.radius_um);
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < kNewtonSteps; ++i) {
     DropletRay<P> r;
     geometry(start, ratio, radius, r);
-    start = start - (r.rho_um - plain(rho_um)) / r.slope_um;
+    start = start - (r.rho_um - plain(rho_um)) * inverse(r.slope_um);
     start = min_of(max_of(start, P(0.0)), limit);
   }
-  DropletRay<P> at_start;
-  geometry(start, ratio, radius, at_start);
   S psi(start);
   if constexpr (ScalarTraits<S>::derivatives > 0) {
     // d psi = (d rho_wanted - d rho(psi; parameters)) / slope: implicit function theorem.
     DropletRay<S> first;
     geometry(S(start), o.ratio, o.radius_um, first);
+    const P inverse_slope = inverse(plain(first.slope_um));
     for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
-      psi.d[j] = (rho_um.d[j] - first.rho_um.d[j]) / at_start.slope_um;
+      psi.d[j] = (rho_um.d[j] - first.rho_um.d[j]) * inverse_slope;
   }
   geometry(psi, o.ratio, o.radius_um, ray);
   return ray;
@@ -160,10 +166,11 @@ Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const T
     // to the surface, so s is ordinary and p sees q_e = (n_o/n_e) sqrt(n_e^2 - kappa^2), Y = n_o^2 / q_e.
     const S s1 = o.n_host * r.cos_out, s2 = o.n_o * r.cos_in;
     const S kappa = o.n_host * r.sin_out;
-    const S p1 = o.n_host / r.cos_out, p2 = o.n_o * o.n_e / sqrt(o.n_e * o.n_e - kappa * kappa);
+    const S p1 = o.n_host * inverse(r.cos_out), p2 = o.n_o * o.n_e * inverse_root(o.n_e * o.n_e - kappa * kappa);
     const S sum_s = s1 + s2, sum_p = p1 + p2;
-    const S t_s = 4.0 * s1 * s2 / (sum_s * sum_s), t_p = 4.0 * p1 * p2 / (sum_p * sum_p);
-    const S t_sp = sqrt(t_s * t_p);
+    const S over_s = inverse(sum_s), over_p = inverse(sum_p);
+    const S t_s = 4.0 * s1 * s2 * over_s * over_s, t_p = 4.0 * p1 * p2 * over_p * over_p;
+    const S t_sp = root(t_s * t_p);
     jones = {t_p * jones.a, t_sp * jones.b, t_sp * jones.c, t_s * jones.d};
   }
   return jones;
@@ -193,7 +200,9 @@ class DropletModel final : public PixelModel<S> {
 
   S intensity(const P& column, const P& row) const override {
     const S x = (S(column) - center_x_) * pixel_um_, y = (center_y_ - S(row)) * pixel_um_;
-    const S rho = sqrt(x * x + y * y + S(1e-18));
+    const S rho2 = x * x + y * y + S(1e-18);
+    const S inverse_rho = inverse_root(rho2);
+    const S rho = rho2 * inverse_rho;
     // Light that passes beside the droplet; the edge is averaged over a pixel.
     const S coverage = min_of(max_of((rho - optics_.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
     const S beside = open_ * coverage;
@@ -203,16 +212,15 @@ class DropletModel final : public PixelModel<S> {
     const S radius = select(inside, rho, S(plain(rim_um_) * P(0.5)));
     const DropletRay<S> ray = trace(optics_, rim_, radius);
     const Mat2<S> jones = droplet_jones(optics_, ray, method_, mesh_, twisted_);
-    const S inverse_rho = 1.0 / rho;
     const S cr = x * inverse_rho, sr = y * inverse_rho;
     const S p_r = polarizers_.px * cr + polarizers_.py * sr, p_f = polarizers_.py * cr - polarizers_.px * sr;
     S a_r = polarizers_.ax * cr + polarizers_.ay * sr;
     const S a_f = polarizers_.ay * cr - polarizers_.ax * sr;
     // Ray tube: flux through the mid plane is b db / (rho drho) of the incident, |E|^2 = flux / cos(2 delta).
-    S tube = optics_.radius_um * ray.cos_out * ray.cos_twice / ray.slope_um;
+    S tube = optics_.radius_um * ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
     if (!aplanatic_) {
       a_r = a_r * ray.cos_twice;  // the transverse part of the p field
-      tube = tube / ray.cos_twice;
+      tube = tube * inverse(ray.cos_twice);
     }
     const Complex<S> field = a_r * (p_r * jones.a + p_f * jones.b) + a_f * (p_r * jones.c + p_f * jones.d);
     return beside + select(inside, tube * norm(field), S(0.0));

@@ -19,7 +19,7 @@ class RimTable {
   double psi_at(double rho_over_radius) const;          ///< within 1e-5 rad
 
  private:
-  static constexpr int kNodes = 1024;
+  static constexpr int kNodes = 512;
   double ratio_, psi_max_ = 0, rho_max_ = 0;
   std::array<double, kNodes + 1> psi_{};
 };

@@ -105,10 +105,10 @@ template <class S>
 BIREFIT_INLINE Vec3<S> su2_generator(const OpticalPoint<S>& p, const S& k0) {
   const S de = p.extraordinary - p.ordinary;
   const S denominator = p.ordinary + de * p.axis.z * p.axis.z;
-  const S inverse_d = 1.0 / denominator;
-  const S n_o = sqrt(p.ordinary);
-  const S n_eff = n_o * sqrt(p.extraordinary * inverse_d);
-  const S half = 0.5 * k0 * p.depth_slope_um * p.ordinary * de * inverse_d / (n_o + n_eff);
+  const S inverse_d = inverse(denominator);
+  const S n_o = root(p.ordinary);
+  const S n_eff = n_o * root(p.extraordinary * inverse_d);
+  const S half = 0.5 * k0 * p.depth_slope_um * p.ordinary * de * inverse_d * inverse(n_o + n_eff);
   return {half * (2.0 * p.axis.x * p.axis.y), S(0.0), half * (p.axis.x * p.axis.x - p.axis.y * p.axis.y)};
 }
 template <class S>
@@ -116,10 +116,10 @@ BIREFIT_INLINE Vec3<S> su2_generator_e_and_h(const OpticalPoint<Slope<S>>& p, co
   const S ax = p.axis.x.value, ay = p.axis.y.value, az = p.axis.z.value;
   const S eo = p.ordinary.value, ee = p.extraordinary.value;
   const S de = ee - eo;
-  const S inverse_d = 1.0 / (eo + de * az * az);
-  const S n_o = sqrt(eo);
-  const S n_eff = n_o * sqrt(ee * inverse_d);
-  const S inverse_sum = 1.0 / (n_o + n_eff);
+  const S inverse_d = inverse(eo + de * az * az);
+  const S n_o = root(eo);
+  const S n_eff = n_o * root(ee * inverse_d);
+  const S inverse_sum = inverse(n_o + n_eff);
   const S g = eo * de * inverse_d * inverse_sum;
   const S half = 0.5 * k0 * p.depth_slope_um.value * g;
   const S cross = ax * p.axis.y.d[0] - ay * p.axis.x.d[0];
@@ -136,7 +136,7 @@ template <class S>
 BIREFIT_INLINE S retardance_per_length(const OpticalPoint<S>& p) {
   const S de = p.extraordinary - p.ordinary;
   const S denominator = p.ordinary + de * p.axis.z * p.axis.z;
-  const S n_o = sqrt(p.ordinary);
+  const S n_o = root(p.ordinary);
   const S n_eff = n_o * sqrt(p.extraordinary / denominator);
   return p.ordinary * de * (p.axis.x * p.axis.x + p.axis.y * p.axis.y) / (denominator * (n_o + n_eff));
 }

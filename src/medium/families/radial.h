@@ -16,13 +16,13 @@ struct Chord {
   S q, half_q;  // q and S q
 
   Chord(const S& impact, const S& half, const S& radius)
-      : impact_um(impact), radius_um(radius), inverse_radius(1.0 / radius), q(4.0 * impact / half + 0.01), half_q(half * q) {}
+      : impact_um(impact), radius_um(radius), inverse_radius(inverse(radius)), q(4.0 * impact * inverse(half) + 0.01), half_q(half * q) {}
   /// Depth along the ray from the chord's middle and its slope d s / d u, for w = 2u - 1.
   template <class T>
   BIREFIT_INLINE void place(const T& w, T& s_um, T& slope_um) const {
     const auto behind = plain(w) < PlainOf<T>(0.0);
     const T size = select(behind, -w, w);
-    const T f = 1.0 / (T(q) + 1.0 - size);
+    const T f = inverse(T(q) + 1.0 - size);
     const T distance = T(half_q) * size * f;
     s_um = select(behind, -distance, distance);
     slope_um = 2.0 * T(half_q) * (T(q) + 1.0) * f * f;
@@ -41,7 +41,7 @@ struct RadialLaw {
     chord.place(u, s, slope);  // w = u: from the middle to the surface
     const T b = T(chord.impact_um);
     // + (1e-9 R)^2: the ray exactly through the defect keeps finite values; its retardance is zero there anyway.
-    const T inverse_r = 1.0 / sqrt(s * s + b * b + T(chord.radius_um * chord.radius_um * 1e-18));
+    const T inverse_r = inverse_root(s * s + b * b + T(chord.radius_um * chord.radius_um * 1e-18));
     return {{b * inverse_r, T(0.0), s * inverse_r}, T(ordinary), T(extraordinary), T(0.0), T(0.0), slope};
   }
 };
@@ -59,7 +59,7 @@ struct TwistedRadialLaw {
     chord.place(2.0 * u - 1.0, s, slope);
     const T b = T(chord.impact_um), sd = T(sin_deflection), cd = T(cos_deflection);
     const T r2 = s * s + b * b + T(chord.radius_um * chord.radius_um * 1e-18);
-    const T inverse_r = 1.0 / sqrt(r2);
+    const T inverse_r = inverse_root(r2);
     const T n_t = b * inverse_r, n_k = s * inverse_r;
     T sn, cs;
     sin_cos(T(twist_rad) * (1.0 - r2 * inverse_r * T(chord.inverse_radius)), sn, cs);

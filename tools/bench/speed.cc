@@ -1,0 +1,132 @@
+// Speed of the forward model and of a fit, as medians of interleaved runs and as ratios within this one run:
+//   build/release/tools/bench/birefit_bench [rounds]
+// Every figure of docs/methods.md's section on speed comes from here.
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "birefit/fit.h"
+#include "birefit/render.h"
+#include "independent_droplet.h"
+#include "render/pixel_model.h"
+
+using namespace birefit;
+
+namespace {
+
+double seconds_of(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+struct DropletScene {
+  ParameterTable table;
+  Scene scene;
+  std::vector<int> four;
+};
+/// 500 x 500 pixels, E12, 9.3 um in 1.43 at 590 nm; twisted: the fully coupled scene.
+DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
+  DropletScene s;
+  Droplet droplet;
+  droplet.diameter_um = s.table.add_constant("diameter_um", 9.3);
+  if (twisted) droplet.director.twist_deg = s.table.add_constant("twist_deg", 60);
+  s.scene.sample = droplet;
+  ConstantIndices material;
+  material.ordinary = s.table.add_constant("ordinary", 1.52);
+  material.birefringence = s.table.add_constant("birefringence", 0.22);
+  s.scene.material = material;
+  s.scene.surround_index = s.table.add_constant("index", 1.43);
+  s.scene.microscope.wavelength_nm = s.table.add_constant("wavelength_nm", 590);
+  s.scene.microscope.polarizer_deg = s.table.add_constant("polarizer_deg", 0);
+  s.scene.microscope.analyzer_deg = s.table.add_constant("analyzer_deg", 90);
+  s.scene.view.width = s.scene.view.height = size;
+  s.scene.view.pixel_size_um = pixel_um;
+  s.scene.view.center_x_px = s.table.add_constant("center_x", 0.5 * size + 0.3);
+  s.scene.view.center_y_px = s.table.add_constant("center_y", 0.5 * size - 0.2);
+  s.four = {droplet.diameter_um.index, material.birefringence.index, s.scene.view.center_x_px.index,
+            s.scene.view.center_y_px.index};
+  return s;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int rounds = argc > 1 ? std::atoi(argv[1]) : 11;
+  std::printf("%u threads, %d doubles a lane pack, %d rounds, medians\n", std::thread::hardware_concurrency(), kLanes, rounds);
+  for (const bool twisted : {false, true}) {
+    const DropletScene s = droplet_scene(twisted, 500, 0.025);
+    const Theta theta = s.table.values();
+    const RenderPlan p = plan(s.scene, theta);
+    std::vector<double> both, one, four, scalar;
+    for (int i = 0; i < rounds; ++i) {
+      both.push_back(seconds_of([&] { render(s.scene, p, theta); }));
+      one.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 1); }));
+      four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four); }));
+      if (i < 3) scalar.push_back(seconds_of([&] { render_scalar(s.scene, p, theta); }));
+    }
+    std::printf("500 x 500 %s droplet (%s, %d steps, accuracy %.0e):\n", twisted ? "twisted" : "radial", p.method.c_str(), p.steps,
+                s.scene.intensity_accuracy);
+    std::printf("  image, all threads            %8.2f ms\n", 1e3 * median(both));
+    std::printf("  image, one thread             %8.2f ms\n", 1e3 * median(one));
+    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image\n", 1e3 * median(four), median(four) / median(both));
+    std::printf("  one ray at a time, one thread %8.2f ms   %.2f times the lanes\n", 1e3 * median(scalar), median(scalar) / median(one));
+  }
+
+  // A whole fit: 256 x 256, six free parameters, the scan included.
+  DropletScene s = droplet_scene(false, 256, 0.05);
+  testing::IndependentDroplet truth;
+  truth.center_x_px = 129.3;
+  truth.center_y_px = 125.8;
+  std::vector<double> mean;
+  for (int row = 0; row < 256; ++row)
+    for (int column = 0; column < 256; ++column) mean.push_back(150 + 3200 * truth.pixel(column, row, 2));
+  const std::vector<double> counts = testing::camera(mean, 0.5, 4.0, 7);
+  const auto free = [&](int index, double value, double low, double high) {
+    Parameter& parameter = s.table[index];
+    parameter.free = true;
+    parameter.value = value;
+    parameter.lower = low;
+    parameter.upper = high;
+  };
+  free(s.four[0], 9.0, 8.0, 10.5);
+  free(s.four[1], 0.15, 0.05, 0.4);
+  free(s.four[2], 130, 110, 150);
+  free(s.four[3], 126, 106, 146);
+  Micrograph micrograph;
+  micrograph.name = "synthetic";
+  micrograph.values = Image(256, 256);
+  micrograph.values.values() = counts;
+  micrograph.mask = Mask(256, 256, 1);
+  for (const char* name : {"gain", "offset"}) {
+    Parameter parameter;
+    parameter.name = name;
+    parameter.free = parameter.automatic = parameter.linear = true;
+    (std::string(name) == "gain" ? micrograph.gain : micrograph.offset) = s.table.add(parameter);
+  }
+  micrograph.scene = s.scene;
+  FitJob job;
+  job.parameters = s.table;
+  job.micrographs = {micrograph};
+  std::vector<double> times;
+  FitResult result;
+  for (int i = 0; i < 3; ++i) times.push_back(seconds_of([&] { result = fit(job); }));
+  std::printf("fit of a 256 x 256 droplet, six parameters, scan included: %.2f s, %d evaluations, %s\n", median(times),
+              result.evaluations, result.has_answer() ? "converged" : "NO ANSWER");
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  std::printf("peak memory %.0f MB\n", static_cast<double>(usage.ru_maxrss) / 1024);
+}
