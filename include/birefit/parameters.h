@@ -65,10 +65,10 @@ struct JointPrior {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
   double degrees_of_freedom = std::numeric_limits<double>::infinity();  ///< of the fit that made it: Student t
-  /// Relative standard deviation of one frame's own misfit, as the earlier fit measured it between its frames
-  /// (FitResult::frame_scatter), keyed like FrameScatter; nothing when it had a single frame.
+  /// What one whole frame is off by, as the earlier fit measured it between its frames (FitResult::frame_scatter);
+  /// nothing when it had a single frame.
   struct FrameScatter {
-    double intensity_sd = 0;  ///< of a multiplicative error of the model intensity common to one frame
+    double intensity_sd = 0;  ///< of an error added to the model intensity of every pixel of a frame (residual / |gain|)
     double degrees_of_freedom = 0;
   };
   std::optional<FrameScatter> frame_scatter;

@@ -112,6 +112,8 @@ ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::st
   if (!given) make_automatic(reader, ref);
   Parameter& parameter = reader.table[ref];
   if (!std::isfinite(parameter.value)) parameter.value = start;
+  // A negative gain would pass off dark fringes as bright ones, half an order away.
+  if (key == "gain" && parameter.automatic && !std::isfinite(parameter.lower)) parameter.lower = parameter.physical_lower = 0;
   return ref;
 }
 

@@ -16,10 +16,10 @@ namespace {
 struct Drop {
   int width = 160, height = 140;
   double x = 79.3, y = 70.6, radius = 50;
-  double phase_rad = 15;     ///< largest retardance
-  double noise = 0.02;       ///< sd as a fraction of the brightest ring
-  double tilt = 0;           ///< of the background from left to right, same unit
-  bool inverted = false;     ///< parallel polarizers
+  double phase_rad = 15;  ///< largest retardance
+  double noise = 0.02;    ///< sd as a fraction of the brightest ring
+  double tilt = 0;        ///< of the background from left to right, same unit
+  bool inverted = false;  ///< parallel polarizers
   unsigned seed = 1;
 };
 
@@ -41,7 +41,8 @@ Image render_drop(const Drop& drop) {
           const double s = std::sin(2 * std::atan2(v, u)) * std::sin(delta / 2);
           sum += s * s / (kSub * kSub);
         }
-      const double signal = (drop.inverted ? 1 - sum : sum) + drop.tilt * x / drop.width + drop.noise * normal(generator);
+      const double signal =
+          (drop.inverted ? 1 - sum : sum) + drop.tilt * x / drop.width + drop.noise * normal(generator);
       image(x, y) = 100 + 2000 * signal;
     }
   return image;

@@ -35,8 +35,8 @@ using testing::IsEmpty;
 class ImageFile : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) /
-              ("birefit_" + std::to_string(getpid()) + "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ = fs::path(testing::TempDir()) / ("birefit_" + std::to_string(getpid()) + "_" +
+                                              testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
@@ -153,8 +153,8 @@ std::string tiff_bytes(std::vector<Tag> tags, const std::string& data) {
   return bytes + tail;
 }
 std::vector<Tag> tiff_tags(std::uint32_t width, std::uint32_t height, std::uint32_t bits, std::uint32_t photometric) {
-  return {{256, 4, {width}}, {257, 4, {height}}, {258, 3, {bits}}, {259, 3, {1}}, {262, 3, {photometric}},
-          {277, 3, {1}}, {278, 4, {height}}};
+  return {{256, 4, {width}},       {257, 4, {height}}, {258, 3, {bits}},  {259, 3, {1}},
+          {262, 3, {photometric}}, {277, 3, {1}},      {278, 4, {height}}};
 }
 
 std::uint32_t crc32(const std::string& bytes) {
@@ -181,7 +181,8 @@ std::string png_bytes(std::uint32_t width, std::uint32_t height, int bits, int c
   for (const unsigned char c : rows) a = (a + c) % 65521, b = (b + a) % 65521;
   const std::size_t n = rows.size();
   std::string zlib = "\x78\x01\x01";
-  zlib += std::string{char(n & 255), char(n >> 8 & 255), char(~n & 255), char(~n >> 8 & 255)} + rows + put32(b << 16 | a);
+  zlib +=
+      std::string{char(n & 255), char(n >> 8 & 255), char(~n & 255), char(~n >> 8 & 255)} + rows + put32(b << 16 | a);
   std::string header = put32(width) + put32(height) + char(bits) + char(colour_type) + std::string(3, '\0');
   return "\x89PNG\r\n\x1a\n" + png_chunk("IHDR", header) + (palette.empty() ? "" : png_chunk("PLTE", palette)) +
          before_data + png_chunk("IDAT", zlib) + png_chunk("IEND", "");
@@ -256,7 +257,8 @@ TEST_F(ImageFile, RestoresCountsOfPacked12BitTiff) {
   ImageSpec spec(64, 64, 1, TypeDesc::UINT16);
   spec.attribute("oiio:BitsPerSample", 12);
   std::vector<std::uint16_t> counts(4096), expanded(4096);
-  for (int i = 0; i < 4096; ++i) counts[i] = i, expanded[i] = static_cast<std::uint16_t>(std::lround(i * 65535.0 / 4095));
+  for (int i = 0; i < 4096; ++i)
+    counts[i] = i, expanded[i] = static_cast<std::uint16_t>(std::lround(i * 65535.0 / 4095));
   const LoadedImage image = load(write("a.tif", spec, expanded));
   EXPECT_EQ(image.values.values(), std::vector<double>(counts.begin(), counts.end()));
   EXPECT_EQ(image.top_code, 4095);
@@ -371,7 +373,8 @@ TEST_F(ImageFile, MissingFileFolderAndEmptyFileAreTold) {
   EXPECT_THAT(refusal(write_bytes("a.tif", "")), HasSubstr("is empty (zero bytes)"));
   EXPECT_THAT(refusal(write_bytes("b.tif", "hello, this is text")), HasSubstr("no image of a kind birefit reads"));
   EXPECT_THAT(refusal(write_bytes("c.png", "\x89PNG\r\n\x1a\n")), HasSubstr("truncated"));
-  EXPECT_THAT(refusal(write_bytes("d.tif", std::string("II*\0\xff\xff\xff\x7f", 8))), HasSubstr("truncated or damaged"));
+  EXPECT_THAT(refusal(write_bytes("d.tif", std::string("II*\0\xff\xff\xff\x7f", 8))),
+              HasSubstr("truncated or damaged"));
 }
 
 TEST_F(ImageFile, TruncatedAtAnyPlaceIsTruncatedInEveryFormat) {
@@ -399,7 +402,8 @@ TEST_F(ImageFile, DamagedDataIsRefused) {
 }
 
 TEST_F(ImageFile, OneBitIsRefused) {
-  EXPECT_THAT(refusal(write_bytes("a.png", png_bytes(8, 1, 1, 0, std::string("\0\xaa", 2)))), HasSubstr("1 bit per pixel"));
+  EXPECT_THAT(refusal(write_bytes("a.png", png_bytes(8, 1, 1, 0, std::string("\0\xaa", 2)))),
+              HasSubstr("1 bit per pixel"));
   EXPECT_THAT(refusal(write_bytes("a.tif", tiff_bytes(tiff_tags(8, 1, 1, 1), "\xaa"))), HasSubstr("1 bit per pixel"));
 }
 

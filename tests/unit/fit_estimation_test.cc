@@ -1,0 +1,515 @@
+// Facts of statistics that a whole fit must show. Images are made here from closed forms; noise by <random>.
+
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "birefit/fit.h"
+
+namespace birefit {
+namespace {
+
+constexpr double kHalfWave = 1500;
+
+/// A crystal bar between crossed polarizers. Its field grows linearly across the bar by +-tilt, so that one image
+/// holds a range of phases: intensity = sin^2(pi/2 V/V_half (1 + tilt t)), t in [-1, 1] at the image's edges.
+struct Bar {
+  FitJob job;
+  ParameterRef half_wave, bias, tilt, gain, offset, wavelength, zero, crossed, slow;
+
+  explicit Bar(double bias_v = 700, double tilt_value = 0.4) {
+    const auto add = [&](const char* name, double value) {
+      Parameter parameter;
+      parameter.name = name;
+      parameter.value = value;
+      return job.parameters.add(parameter);
+    };
+    half_wave = add("sample.crystal.half_wave_voltage_v", kHalfWave);
+    bias = add("sample.crystal.bias_v", bias_v);
+    tilt = add("sample.crystal.field_legendre.c1", tilt_value);
+    gain = add("micrograph.gain", 1);
+    offset = add("micrograph.offset", 0);
+    wavelength = add("microscope.light.wavelength_nm", 1550);
+    zero = add("microscope.polarizer_deg", 0);
+    crossed = add("microscope.analyzer_deg", 90);
+    slow = add("sample.crystal.slow_axis_deg", 45);
+  }
+  void free(ParameterRef ref, double start, double lower, double upper) {
+    job.parameters[ref].free = true;
+    job.parameters[ref].value = start;
+    job.parameters[ref].lower = lower;
+    job.parameters[ref].upper = upper;
+  }
+  void free_linear() {
+    for (const ParameterRef ref : {gain, offset}) job.parameters[ref].free = job.parameters[ref].linear = true;
+  }
+  Micrograph& add_image(int width, int height, ParameterRef bias_ref, bool uniform = false) {
+    Micrograph micrograph;
+    micrograph.name = "frame " + std::to_string(job.micrographs.size());
+    Crystal crystal;
+    crystal.half_wave_voltage_v = half_wave;
+    crystal.bias_v = bias_ref;
+    crystal.slow_axis_deg = slow;
+    if (!uniform) crystal.field_legendre = {tilt};
+    Scene& scene = micrograph.scene;
+    scene.sample = crystal;
+    scene.microscope.wavelength_nm = wavelength;
+    scene.microscope.polarizer_deg = zero;
+    scene.microscope.analyzer_deg = crossed;
+    scene.view.width = width;
+    scene.view.height = height;
+    scene.view.center_x_px = job.parameters.add_constant("cx", 0.5 * (width - 1));
+    scene.view.center_y_px = job.parameters.add_constant("cy", 0.5 * (height - 1));
+    scene.view.rotation_deg = zero;
+    scene.surround_index = job.parameters.add_constant("surround", 1);
+    scene.material = ConstantIndices{job.parameters.add_constant("n", 1), job.parameters.add_constant("dn", 0)};
+    micrograph.values = Image(width, height);
+    micrograph.mask = Mask(width, height, 1);
+    micrograph.gain = gain;
+    micrograph.offset = offset;
+    job.micrographs.push_back(std::move(micrograph));
+    return job.micrographs.back();
+  }
+};
+
+double intensity(double bias, double tilt, int y, int height) {
+  const double t = 2 * (y + 0.5) / height - 1;
+  const double s = std::sin(std::numbers::pi / 2 * bias / kHalfWave * (1 + tilt * t));
+  return s * s;
+}
+
+/// value = gain * intensity + offset + noise(x, y, signal).
+void expose(Micrograph& micrograph, double gain, double offset, double bias, double tilt,
+            const std::function<double(int, int, double)>& noise) {
+  for (int y = 0; y < micrograph.values.height(); ++y)
+    for (int x = 0; x < micrograph.values.width(); ++x) {
+      const double signal = gain * intensity(bias, tilt, y, micrograph.values.height()) + offset;
+      micrograph.values(x, y) = signal + noise(x, y, signal);
+    }
+}
+
+struct Gaussian {
+  std::mt19937_64 random;
+  std::normal_distribution<double> normal;
+  explicit Gaussian(unsigned seed) : random(seed) {}
+  double operator()() { return normal(random); }
+};
+
+int index_of(const FitResult& result, const std::string& name) {
+  for (std::size_t i = 0; i < result.names.size(); ++i)
+    if (result.names[i] == name) return static_cast<int>(i);
+  ADD_FAILURE() << name;
+  return 0;
+}
+const ParameterEstimate& estimate(const FitResult& result, const std::string& name) {
+  return result.parameters[index_of(result, name)];
+}
+
+TEST(Fit, GainAndOffsetAreTheLeastSquaresSolutionWithItsCovariance) {
+  Bar bar(700, 0.4);
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(40, 30, bar.bias);
+  constexpr double kSd = 20;
+  micrograph.noise = NoiseModel{kSd, 0, false};
+  Gaussian gaussian(1);
+  expose(micrograph, 3000, 150, 700, 0.4, [&](int, int, double) { return kSd * gaussian(); });
+  const FitResult result = fit(bar.job);
+
+  // Pixels are means over their area, the model's own: recover it from the fitted image instead of repeating it.
+  Eigen::MatrixXd x(1200, 2);
+  Eigen::VectorXd y(1200);
+  for (int i = 0; i < 1200; ++i) {
+    const double fitted = result.micrographs[0].fitted(i % 40, i / 40);
+    x(i, 0) = (fitted - result.theta[bar.offset.index]) / result.theta[bar.gain.index];
+    x(i, 1) = 1;
+    y[i] = micrograph.values(i % 40, i / 40);
+  }
+  const Eigen::VectorXd expected = x.colPivHouseholderQr().solve(y);
+  EXPECT_NEAR(result.theta[bar.gain.index], expected[0], 1e-8 * expected[0]);
+  EXPECT_NEAR(result.theta[bar.offset.index], expected[1], 1e-8 * expected[0]);
+  const Eigen::MatrixXd covariance = kSd * kSd * (x.transpose() * x).inverse();
+  EXPECT_LT((result.covariance - covariance).norm(), 1e-8 * covariance.norm());
+  EXPECT_TRUE(result.has_answer()) << result.verdict;
+}
+
+TEST(Fit, PriorsPullAsTheAnalyticPosterior) {
+  for (const bool joint : {false, true}) {
+    Bar bar(700, 0.4);
+    bar.free_linear();
+    Micrograph& micrograph = bar.add_image(20, 20, bar.bias);
+    constexpr double kSd = 100;
+    micrograph.noise = NoiseModel{kSd, 0, false};
+    Gaussian gaussian(2);
+    expose(micrograph, 3000, 150, 700, 0.4, [&](int, int, double) { return kSd * gaussian(); });
+    const Eigen::Vector2d mean(2900, 200);
+    Eigen::Matrix2d prior;
+    prior << 20 * 20, -0.99999 * 20 * 10, -0.99999 * 20 * 10, 10 * 10;
+    if (!joint) prior = Eigen::Vector2d(20 * 20, 10 * 10).asDiagonal();
+    bar.job.parameters[bar.gain].value = mean[0];
+    bar.job.parameters[bar.offset].value = mean[1];
+    if (joint) {
+      bar.job.prior = JointPrior{};
+      bar.job.prior->names = {"micrograph.gain", "micrograph.offset"};
+      bar.job.prior->mean = mean;
+      bar.job.prior->covariance = prior;
+    } else {
+      bar.job.parameters[bar.gain].prior_sd = 20;
+      bar.job.parameters[bar.offset].prior_sd = 10;
+    }
+    const FitResult result = fit(bar.job);
+    Eigen::MatrixXd x(400, 2);
+    Eigen::VectorXd y(400);
+    for (int i = 0; i < 400; ++i) {
+      const double fitted = result.micrographs[0].fitted(i % 20, i / 20);
+      x(i, 0) = (fitted - result.theta[bar.offset.index]) / result.theta[bar.gain.index];
+      x(i, 1) = 1;
+      y[i] = micrograph.values(i % 20, i / 20);
+    }
+    const Eigen::Matrix2d precision = prior.inverse();
+    const Eigen::Matrix2d posterior = (x.transpose() * x / (kSd * kSd) + precision).inverse();
+    const Eigen::Vector2d expected = posterior * (x.transpose() * y / (kSd * kSd) + precision * mean);
+    // The nearly singular prior costs five digits of sixteen, in both computations.
+    EXPECT_NEAR(result.theta[bar.gain.index], expected[0], 1e-6 * std::sqrt(posterior(0, 0)) + 1e-8 * expected[0])
+        << joint;
+    EXPECT_NEAR(result.theta[bar.offset.index], expected[1], 1e-4 * std::sqrt(posterior(1, 1))) << joint;
+    EXPECT_LT((result.covariance - posterior).norm(), 1e-6 * posterior.norm()) << joint;
+  }
+}
+
+TEST(Fit, AStartInAnotherFringeOrderIsRecovered) {
+  // Six half waves in the middle, 4.2 to 7.8 across the bar: the start is more than one order off. The tilt is known,
+  // or every order would do: the fringes' spacing tells only bias times tilt.
+  Bar bar(6 * kHalfWave, 0.3);
+  bar.free(bar.bias, 3.6 * kHalfWave, 1 * kHalfWave, 9 * kHalfWave);
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(16, 200, bar.bias);
+  micrograph.noise = NoiseModel{20, 0, false};
+  Gaussian gaussian(3);
+  // A pixel is the mean over its area: 8 Gauss-like midpoints of it are exact to 1e-4 of a count here.
+  for (int y = 0; y < 200; ++y)
+    for (int x = 0; x < 16; ++x) {
+      double mean = 0;
+      for (int k = 0; k < 16; ++k) mean += intensity(6 * kHalfWave, 0.3, 16 * y + k, 3200) / 16;
+      micrograph.values(x, y) = 1000 * mean + 100 + 20 * gaussian();
+    }
+  const FitResult result = fit(bar.job);
+  const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
+  EXPECT_TRUE(result.has_answer()) << result.verdict;
+  EXPECT_NEAR(bias.value, 6 * kHalfWave, 5 * bias.stderr_);
+  EXPECT_LT(bias.stderr_, 0.01 * kHalfWave);
+  EXPECT_FALSE(result.scans.empty());
+}
+
+TEST(Fit, StandardErrorsEqualTheSpreadOverSeeds) {
+  constexpr int kSeeds = 200;
+  double sum = 0, squares = 0, errors = 0, worst = 0;
+  int inflated = 0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    Bar bar;
+    bar.free(bar.bias, 650, 400, 1000);
+    bar.free(bar.tilt, 0.3, 0.1, 0.7);
+    bar.free_linear();
+    Micrograph& micrograph = bar.add_image(24, 24, bar.bias);
+    micrograph.noise = NoiseModel{10, 0.5, false};
+    Gaussian gaussian(1000 + seed);
+    // The noise-free image at 24 x 24, pixel means as above.
+    for (int y = 0; y < 24; ++y)
+      for (int x = 0; x < 24; ++x) {
+        double mean = 0;
+        for (int k = 0; k < 16; ++k) mean += intensity(700, 0.4, 16 * y + k, 384) / 16;
+        const double signal = 3000 * mean + 100;
+        micrograph.values(x, y) = signal + std::sqrt(100 + 0.5 * signal) * gaussian();
+      }
+    const FitResult result = fit(bar.job);
+    const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
+    ASSERT_TRUE(result.has_answer()) << seed << ": " << result.verdict;
+    sum += bias.value;
+    squares += (bias.value - 700) * (bias.value - 700);
+    errors += bias.stderr_;
+    worst = std::max(worst, std::abs(bias.value - 700) / bias.stderr_);
+    inflated += result.covariance_kind.rfind("white noise", 0) != 0;
+  }
+  const double spread = std::sqrt(squares / kSeeds), error = errors / kSeeds;
+  // A spread of 200 draws is known to 5 %: four of that.
+  EXPECT_NEAR(error / spread, 1, 0.2);
+  EXPECT_LT(std::abs(sum / kSeeds - 700), 4 * spread / std::sqrt(kSeeds));
+  EXPECT_LT(worst, 5);
+  EXPECT_LE(inflated, 1);  // expected: none in a million
+}
+
+/// Five frames at known voltages whose means err by `scatter` of the model intensity: what a joint calibration meets.
+FitResult calibrate(unsigned seed, double scatter, int side = 8) {
+  Bar bar(0, 0);
+  bar.free(bar.half_wave, 1400, 1000, 2200);
+  bar.free_linear();
+  bar.job.parameters[bar.gain].value = 0.8;
+  Gaussian gaussian(seed);
+  bar.job.options.threads = 1;
+  for (const double voltage : {200.0, 400.0, 600.0, 800.0, 1000.0}) {
+    const ParameterRef ref = bar.job.parameters.add_constant("bias", voltage);
+    Micrograph& micrograph = bar.add_image(side, side, ref, true);
+    micrograph.noise = NoiseModel{0.002, 0, false};
+    const double frame = scatter * gaussian();
+    expose(micrograph, 0.77, 0.008, voltage, 0, [&](int, int, double) { return 0.77 * frame + 0.002 * gaussian(); });
+  }
+  return fit(bar.job);
+}
+
+TEST(Fit, IntervalsOfFramesThatScatterCoverTheTruth) {
+  constexpr int kRuns = 400;
+  constexpr double kScatter = 0.003;  // the pixel noise leaves 0.0003 to a frame's mean
+  int covered = 0;
+  double variance = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const FitResult result = calibrate(run, kScatter);
+    const ParameterEstimate& half_wave = estimate(result, "sample.crystal.half_wave_voltage_v");
+    ASSERT_TRUE(result.converged) << run;
+    covered += half_wave.interval95_low <= kHalfWave && kHalfWave <= half_wave.interval95_high;
+    if (result.frame_scatter) variance += result.frame_scatter->intensity_sd * result.frame_scatter->intensity_sd;
+  }
+  // 95 % with a sampling error of 1.1 %; the model is a little curved within its errors.
+  EXPECT_GE(covered, 0.90 * kRuns);
+  EXPECT_LE(covered, 0.99 * kRuns);
+  // Two degrees of freedom: the mean of 400 variances is known to 5 %.
+  EXPECT_NEAR(variance / kRuns, kScatter * kScatter, 0.2 * kScatter * kScatter);
+}
+
+TEST(Fit, FramesThatAgreeKeepTheErrorsOfTheirNoise) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    const FitResult result = calibrate(seed, 0);
+    EXPECT_FALSE(result.frame_scatter) << seed;
+    EXPECT_EQ(result.covariance_kind.rfind("white noise", 0), 0u) << result.covariance_kind;
+    EXPECT_GT(result.interval_degrees_of_freedom, 100);
+  }
+}
+
+TEST(Fit, FrameIntervalsCountFrames) {
+  const FitResult result = calibrate(5, 0.02);
+  // Five frames, three parameters; the frames' means hold all there is.
+  EXPECT_NEAR(result.interval_degrees_of_freedom, 2, 0.02);
+  const ParameterEstimate& half_wave = estimate(result, "sample.crystal.half_wave_voltage_v");
+  EXPECT_NEAR((half_wave.interval95_high - half_wave.value) / half_wave.stderr_, 4.303, 0.05);
+}
+
+TEST(Fit, ASingleFrameThroughACalibrationCarriesTheFramesOwnMisfit) {
+  // Gain, offset and half-wave voltage known from elsewhere: the bias' error is the frame scatter over the slope.
+  Bar bar(700, 0);
+  bar.free(bar.bias, 600, 100, 1400);
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(100, 100, bar.bias, true);
+  micrograph.noise = NoiseModel{0.002, 0, false};
+  Gaussian gaussian(4);
+  expose(micrograph, 0.77, 0.008, 700, 0, [&](int, int, double) { return 0.002 * gaussian(); });
+  JointPrior prior;
+  prior.names = {"micrograph.gain", "micrograph.offset"};
+  prior.mean = Eigen::Vector2d(0.77, 0.008);
+  prior.covariance = Eigen::Vector2d(1e-12, 1e-12).asDiagonal();
+  prior.degrees_of_freedom = 2;
+  prior.frame_scatter = JointPrior::FrameScatter{0.002, 2};
+  bar.job.prior = prior;
+  const FitResult result = fit(bar.job);
+  const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
+  const double slope = std::numbers::pi / 2 / kHalfWave * std::sin(std::numbers::pi * 700 / kHalfWave);
+  // Pixel noise adds 2e-5 / 2e-3 squared: nothing.
+  EXPECT_NEAR(bias.stderr_, 0.002 / slope, 0.01 * 0.002 / slope);
+  EXPECT_NEAR(bias.value, 700, 0.2 * bias.stderr_);
+  EXPECT_EQ(result.interval_degrees_of_freedom, 2);
+  EXPECT_TRUE(result.has_answer()) << result.verdict;
+}
+
+TEST(Fit, MisfitSharedByPixelsWidensTheErrors) {
+  const auto run = [](double misfit) {
+    Bar bar;
+    bar.free(bar.bias, 650, 400, 1000);
+    bar.free_linear();
+    Micrograph& micrograph = bar.add_image(64, 64, bar.bias);
+    micrograph.noise = NoiseModel{10, 0, false};
+    Gaussian gaussian(8);
+    expose(micrograph, 3000, 100, 700, 0.4,
+           [&](int x, int y, double) { return 10 * gaussian() + misfit * std::sin(0.4 * x) * std::sin(0.4 * y); });
+    return fit(bar.job);
+  };
+  const FitResult clean = run(0), wrong = run(100);
+  EXPECT_EQ(clean.covariance_kind.rfind("white noise", 0), 0u) << clean.covariance_kind;
+  EXPECT_TRUE(clean.warnings.empty());
+  // Reduced chi-square about 26; patches of 8 x 8 pixels share a sign.
+  const double ratio =
+      estimate(wrong, "sample.crystal.bias_v").stderr_ / estimate(clean, "sample.crystal.bias_v").stderr_;
+  EXPECT_GT(ratio, 2 * std::sqrt(26.0));
+  EXPECT_FALSE(wrong.warnings.empty());
+  EXPECT_NE(wrong.covariance_kind.find("scaled by reduced chi-square"), std::string::npos);
+}
+
+TEST(Fit, MirrorMinimaInsideTheBoundsAreAmbiguous) {
+  Bar bar(700, 0);
+  bar.free(bar.bias, 500, 0, 3000);
+  Micrograph& micrograph = bar.add_image(30, 30, bar.bias, true);
+  micrograph.noise = NoiseModel{0.01, 0, false};
+  Gaussian gaussian(12);
+  expose(micrograph, 1, 0, 700, 0, [&](int, int, double) { return 0.01 * gaussian(); });
+  const FitResult result = fit(bar.job);
+  EXPECT_TRUE(result.ambiguous);
+  ASSERT_EQ(result.rivals.size(), 1u);
+  // sin^2 is even about the half-wave voltage: the two minima are each other's mirror image.
+  EXPECT_NEAR(result.theta[bar.bias.index] + result.rivals[0].theta[bar.bias.index], 2 * kHalfWave, 0.01);
+  EXPECT_NEAR(result.rivals[0].odds, 1, 0.01);
+  EXPECT_FALSE(result.has_answer());
+}
+
+TEST(Fit, AParameterWithoutInfluenceIsNamed) {
+  Bar bar;
+  bar.free(bar.bias, 650, 400, 1000);
+  bar.free(bar.wavelength, 1550, 1000, 2000);  // a crystal's retardance is given in voltages
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  micrograph.noise = NoiseModel{10, 0, false};
+  Gaussian gaussian(21);
+  expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return 10 * gaussian(); });
+  const FitResult result = fit(bar.job);
+  EXPECT_FALSE(result.identifiable);
+  EXPECT_TRUE(std::isnan(estimate(result, "microscope.light.wavelength_nm").stderr_));
+  EXPECT_NE(result.verdict.find("wavelength_nm has no measurable influence"), std::string::npos) << result.verdict;
+  const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
+  // The pixel mean differs from its middle by less than a standard error here.
+  EXPECT_NEAR(bias.value, 700, 5 * bias.stderr_);
+}
+
+TEST(Fit, OneUniformFrameCannotGiveBiasGainAndOffset) {
+  Bar bar(700, 0);
+  bar.free(bar.bias, 650, 100, 1400);
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(32, 32, bar.bias, true);
+  micrograph.noise = NoiseModel{10, 0, false};
+  Gaussian gaussian(22);
+  expose(micrograph, 3000, 100, 700, 0, [&](int, int, double) { return 10 * gaussian(); });
+  const FitResult result = fit(bar.job);
+  EXPECT_FALSE(result.identifiable) << result.verdict;
+  EXPECT_TRUE(std::isnan(estimate(result, "sample.crystal.bias_v").stderr_));
+}
+
+TEST(Fit, NoiseAloneIsNoSignal) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    Bar bar;
+    bar.free(bar.bias, 650, 100, 5000);
+    bar.free_linear();
+    Micrograph& micrograph = bar.add_image(40, 40, bar.bias);
+    Gaussian gaussian(300 + seed);
+    for (double& value : micrograph.values.values()) value = std::round(1000 + 15 * gaussian());
+    const FitResult result = fit(bar.job);
+    EXPECT_FALSE(result.identifiable) << seed << ' ' << result.verdict;
+    EXPECT_NE(result.verdict.find("no signal"), std::string::npos) << result.verdict;
+  }
+}
+
+TEST(Fit, AFlatImageIsNoSignal) {
+  Bar bar;
+  bar.free(bar.bias, 650, 100, 5000);
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(40, 40, bar.bias);
+  for (double& value : micrograph.values.values()) value = 1000;
+  const FitResult result = fit(bar.job);
+  EXPECT_FALSE(result.has_answer());
+  EXPECT_FALSE(result.identifiable) << result.verdict;
+}
+
+TEST(Fit, ABoundThatIsNoPhysicalLimitPins) {
+  Bar bar;
+  bar.free(bar.bias, 450, 300, 500);
+  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  micrograph.noise = NoiseModel{0.01, 0, false};
+  expose(micrograph, 1, 0, 700, 0.4, [](int, int, double) { return 0.0; });
+  const FitResult result = fit(bar.job);
+  EXPECT_TRUE(result.pinned);
+  EXPECT_TRUE(estimate(result, "sample.crystal.bias_v").at_bound);
+  EXPECT_FALSE(result.has_answer());
+}
+
+TEST(Fit, APhysicalLimitGivesAOneSidedLimit) {
+  Bar bar;
+  bar.free(bar.tilt, 0.1, 0, 0.5);
+  bar.job.parameters[bar.tilt].physical_lower = 0;
+  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  micrograph.noise = NoiseModel{0.05, 0, false};
+  // A little beyond the limit, so that the fit must end on it.
+  expose(micrograph, 1, 0, 700, -0.001, [](int, int, double) { return 0.0; });
+  const FitResult result = fit(bar.job);
+  const ParameterEstimate& tilt = estimate(result, "sample.crystal.field_legendre.c1");
+  EXPECT_EQ(tilt.value, 0);
+  EXPECT_FALSE(result.pinned);
+  EXPECT_EQ(tilt.limit, "upper");
+  // At the limit exactly the one-sided 95 % point of half a normal is 1.96; further out it is less.
+  EXPECT_GT(tilt.limit_value, 0);
+  EXPECT_LE(tilt.limit_value, 1.96 * tilt.stderr_ * (1 + 1e-6));
+  EXPECT_TRUE(result.has_answer()) << result.verdict;
+}
+
+TEST(Fit, GainBoundsAreHonouredByTheExactSolution) {
+  Bar bar(700, 0.4);
+  bar.free_linear();
+  bar.job.parameters[bar.gain].upper = 2500;
+  Micrograph& micrograph = bar.add_image(20, 20, bar.bias);
+  micrograph.noise = NoiseModel{10, 0, false};
+  expose(micrograph, 3000, 150, 700, 0.4, [](int, int, double) { return 0.0; });
+  const FitResult result = fit(bar.job);
+  EXPECT_EQ(result.theta[bar.gain.index], 2500);
+  // The offset of the rest: mean(value - 2500 intensity).
+  double mean = 0;
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 20; ++x)
+      mean += (micrograph.values(x, y) - result.micrographs[0].fitted(x, y) + result.theta[bar.offset.index]) / 400;
+  EXPECT_NEAR(result.theta[bar.offset.index], mean, 1e-9 * 3000);
+  EXPECT_TRUE(result.pinned);
+}
+
+TEST(Fit, AnInterruptionGivesTheBestStateSoFar) {
+  Bar bar;
+  bar.free(bar.bias, 650, 400, 1000);
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  expose(micrograph, 3000, 100, 700, 0.4, [](int x, int y, double) { return (x * 7 + y * 13) % 5; });
+  std::atomic<bool> stop = true;
+  bar.job.options.interrupted = &stop;
+  const FitResult result = fit(bar.job);
+  EXPECT_TRUE(result.interrupted);
+  EXPECT_FALSE(result.converged);
+  EXPECT_FALSE(result.has_answer());
+  ASSERT_EQ(result.micrographs.size(), 1u);
+  EXPECT_EQ(result.micrographs[0].fitted.width(), 32);
+  EXPECT_GE(result.theta[bar.bias.index], 400);
+  EXPECT_LE(result.theta[bar.bias.index], 1000);
+  EXPECT_NE(result.verdict.find("interrupted"), std::string::npos);
+}
+
+TEST(Fit, GivesTheSameBitsWithOneAndTwoThreads) {
+  const auto run = [](int threads) {
+    Bar bar;
+    bar.job.options.threads = threads;
+    bar.free(bar.bias, 500, 100, 4000);
+    bar.free(bar.tilt, 0.3, 0.1, 0.7);
+    bar.free_linear();
+    Micrograph& micrograph = bar.add_image(64, 64, bar.bias);
+    Gaussian gaussian(17);
+    expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return std::round(20 * gaussian()); });
+    return fit(bar.job);
+  };
+  const FitResult one = run(1), two = run(2);
+  EXPECT_EQ(one.theta, two.theta);
+  EXPECT_EQ(one.covariance, two.covariance);
+  EXPECT_EQ(one.evaluations, two.evaluations);
+}
+
+TEST(Fit, AnImageWithoutUsablePixelsIsTheUsersMistake) {
+  Bar bar;
+  bar.free(bar.bias, 500, 100, 4000);
+  Micrograph& micrograph = bar.add_image(16, 16, bar.bias);
+  micrograph.mask = Mask(16, 16, 0);
+  EXPECT_THROW(fit(bar.job), UserError);
+}
+
+}  // namespace
+}  // namespace birefit
