@@ -88,7 +88,9 @@ double phase_free_distance(const M& a, const M& b) {
 
 TEST(TransportLaws, NothingHappensWithoutBirefringence) {
   for_each_method([](const auto& method, Continuity c) {
-    const LawColumn<double, TiltTwistLaw> column(kIsotropic);
+    TiltTwistLaw law = kIsotropic;
+    if (!coupled(method)) law.azimuth1 = 0;  // an axis that turns is not its column, seen or not
+    const LawColumn<double, TiltTwistLaw> column(law);
     const Ray<double> ray = normal_ray(c);
     // 60 rad of phase in up to 1,000 products: 1e-12.
     EXPECT_LT(phase_free_distance(method.transfer(column, ray, uniform_mesh(64)), M::identity()), 1e-12);
@@ -168,7 +170,8 @@ TEST(TransportLaws, MeasuredOrderIsTheDeclaredOne) {
 }
 // Dropping the backward wave at n faces of height ~ 1/n leaves an error ~ n (1/n)^2.
 TEST(TransportLaws, LayersWithEAndHContinuousConvergeAtFirstOrder) {
-  const double order = measured_order(transport_method<double>("layers_midpoint"), oblique_ray(Continuity::e_and_h), 1024);
+  const double order = measured_order(transport_method<double>("layers_midpoint"), oblique_ray(Continuity::e_and_h), 8192);
+  // The 1/n^2 of the layers' middles is as large as the 1/n of the faces at 1,024 layers (1.4 there), an eighth at 8,192.
   EXPECT_GT(order, 0.8);
   EXPECT_LT(order, 1.3);
 }
