@@ -44,8 +44,8 @@ struct LoadedImage {
   std::vector<std::string> notes;  ///< "alpha channel ignored", ...
 };
 
-/// Throws UserError: missing, truncated, empty, 1-bit, animated, palette, over 16384 x 16384 images; several pages or
-/// colour channels and none chosen (the message lists them).
+/// Throws UserError: missing, truncated, empty, 1-bit, animated, over 16384 x 16384 images; several pages or
+/// colour channels and none chosen (the message lists them). Palette images are expanded to colours, with a note.
 LoadedImage load_image(const ImageRequest& request);
 
 /// .tif, .exr: float; .png: 16-bit, value 1.0 = 65535 * scale. Written to a temporary name and renamed.

@@ -96,9 +96,7 @@ JointPrior load_prior(const std::filesystem::path& path, const std::vector<std::
   if (!scaled.isApprox(scaled.transpose(), 1e-6) || Eigen::LLT<Eigen::MatrixXd>(scaled).info() != Eigen::Success)
     throw UserError(where, "the covariance in " + file + " is not symmetric and positive definite");
 
-  const json& intervals = root.contains("intervals") ? root["intervals"] : json();
-  std::optional<double> freedom = number_at(root, "degrees_of_freedom_interval");
-  if (!freedom) freedom = number_at(intervals, "degrees_of_freedom_interval");
+  const std::optional<double> freedom = number_at(root, "interval_degrees_of_freedom");
   if (freedom && *freedom > 0) prior.degrees_of_freedom = *freedom;
   if (root.contains("frame_scatter")) {
     const std::optional<double> intensity_sd = number_at(root["frame_scatter"], "intensity_sd");

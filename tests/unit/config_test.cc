@@ -301,7 +301,7 @@ TEST_F(Config, ReadsAJointPrior) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   write("fit.json", R"({"converged": true, "parameters": {"sample.crystal.half_wave_voltage_v": {"value": 1490},
-    "micrograph.gain": {"value": 0.77}}, "degrees_of_freedom_interval": 4,
+    "micrograph.gain": {"value": 0.77}}, "interval_degrees_of_freedom": 4,
     "frame_scatter": {"intensity_sd": 0.01, "degrees_of_freedom": 3},
     "covariance": {"names": ["micrograph.gain", "sample.crystal.half_wave_voltage_v"], "matrix": [[1e-4, 0.9e-2], [0.9e-2, 1]]}})");
   const std::string prior = "prior: {from: fit.json, parameters: [sample.crystal.half_wave_voltage_v, micrograph.gain]}\n";

@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# Real images of a biased crystal: calibrated on known voltages, does the fit find the others, inside its own intervals?
+# usage: real_pockels.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with pockels_czt/, default ../shared/data/real
+set -u
+birefit=$(realpath "$1")
+source=$(realpath "$2")
+data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/../shared/data/real}")
+if [ ! -f "$data/pockels_czt/led_data/Bias_-0700V.png" ]; then
+  echo "skipped: no real images at $data (docs/tutorial_pockels.md says where to get them; set BIREFIT_REAL_DATA)"
+  exit 77
+fi
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir "$work/configs"
+for name in calibrate calibrate_low bias; do
+  sed "s#\.\./\.\./shared/data/real#$data#g" "$source/fit_configs/pockels_$name.yaml" > "$work/configs/pockels_$name.yaml" || exit 1
+done
+sed 's#out/pockels_calibrate/#out/pockels_calibrate_low/#' "$work/configs/pockels_bias.yaml" > "$work/configs/pockels_bias_low.yaml"
+cd "$work" || exit 1
+failures=0
+
+run() { # NAME CONFIG [OPTIONS]: exit code 0 = an answer, neither ambiguous nor at a bound
+  local name=$1 config=$2
+  shift 2
+  "$birefit" fit "configs/$config.yaml" "$@" --out "out/$name" > "$name.txt" 2>&1
+  local code=$?
+  [ $code -eq 0 ] && return
+  echo "FAIL $name: exit code $code"
+  cat "$name.txt"
+  failures=$((failures + 1))
+}
+
+# check NAME TRUTH ERROR_PERCENT HALF_WIDTH_PERCENT: the line of bias_v in the summary against the truth
+check() {
+  awk -v name="$1" -v truth="$2" -v most="$3" -v widest="$4" '
+    $1 == "sample.crystal.bias_v" {
+      found = 1; value = $3 + 0; low = high = $0
+      sub(/.*\[95%: */, "", low); sub(/ .*/, "", low)
+      sub(/.*\.\. */, "", high); sub(/\].*/, "", high); low += 0; high += 0
+      error = 100 * (value - truth) / truth; half = 50 * (high - low) / truth
+      bad = ""
+      if (error > most || -error > most) bad = bad " error over " most " %;"
+      if (!(low <= truth && truth <= high)) bad = bad " truth outside its interval;"
+      if (half > widest) bad = bad " half-width over " widest " %;"
+      printf "%-4s %-8s truth %4d  estimate %7.1f (%+.2f %%)  95 %% interval %.1f .. %.1f  half-width %.2f %%%s\n",
+             bad == "" ? "ok" : "FAIL", name, truth, value, error, low, high, half, bad
+      exit bad != ""
+    }
+    END { if (!found) { print "FAIL " name ": no bias_v in the summary"; exit 1 } }' "$1.txt" || failures=$((failures + 1))
+}
+
+run pockels_calibrate pockels_calibrate
+run pockels_calibrate_low pockels_calibrate_low
+frame() { printf '%s/pockels_czt/led_data/Bias_-%04dV.png' "$data" "$1"; }
+while read -r volts error width; do
+  run "b$volts" pockels_bias --image "$(frame "$volts")"
+  check "b$volts" "$volts" "$error" "$width"
+done <<'CASES'
+300 3 6
+500 1 2.5
+700 1 1.5
+900 1 1.5
+CASES
+# Calibrated up to 700 V only: the interval must own up to the extrapolation.
+for volts in 800 900 1000; do
+  run "low$volts" pockels_bias_low --image "$(frame "$volts")"
+  check "low$volts" "$volts" 8 8
+done
+[ $failures -eq 0 ] && echo "all as required" || echo "$failures failures"
+exit $((failures > 0))
