@@ -1,0 +1,233 @@
+// Derivatives: kernels against ceres::Jet, whole images against Richardson differences.
+
+#include <ceres/jet.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "birefit/render.h"
+#include "medium/families/planar.h"
+#include "medium/families/radial.h"
+#include "scene_builder.h"
+#include "transport/one_way.h"
+
+namespace birefit {
+
+// What the kernels ask of a scalar beyond arithmetic, for the oracle: found by argument-dependent look-up.
+inline double plain(const ceres::Jet<double, 3>& x) { return x.a; }
+
+namespace {
+using Jet = ceres::Jet<double, 3>;
+using D3 = Dual<double, 3>;
+
+/// Largest difference of value and derivatives, relative to the largest derivative of the pair.
+void expect_same(const Jet& jet, const D3& dual, double phase_rad, const std::string& what) {
+  double size = std::abs(jet.a);
+  for (int i = 0; i < 3; ++i) size = std::max(size, std::abs(jet.v[i]));
+  const double tolerance = 1e-12 * (1 + phase_rad / 100) * std::max(size, 1e-3);
+  EXPECT_NEAR(jet.a, dual.value, tolerance) << what;
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(jet.v[i], dual.d[static_cast<std::size_t>(i)], tolerance) << what << " d" << i;
+}
+
+template <class S>
+S variable(double value, int index);
+template <>
+Jet variable<Jet>(double value, int index) {
+  return Jet(value, index);
+}
+template <>
+D3 variable<D3>(double value, int index) {
+  D3 x(value);
+  x.d[static_cast<std::size_t>(index)] = 1;
+  return x;
+}
+
+/// The pieces of a step: where, which axis, which generator, as functions of three parameters.
+template <class S>
+std::array<S, 6> radial_sample(double u, bool twisted) {
+  const S radius = variable<S>(4.65, 0), impact = variable<S>(1.3, 1), n_e = variable<S>(1.74, 2);
+  const S half = sqrt(radius * radius - impact * impact);
+  const Chord<S> chord(impact, half, radius);
+  const S eo(1.52 * 1.52), ee = n_e * n_e;
+  const OpticalPoint<S> p = twisted ? TwistedRadialLaw<S>{chord, S(0.1), S(std::sqrt(0.99)), impact * S(0.4), eo, ee}.at(S(u))
+                                    : RadialLaw<S>{chord, eo, ee}.at(S(u));
+  const Vec3<S> v = su2_generator(p, S(10.6));
+  return {p.axis.x, p.axis.y, p.axis.z, p.depth_slope_um, v.x, v.z};
+}
+
+TEST(Gradients, RadialAndTwistedRadialLawsAgreeWithJets) {
+  for (bool twisted : {false, true})
+    for (double u : {1e-8, 0.13, 0.41, 0.77, 0.999}) {
+      const auto jets = radial_sample<Jet>(u, twisted);
+      const auto duals = radial_sample<D3>(u, twisted);
+      for (std::size_t i = 0; i < 6; ++i)
+        expect_same(jets[i], duals[i], 20, (twisted ? "twisted " : "radial ") + std::to_string(i) + " u " + std::to_string(u));
+    }
+}
+
+template <class S>
+std::array<S, 8> oblique_operator(double kx, double ky) {
+  const S azimuth = variable<S>(0.4, 0), tilt = variable<S>(0.5, 1), n_e = variable<S>(1.74, 2);
+  const OpticalPoint<S> p = TwistedLaw<S>{azimuth, S(1.2), tilt, S(1.52 * 1.52), n_e * n_e, S(5.0)}.at(S(0.3));
+  const OneWay<S> m = one_way(p, S(kx), S(ky));
+  return {m.index.a.re, m.index.b.re, m.index.c.re, m.index.d.re, m.admittance.a.re, m.admittance.b.re,
+          m.admittance.c.re, m.admittance.d.re};
+}
+
+TEST(Gradients, ObliqueOperatorAgreesWithJets) {
+  for (const auto& [kx, ky] : {std::pair{0.0, 0.0}, {1e-8, 0.0}, {0.37, -0.21}}) {
+    const auto jets = oblique_operator<Jet>(kx, ky);
+    const auto duals = oblique_operator<D3>(kx, ky);
+    for (std::size_t i = 0; i < 8; ++i) expect_same(jets[i], duals[i], 0, "entry " + std::to_string(i));
+  }
+}
+
+TEST(Gradients, StepExponentialAgreesWithJetsThroughZero) {
+  for (double size : {0.0, 1e-8, 1e-3, 0.17, 1.9, 40.0}) {
+    // exp(i v.s), v = size (a, b, c); the oracle differentiates cos and sin of the modulus itself.
+    const D3 a = variable<D3>(0.6, 0), b = variable<D3>(-0.3, 1), c = variable<D3>(0.74, 2);
+    const Su2<D3> dual = su2_exp(Vec3<D3>{size * a, size * b, size * c});
+    const Jet ja(0.6, 0), jb(-0.3, 1), jc(0.74, 2);
+    const Jet modulus = sqrt(ja * ja + jb * jb + jc * jc);
+    const Jet cosine = cos(size * modulus), sine = sin(size * modulus) / modulus;
+    expect_same(cosine, dual.w, size, "w at " + std::to_string(size));
+    expect_same(sine * ja, dual.x, size, "x at " + std::to_string(size));
+    expect_same(sine * jc, dual.z, size, "z at " + std::to_string(size));
+  }
+}
+
+// ---- whole images ------------------------------------------------------------------------------------------------------
+
+struct Case {
+  std::string name;
+  testing::TableBuilder t;
+  Scene scene;
+  std::vector<int> parameters;
+};
+
+Case base(const std::string& name) {
+  Case c;
+  c.name = name;
+  c.scene.microscope.wavelength_nm = c.t.fixed("wavelength_nm", 590);
+  c.scene.microscope.polarizer_deg = c.t.fixed("polarizer_deg", 12);
+  c.scene.microscope.analyzer_deg = c.t.fixed("analyzer_deg", 95);
+  c.scene.surround_index = c.t.fixed("index", 1.43);
+  ConstantIndices m;
+  m.ordinary = c.t.fixed("ordinary", 1.52);
+  m.birefringence = c.t.fixed("birefringence", 0.2);
+  c.scene.material = m;
+  c.scene.view.width = c.scene.view.height = 16;
+  c.scene.view.pixel_size_um = 0.5;
+  c.scene.view.center_x_px = c.t.fixed("center_x", 7.7);
+  c.scene.view.center_y_px = c.t.fixed("center_y", 7.4);
+  c.scene.view.rotation_deg = c.t.fixed("rotation_deg", 3);
+  return c;
+}
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (bool twisted : {false, true}) {
+    // Larger than the picture: the rim, where intensity ends like a root and differences fail, is outside.
+    Case c = base(twisted ? "twisted droplet" : "droplet");
+    Droplet d;
+    d.diameter_um = c.t.fixed("diameter_um", 16);
+    if (twisted) d.director.twist_deg = c.t.fixed("twist_deg", 40);
+    c.scene.sample = d;
+    all.push_back(c);
+  }
+  {
+    Case c = base("uniform cell");
+    Cell cell;
+    cell.thickness_um = c.t.fixed("thickness_um", 5);
+    UniformDirector u;
+    u.azimuth_deg = c.t.fixed("azimuth_deg", 30);
+    u.tilt_deg = c.t.fixed("tilt_deg", 10);
+    cell.director = u;
+    c.scene.sample = cell;
+    all.push_back(c);
+  }
+  {
+    Case c = base("twisted cell");
+    Cell cell;
+    cell.thickness_um = c.t.fixed("thickness_um", 5);
+    TwistedDirector u;
+    u.azimuth_deg = c.t.fixed("azimuth_deg", 30);
+    u.twist_deg = c.t.fixed("twist_deg", 80);
+    u.pretilt_deg = c.t.fixed("pretilt_deg", 3);
+    cell.director = u;
+    c.scene.sample = cell;
+    all.push_back(c);
+  }
+  {
+    Case c = base("heated plate");
+    Plate plate;
+    plate.thickness_um = c.t.fixed("thickness_um", 60);
+    for (int i = 0; i < 3; ++i)
+      plate.director.axis[static_cast<std::size_t>(i)] = c.t.fixed("axis" + std::to_string(i), std::array{-0.35, 0.35, -0.87}[static_cast<std::size_t>(i)]);
+    HeatStep heat;
+    heat.fourier_number = c.t.fixed("fourier_number", 0.07);
+    heat.cold_k = c.t.fixed("cold_k", 278);
+    heat.hot_k = c.t.fixed("hot_k", 368);
+    plate.heat = heat;
+    plate.half_angle_deg = c.t.fixed("half_angle_deg", 15);
+    c.scene.sample = plate;
+    c.scene.material = E44Steinberg2020{};
+    all.push_back(c);
+  }
+  {
+    Case c = base("crystal");
+    Crystal crystal;
+    crystal.half_wave_voltage_v = c.t.fixed("half_wave_voltage_v", 1500);
+    crystal.bias_v = c.t.fixed("bias_v", 700);
+    crystal.slow_axis_deg = c.t.fixed("slow_axis_deg", 52);
+    crystal.field_legendre = {c.t.fixed("c1", 0.2), c.t.fixed("c2", -0.1), c.t.fixed("c3", 0.05)};
+    c.scene.sample = crystal;
+    all.push_back(c);
+  }
+  return all;
+}
+
+// Richardson differences are good to about 1e-8 of the second derivative's size; 1e-6 of the largest entry is asked.
+TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
+  for (Case& c : cases()) {
+    const Theta theta = c.t.table.values();
+    const RenderPlan p = plan(c.scene, theta);
+    std::vector<int> active;
+    for (int i = 0; i < c.t.table.size(); ++i) active.push_back(i);
+    const Rendering r = render(c.scene, p, theta, active, 1);
+    bool any = false;
+    for (std::size_t k = 0; k < active.size(); ++k) {
+      const int i = active[k];
+      const double h = 1e-4 * std::max(0.1, std::abs(theta[static_cast<std::size_t>(i)]));
+      const auto at = [&](double step) {
+        Theta moved = theta;
+        moved[static_cast<std::size_t>(i)] += step;
+        return render(c.scene, p, moved, {}, 1).intensity;
+      };
+      const Image a = at(h), b = at(-h), a2 = at(h / 2), b2 = at(-h / 2);
+      double size = 0, error = 0;
+      for (std::size_t j = 0; j < a.size(); ++j) {
+        const double coarse = (a.values()[j] - b.values()[j]) / (2 * h), fine = (a2.values()[j] - b2.values()[j]) / h;
+        const double exact = (4 * fine - coarse) / 3;
+        size = std::max(size, std::abs(exact));
+        error = std::max(error, std::abs(exact - r.derivatives[k].values()[j]));
+      }
+      any = any || size > 1e-6;
+      // 1e-11/h: rounding of the differences.
+      EXPECT_LT(error, 1e-6 * size + 1e-11 / h) << c.name << ", " << c.t.table[i].name;
+    }
+    EXPECT_TRUE(any) << c.name << " depends on nothing";
+  }
+}
+
+TEST(Gradients, SameBitsWhateverTheNumberOfThreads) {
+  Case c = cases()[1];
+  const Theta theta = c.t.table.values();
+  const RenderPlan p = plan(c.scene, theta);
+  const Rendering one = render(c.scene, p, theta, {0, 1, 3}, 1), two = render(c.scene, p, theta, {0, 1, 3}, 2);
+  EXPECT_EQ(one.intensity.values(), two.intensity.values());
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(one.derivatives[k].values(), two.derivatives[k].values());
+}
+
+}  // namespace
+}  // namespace birefit
