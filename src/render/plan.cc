@@ -161,7 +161,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
     const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
     // The cross turns within the innermost pixels; at the rim intensity ends like a root.
-    if (r < 2) return std::max(0.5, std::abs(phase_at(high) - phase_at(low)));
+    if (r < 3) return r < 2 ? 9.0 : 5.0;
     if (high > edge - px && low < edge + px) return 3.0;
     return std::abs(phase_at(high) - phase_at(low));
   });

@@ -82,7 +82,7 @@ TEST(Conventions, QuarterWaveHandedness) {
 TEST(Conventions, RotationTurnsTheSampleCounterClockwise) {
   for (double twist : {0.0, 70.0})
     EXPECT_NEAR(intensity(cell_case(0.08, 5, 0, twist, 10, 80, 30)), intensity(cell_case(0.08, 5, 30, twist, 10, 80, 0)), 1e-9);
-  EXPECT_GT(std::abs(intensity(cell_case(0.08, 5, 30, 0, 10, 80)) - intensity(cell_case(0.08, 5, -30, 0, 10, 80))), 0.01);
+  EXPECT_GT(std::abs(intensity(cell_case(0.08, 5, 30, 0, 10, 70)) - intensity(cell_case(0.08, 5, -30, 0, 10, 70))), 0.01);
 }
 
 TEST(Conventions, PolarizerAnglesAreCounterClockwiseInTheImage) {
@@ -221,10 +221,15 @@ TEST(RadialDroplet, AgreesWithAnIndependentProgram) {
   const Theta theta = t.table.values();
   const Image image = render(s, plan(s, theta), theta, {}, 1).intensity;
   double worst = 0;
+  std::string where;
   for (int r = 0; r < 40; ++r)
-    for (int c = 0; c < 40; ++c) worst = std::max(worst, std::abs(image(c, r) - truth.pixel(c, r, 12)));
+    for (int c = 0; c < 40; ++c) {
+      const double error = std::abs(image(c, r) - truth.pixel(c, r, 12));
+      if (error > worst) where = std::to_string(c) + ", " + std::to_string(r);
+      worst = std::max(worst, error);
+    }
   // 12 x 12 midpoints err by (phase per pixel)^2/(24 x 144 x 2) = 3e-4 at the steepest fringe of 1.5 rad a pixel.
-  EXPECT_LT(worst, 1e-3);
+  EXPECT_LT(worst, 1e-3) << "at " << where;
 }
 
 }  // namespace

@@ -11,11 +11,12 @@
 #include "scene_builder.h"
 #include "transport/one_way.h"
 
-namespace birefit {
-
 // What the kernels ask of a scalar beyond arithmetic, for the oracle: found by argument-dependent look-up.
-inline double plain(const ceres::Jet<double, 3>& x) { return x.a; }
+namespace ceres {
+inline double plain(const Jet<double, 3>& x) { return x.a; }
+}  // namespace ceres
 
+namespace birefit {
 namespace {
 using Jet = ceres::Jet<double, 3>;
 using D3 = Dual<double, 3>;
