@@ -78,9 +78,9 @@ std::vector<Image> render_planes(const Scene& scene, const RenderPlan& plan, con
   const int w = scene.view.width, h = scene.view.height;
   constexpr int kStep = kLanesOf<S>;
   Grid<std::uint8_t> samples(w + 2, h + 2);
-  for (int r = 0; r < h + 2; ++r)
-    for (int c = 0; c < w + 2; ++c)
-      samples(c, r) = static_cast<std::uint8_t>(samples_at(plan, c - 1.0, r - 1.0));
+  parallel_for(h + 2, threads, [&](int r) {
+    for (int c = 0; c < w + 2; ++c) samples(c, r) = static_cast<std::uint8_t>(samples_at(plan, c - 1.0, r - 1.0));
+  });
   // Point values on the image and a rim of one pixel, wherever a one-sample pixel or its neighbour needs them.
   std::vector<Image> points(active.size() + 1, Image(w + 2, h + 2));
   parallel_for(h + 2, threads, [&](int r) {
