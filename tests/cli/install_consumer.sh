@@ -31,7 +31,7 @@ int main() {
 EOF
 flags=$(sed -n 's/^CMAKE_CXX_FLAGS:[A-Z]*=//p' "$build/CMakeCache.txt")
 sanitize=$(sed -n 's/^BIREFIT_SANITIZE:[A-Z]*=//p' "$build/CMakeCache.txt")
-cmake -S consumer -B consumer/build -DCMAKE_PREFIX_PATH="$PWD/prefix" -DCMAKE_BUILD_TYPE=Release \
+cmake -G Ninja -S consumer -B consumer/build -DCMAKE_PREFIX_PATH="$PWD/prefix" -DCMAKE_BUILD_TYPE=Release \
   -DCMAKE_CXX_FLAGS="$flags${sanitize:+ -fsanitize=$sanitize}" >configure.log
 cmake --build consumer/build >build.log
 consumer/build/consumer
