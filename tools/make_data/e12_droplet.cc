@@ -1,5 +1,5 @@
-// Makes data/e12_droplet/e12_9um.pgm: run from the repository's root,
-//   g++ -std=c++20 -O2 -Itests/support tools/make_data/e12_droplet.cc -o /tmp/make && /tmp/make > data/e12_droplet/e12_9um.pgm
+// Makes the image of data/e12_droplet: run from the repository's root,
+//   g++ -std=c++20 -O2 -Itests/support tools/make_data/e12_droplet.cc -o make_e12 && ./make_e12 > e12_9um.pgm
 // 16-bit binary PGM, which any image tool turns into the shipped PNG.
 
 #include <cstdio>
