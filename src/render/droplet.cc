@@ -87,7 +87,7 @@ DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho
       start = Pack::load_aligned(lanes);
     }
   }
-  // The last half percent before the end of the table stays at its end: intensity vanishes there.
+  // No step leaves the accepted interval: at its end the intensity vanishes.
   const P limit(rim.psi_max());
   DropletRay<S> ray;
   const auto geometry = [&](auto psi, auto ratio, auto radius, auto& r) {
