@@ -26,6 +26,7 @@ struct RenderPlan {
   // The numerical choices themselves.
   int steps = 1;                    ///< equal mesh steps in u (diagonal: 8 Gauss nodes each); 0 = use `mesh`
   std::vector<double> mesh;         ///< adapted mesh in u
+  int radial_panels = 0;            ///< droplets: panels of the table over the radius; 0 = one ray a point
   /// Samples per pixel side by distance from (sampling_center_x_px, _y_px), one entry per sampling_bin_px; 1 = the
   /// point value with a second-order correction to the pixel's mean, n > 1 = n x n Gauss points.
   std::vector<int> samples;

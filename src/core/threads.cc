@@ -20,12 +20,15 @@ void parallel_for(int n, int threads, const std::function<void(int)>& body) {
     for (int i = 0; i < n; ++i) body(i);
     return;
   }
+  // Neighbouring indices share memory (rows of an image): a few blocks a thread, no smaller than needed to even out.
+  const int block = std::clamp(n / (8 * threads), 1, 16);
   std::atomic<int> next{0};
   std::exception_ptr failure;
   std::mutex failure_guard;
   const auto work = [&] {
     try {
-      for (int i = next++; i < n; i = next++) body(i);
+      for (int first = next.fetch_add(block); first < n; first = next.fetch_add(block))
+        for (int i = first; i < std::min(n, first + block); ++i) body(i);
     } catch (...) {
       const std::lock_guard lock(failure_guard);
       if (!failure) failure = std::current_exception();

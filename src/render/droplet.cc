@@ -15,7 +15,7 @@ namespace birefit {
 // The geometry depends only on m = n_host / n_o: with psi the angle of incidence on the sphere, sin psi' = m sin psi,
 // delta = psi - psi', the ray leaves turned by 2 delta towards the axis and its backward extension meets the mid plane
 // at rho = R sin psi / cos 2 delta.
-RimTable::RimTable(double index_ratio, double host_index, double objective_na) : ratio_(index_ratio) {
+RimTable::RimTable(double index_ratio, double host_index, double objective_na) : ratio_(index_ratio), objective_na_(objective_na) {
   const auto accepted = [&](double psi) {
     const double sin_in = ratio_ * std::sin(psi);
     if (sin_in >= 1) return false;
@@ -36,6 +36,10 @@ RimTable::RimTable(double index_ratio, double host_index, double objective_na) :
   }
   psi_max_ = inside;
   rho_max_ = rho_over_radius(psi_max_);
+  const double sin_in = ratio_ * std::sin(psi_max_);
+  end_ = inside == std::numbers::pi / 2 - kGrazing ? End::grazing
+         : sin_in > 1 - 1e-9                       ? End::total_reflection
+                                                   : End::turned;
   // psi against t = sqrt(1 - rho / rho_max): smooth through the rim, where rho(psi) has its square-root end.
   // Newton from the neighbour before; rho(psi) is monotone, and what little error is left is Newton's again in trace().
   psi_[0] = psi_max_;
@@ -68,6 +72,27 @@ double RimTable::psi_at(double rho_over_radius) const {
   const double f = t - i;
   const std::size_t k = static_cast<std::size_t>(i);
   return psi_[k] * (1 - f) + psi_[k + 1] * f;
+}
+
+template <class S>
+S rim_edge(const RimTable& rim, const S& ratio, const S& n_host) {
+  const double psi0 = rim.psi_max();
+  if (rim.end() == RimTable::End::total_reflection)
+    return ratio / (2.0 - ratio * ratio);  // sin psi = 1/m, 2 delta = 2 psi - pi
+  const double s1 = std::sin(psi0), c1 = std::cos(psi0);
+  // cos 2 delta and sin 2 delta at fixed psi, as functions of m.
+  const S s2 = ratio * s1, c2 = sqrt(1.0 - s2 * s2);
+  const S sd = s1 * c2 - c1 * s2, cd = c1 * c2 + s1 * s2;
+  const S cos_twice = 1.0 - 2.0 * sd * sd, sin_twice = 2.0 * sd * cd;
+  if (rim.end() == RimTable::End::grazing) return s1 / cos_twice;
+  // |sin 2 delta| is held: by the aperture at NA / n_host, or at its fixed limit. psi follows by one Newton step, which
+  // is exact for value and first derivative.
+  const double sign = lane(plain(sin_twice), 0) < 0 ? -1 : 1;
+  const S held = rim.objective_na() > 0 ? S(sign * rim.objective_na()) / n_host : S(plain(sin_twice));
+  const S slope = 2.0 * cos_twice * (1.0 - ratio * c1 / c2);
+  const S change = (held - sin_twice) / slope;  // of psi
+  const S tip = cos_twice - 2.0 * sin_twice * (1.0 - ratio * c1 / c2) * change;
+  return (s1 + c1 * change) / tip;
 }
 
 template <class S>
@@ -178,75 +203,122 @@ Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const T
 
 namespace {
 
+/// The image is symmetric up to the turn of the polarizers: with a_r, a_f (p_r, p_f) the analyser's (polarizer's)
+/// components along the radius and around the axis,
+///   I = sum of tube |field|^2 terms = sum_k basis_k(a_r, a_f, p_r, p_f) f_k(rho),
+/// nine terms, three when the transport is diagonal.
+constexpr int kTerms = 9, kDiagonalTerms = 3;
 template <class S>
-class DropletModel final : public PixelModel<S> {
- public:
-  using P = PlainOf<S>;
-  DropletModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
-      : optics_(droplet_optics(scene, value)),
-        rim_(lane(plain(optics_.ratio), 0), lane(plain(optics_.n_host), 0), scene.microscope.objective_na),
-        method_(transport_method<S>(plan.method)),
-        mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
-        twisted_(static_cast<bool>(std::get<Droplet>(scene.sample).director.twist_deg)),
-        aplanatic_(scene.microscope.aplanatic),
-        polarizers_(polarizers(scene, value)),
-        pixel_um_(scene.view.pixel_size_um),
-        center_x_(value(scene.view.center_x_px)),
-        center_y_(value(scene.view.center_y_px)) {
-    const S along = polarizers_.px * polarizers_.ax + polarizers_.py * polarizers_.ay;
-    open_ = along * along;
-    rim_um_ = optics_.radius_um * rim_.rho_max();
+void intensity_terms(const Mat2<S>& j, const S& tube, bool diagonal, S* f) {
+  const auto cross = [](const Complex<S>& a, const Complex<S>& b) { return a.re * b.re + a.im * b.im; };
+  f[0] = tube * norm(j.a);
+  f[1] = tube * norm(j.d);
+  f[2] = 2.0 * tube * cross(j.a, j.d);
+  if (diagonal) return;
+  f[2] = f[2] + 2.0 * tube * cross(j.b, j.c);
+  f[3] = tube * norm(j.b);
+  f[4] = tube * norm(j.c);
+  f[5] = 2.0 * tube * cross(j.a, j.b);
+  f[6] = 2.0 * tube * cross(j.c, j.d);
+  f[7] = 2.0 * tube * cross(j.a, j.c);
+  f[8] = 2.0 * tube * cross(j.b, j.d);
+}
+template <class S>
+void intensity_basis(const S& a_r, const S& a_f, const S& p_r, const S& p_f, bool diagonal, S* basis) {
+  const S arf = a_r * a_f, prf = p_r * p_f;
+  if (diagonal) {
+    const S r = a_r * p_r, f = a_f * p_f;
+    basis[0] = r * r, basis[1] = f * f, basis[2] = r * f;
+    return;
   }
-
-  S intensity(const P& column, const P& row) const override {
-    const S x = (S(column) - center_x_) * pixel_um_, y = (center_y_ - S(row)) * pixel_um_;
-    const S rho2 = x * x + y * y + S(1e-18);
-    const S inverse_rho = inverse_root(rho2);
-    const S rho = rho2 * inverse_rho;
-    // Light that passes beside the droplet; the edge is averaged over a pixel.
-    const S coverage = min_of(max_of((rho - optics_.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
-    const S beside = open_ * coverage;
-    const P edge = plain(rim_um_) * P(1 - 1e-12);
-    const auto inside = plain(rho) < edge;
-    if (none(inside)) return beside;
-    const S radius = select(inside, rho, S(plain(rim_um_) * P(0.5)));
-    const DropletRay<S> ray = trace(optics_, rim_, radius);
-    const Mat2<S> jones = droplet_jones(optics_, ray, method_, mesh_, twisted_);
-    const S cr = x * inverse_rho, sr = y * inverse_rho;
-    const S p_r = polarizers_.px * cr + polarizers_.py * sr, p_f = polarizers_.py * cr - polarizers_.px * sr;
-    S a_r = polarizers_.ax * cr + polarizers_.ay * sr;
-    const S a_f = polarizers_.ay * cr - polarizers_.ax * sr;
-    // Ray tube: flux through the mid plane is b db / (rho drho) of the incident, |E|^2 = flux / cos(2 delta).
-    S tube = optics_.radius_um * ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
-    if (!aplanatic_) {
-      a_r = a_r * ray.cos_twice;  // the transverse part of the p field
-      tube = tube * inverse(ray.cos_twice);
-    }
-    const Complex<S> field = a_r * (p_r * jones.a + p_f * jones.b) + a_f * (p_r * jones.c + p_f * jones.d);
-    return beside + select(inside, tube * norm(field), S(0.0));
-  }
-
- private:
-  static bool none(bool inside) { return !inside; }
-  static bool none(const Pack::batch_bool_type& inside) { return xsimd::none(inside); }
-
-  DropletOptics<S> optics_;
-  RimTable rim_;
-  const TransportMethod<S>& method_;
-  Mesh mesh_;
-  bool twisted_, aplanatic_;
-  Polarizers<S> polarizers_;
-  double pixel_um_;
-  S center_x_, center_y_, open_, rim_um_;
-};
+  const S arr = a_r * a_r, aff = a_f * a_f, prr = p_r * p_r, pff = p_f * p_f;
+  basis[0] = arr * prr, basis[1] = aff * pff, basis[2] = arf * prf;
+  basis[3] = arr * pff, basis[4] = aff * prr, basis[5] = arr * prf;
+  basis[6] = aff * prf, basis[7] = arf * prr, basis[8] = arf * pff;
+}
 
 }  // namespace
 
 template <class S>
+DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+    : optics_(droplet_optics(scene, value)),
+      rim_(lane(plain(optics_.ratio), 0), lane(plain(optics_.n_host), 0), scene.microscope.objective_na),
+      method_(transport_method<S>(plan.method)),
+      mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
+      twisted_(static_cast<bool>(std::get<Droplet>(scene.sample).director.twist_deg)),
+      aplanatic_(scene.microscope.aplanatic),
+      polarizers_(polarizers(scene, value)),
+      pixel_um_(scene.view.pixel_size_um),
+      center_x_(value(scene.view.center_x_px)),
+      center_y_(value(scene.view.center_y_px)),
+      edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)) {
+  const S along = polarizers_.px * polarizers_.ax + polarizers_.py * polarizers_.ay;
+  open_ = along * along;
+  if (plan.radial_panels > 0)
+    table_ = RadialTable<S>(plan.radial_panels, twisted_ ? kTerms : kDiagonalTerms,
+                            [this](const P& v, S* out) { terms(S(v), out); });
+  tabulated_ = plan.radial_panels > 0;
+}
+
+// v = (1 - sqrt(1 - rho/edge))^(1/4): edge - rho is quadratic in v at the rim, where everything is a function of
+// sqrt(edge - rho), and rho ~ v^4 at the centre, where a twist leaves rho^2 log rho and the mesh along the chord changes
+// its shape at rho ~ 0.003 edge.
+template <class S>
+void DropletImage<S>::terms(const S& v, S* out) const {
+  const S v2 = v * v, w = 1.0 - v2 * v2;
+  terms_at(edge_um_ * (1.0 - w * w), out);
+}
+
+template <class S>
+void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
+  const DropletRay<S> ray = trace(optics_, rim_, rho_um);
+  Mat2<S> jones = droplet_jones(optics_, ray, method_, mesh_, twisted_);
+  // Ray tube: flux through the mid plane is b db / (rho drho) of the incident, |E|^2 = flux / cos(2 delta).
+  S tube = optics_.radius_um * ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
+  if (!aplanatic_) {  // only the transverse part of the p field
+    jones.a = ray.cos_twice * jones.a;
+    jones.b = ray.cos_twice * jones.b;
+    tube = tube * inverse(ray.cos_twice);
+  }
+  intensity_terms(jones, tube, !twisted_, out);
+}
+
+template <class S>
+S DropletImage<S>::intensity(const P& column, const P& row) const {
+  const S x = (S(column) - center_x_) * pixel_um_, y = (center_y_ - S(row)) * pixel_um_;
+  const S rho2 = x * x + y * y + S(1e-18);
+  const S inverse_rho = inverse_root(rho2);
+  const S rho = rho2 * inverse_rho;
+  const P edge = plain(edge_um_) * P(1 - 1e-12);
+  const auto inside = plain(rho) < edge;
+  S beside(0.0);
+  if (!all(plain(rho) < plain(optics_.radius_um) - P(pixel_um_)))  // light that passes by; averaged over a pixel
+    beside = open_ * min_of(max_of((rho - optics_.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
+  if (none(inside)) return beside;
+  const S cr = x * inverse_rho, sr = y * inverse_rho;
+  const S p_r = polarizers_.px * cr + polarizers_.py * sr, p_f = polarizers_.py * cr - polarizers_.px * sr;
+  const S a_r = polarizers_.ax * cr + polarizers_.ay * sr, a_f = polarizers_.ay * cr - polarizers_.ax * sr;
+  S basis[kTerms];
+  intensity_basis(a_r, a_f, p_r, p_f, !twisted_, basis);
+  S through;
+  if (tabulated_) {
+    const S fraction = select(inside, rho * inverse(edge_um_), S(0.5));
+    through = tabulated_sum(root(root(fraction * inverse(1.0 + root(1.0 - fraction)))), basis);
+  } else {
+    S f[kTerms];
+    terms_at(select(inside, rho, S(plain(edge_um_) * P(0.5))), f);
+    through = basis[0] * f[0];
+    for (int k = 1; k < number_of_terms(); ++k) through = through + basis[k] * f[k];
+  }
+  return beside + select(inside, through, S(0.0));
+}
+
+template <class S>
 std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<DropletModel<S>>(scene, plan, value);
+  return std::make_unique<DropletImage<S>>(scene, plan, value);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                       \
+  template class DropletImage<S>;                                                                                    \
   template std::unique_ptr<PixelModel<S>> make_droplet_model<S>(const Scene&, const RenderPlan&, const Values<S>&);  \
   template DropletOptics<S> droplet_optics<S>(const Scene&, const Values<S>&);                                       \
   template DropletRay<S> trace<S>(const DropletOptics<S>&, const RimTable&, const S&);                               \

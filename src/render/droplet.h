@@ -4,6 +4,7 @@
 #include <array>
 
 #include "render/pixel_model.h"
+#include "render/radial_table.h"
 #include "transport/method.h"
 
 namespace birefit {
@@ -13,6 +14,10 @@ class RimTable {
  public:
   /// objective_na 0 = no limit.
   RimTable(double index_ratio, double host_index, double objective_na);
+  /// What ends the accepted rays: grazing incidence, total reflection, or being turned too far to be collected.
+  enum class End { grazing, total_reflection, turned };
+  End end() const { return end_; }
+  double objective_na() const { return objective_na_; }
   double psi_max() const { return psi_max_; }
   double rho_max() const { return rho_max_; }          ///< largest image radius / R that light reaches
   double rho_over_radius(double psi) const;
@@ -20,7 +25,8 @@ class RimTable {
 
  private:
   static constexpr int kNodes = 512;
-  double ratio_, psi_max_ = 0, rho_max_ = 0;
+  double ratio_, objective_na_, psi_max_ = 0, rho_max_ = 0;
+  End end_ = End::grazing;
   std::array<double, kNodes + 1> psi_{};
 };
 
@@ -39,6 +45,9 @@ struct DropletRay {
 
 template <class S>
 DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value);
+/// rim.rho_max() with its derivatives by the indices.
+template <class S>
+S rim_edge(const RimTable& rim, const S& index_ratio, const S& host_index);
 /// The ray whose backward extension meets the mid plane at image radius rho_um < rim.rho_max() R.
 template <class S>
 DropletRay<S> trace(const DropletOptics<S>& optics, const RimTable& rim, const S& rho_um);
@@ -50,5 +59,39 @@ Su2<S> droplet_retarder(const DropletOptics<S>&, const DropletRay<S>&, const Tra
 template <class S>
 Mat2<S> droplet_jones(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&,
                       bool twisted);
+
+/// The image of a droplet that is symmetric about the viewing axis.
+template <class S>
+class DropletImage final : public PixelModel<S> {
+ public:
+  using P = PlainOf<S>;
+  DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value);
+  S intensity(const P& column, const P& row) const override;
+  /// What the image is made of, as functions of v in (0, 1) (centre to rim); out has number_of_terms() places.
+  void terms(const S& v, S* out) const;
+  int number_of_terms() const { return twisted_ ? 9 : 3; }
+  /// sum_k basis[k] terms_k(v) as the image reads it; only with plan.radial_panels > 0.
+  S tabulated_sum(const S& v, const S* basis) const {
+    return twisted_ ? table_.template sum<9>(v, basis) : table_.template sum<3>(v, basis);
+  }
+
+ private:
+  static bool none(bool inside) { return !inside; }
+  static bool none(const Pack::batch_bool_type& inside) { return xsimd::none(inside); }
+  static bool all(bool inside) { return inside; }
+  static bool all(const Pack::batch_bool_type& inside) { return xsimd::all(inside); }
+  void terms_at(const S& rho_um, S* out) const;
+
+  DropletOptics<S> optics_;
+  RimTable rim_;
+  const TransportMethod<S>& method_;
+  Mesh mesh_;
+  bool twisted_, aplanatic_;
+  Polarizers<S> polarizers_;
+  double pixel_um_;
+  S center_x_, center_y_, edge_um_, open_;
+  bool tabulated_ = false;
+  RadialTable<S> table_;
+};
 
 }  // namespace birefit

@@ -23,6 +23,9 @@ class Values {
     }
     return value;
   }
+  /// The same values as another scalar.
+  template <class T>
+  Values<T> as() const { return {theta_, active_}; }
   S get(ParameterRef ref, double fallback) const { return ref ? (*this)(ref) : S(fallback); }
   S radians(ParameterRef ref, double fallback_deg = 0) const {
     return get(ref, fallback_deg) * (std::numbers::pi / 180);

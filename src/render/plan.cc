@@ -110,6 +110,47 @@ void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double 
   for (int i = 0; i < bins; ++i) plan.samples.push_back(samples_for(phase_step(i + 0.5)));
 }
 
+/// One ray a radius instead of one a point, when that is fewer rays. The table's error stays far below the accuracy, so
+/// that neither the image nor its slope shows the panels.
+void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
+  const double target = std::max(1e-4 * scene.intensity_accuracy, 1e-12);
+  const double points = static_cast<double>(scene.view.width) * scene.view.height;
+  const Values<Pack> lanes = value.template as<Pack>();
+  for (int panels = 4; panels * RadialTable<Pack>::kPoints < points / 4; panels += std::max(2, panels / 4)) {
+    plan.radial_panels = panels;
+    const DropletImage<Pack> image(scene, plan, lanes);
+    std::array<Pack, 9> direct;
+    double error = 0;
+    // A panel's error is largest near its ends; the golden ratio meets all places of a panel, the ends of the table too.
+    for (int i = 0; i < 96; i += kLanes) {
+      alignas(64) double v[kLanes];
+      for (int k = 0; k < kLanes; ++k) {
+        // Closer to the centre than 1/1000 of the radius (v = 0.15) the mesh along the chord no longer resolves the
+        // defect; the ripple this leaves is far below the accuracy but not smooth.
+        const double turn = (i + k + 0.5) * 0.6180339887498949;
+        v[k] = i + k < 8 ? 1 - (i + k + 0.1) / 8.2 / panels : 0.15 + 0.85 * (turn - std::floor(turn));
+      }
+      image.terms(Pack::load_aligned(v), direct.data());
+      for (int f = 0; f < image.number_of_terms(); ++f) {
+        std::array<Pack, 9> basis;
+        basis.fill(Pack(0.0));
+        basis[static_cast<std::size_t>(f)] = Pack(1.0);
+        const Pack read = image.tabulated_sum(Pack::load_aligned(v), basis.data());
+        error = std::max(error, largest(max_of(direct[static_cast<std::size_t>(f)] - read, read - direct[static_cast<std::size_t>(f)])));
+      }
+    }
+    if (error <= target) {
+      plan.reasons.push_back(fmt::format(
+          "the droplet looks the same from all sides of the viewing axis: {} rays, one a radius, serve all pixels "
+          "(interpolated to {})",
+          panels * RadialTable<Pack>::kPoints, sci(error)));
+      return;
+    }
+  }
+  plan.radial_panels = 0;
+  plan.reasons.push_back("the picture has too few pixels for a table over the radius: one ray a point");
+}
+
 RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   const Droplet& droplet = std::get<Droplet>(scene.sample);
@@ -148,6 +189,8 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
                                      plan.method == "diagonal" ? "panels of 8 Gauss nodes" : "steps", sci(plan.numerical_error),
                                      rays.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
+
+  plan_radial_table(scene, value, plan);
 
   const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.radius_um;
   double largest_phase = 0;

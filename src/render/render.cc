@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "core/threads.h"
 #include "render/droplet.h"
@@ -45,6 +46,12 @@ P load_lanes(const double* x) {
     return *x;
 }
 
+constexpr std::array<double, kLanes> kCount = [] {
+  std::array<double, kLanes> a{};
+  for (int k = 0; k < kLanes; ++k) a[static_cast<std::size_t>(k)] = k;
+  return a;
+}();
+
 template <class S>
 S mean_over_pixel(const PixelModel<S>& model, const PlainOf<S>& column, const PlainOf<S>& row, int n) {
   const PixelRule& rule = rule_of(n);
@@ -57,15 +64,42 @@ S mean_over_pixel(const PixelModel<S>& model, const PlainOf<S>& column, const Pl
   return sum;
 }
 
-/// Writes the lanes of value and derivatives to planes[0], planes[1..N] at `index`, `count` lanes.
-template <class S>
-void store(const S& value, std::vector<Image>& planes, std::size_t index, int first_lane, int count) {
-  for (int k = 0; k < count; ++k) {
-    planes[0].values()[index + static_cast<std::size_t>(k)] = lane(plain(value), first_lane + k);
-    constexpr std::size_t kDerivatives = ScalarTraits<S>::derivatives;
-    if constexpr (kDerivatives > 0)
-      for (std::size_t j = 0; j < std::min(kDerivatives, planes.size() - 1); ++j)
-        planes[j + 1].values()[index + static_cast<std::size_t>(k)] = lane(value.d[j], first_lane + k);
+/// Writes lanes [first, first + count) of value and derivatives to out[0], out[1..N].
+template <class S, std::size_t N>
+BIREFIT_INLINE void store(const S& value, const std::array<double*, N>& out, int planes, int first, int count) {
+  const auto put = [&](const PlainOf<S>& x, double* to) {
+    if constexpr (kLanesOf<S> > 1) {
+      if (first == 0 && count == kLanes) {
+        x.store_unaligned(to);
+        return;
+      }
+    }
+    for (int k = 0; k < count; ++k) to[k] = lane(x, first + k);
+  };
+  put(plain(value), out[0]);
+  if constexpr (ScalarTraits<S>::derivatives > 0)
+    for (int j = 1; j < planes; ++j) put(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)]);
+}
+
+/// samples_at() for the whole picture and a rim of one pixel around it. Rings of equal samples are painted row by row
+/// from the inside out; a root a ring and row instead of one a pixel.
+void fill_samples(const RenderPlan& plan, Grid<std::uint8_t>& samples) {
+  const int w = samples.width();
+  const std::uint8_t inner = plan.samples.empty() ? 1 : static_cast<std::uint8_t>(plan.samples[0]);
+  for (int r = 0; r < samples.height(); ++r) {
+    std::uint8_t* out = samples.row(r);
+    std::fill(out, out + w, inner);
+    const double dy = r - 1.0 - plan.sampling_center_y_px, middle = plan.sampling_center_x_px + 1;
+    for (std::size_t i = 1; i < plan.samples.size(); ++i) {
+      if (plan.samples[i] == plan.samples[i - 1]) continue;
+      const double radius = static_cast<double>(i) * plan.sampling_bin_px, square = radius * radius - dy * dy;
+      const double half = square > 0 ? std::sqrt(square) : 0;
+      const int left = static_cast<int>(std::clamp(std::floor(middle - half) + 1, 0.0, static_cast<double>(w)));
+      const int right = static_cast<int>(std::clamp(std::ceil(middle + half), 0.0, static_cast<double>(w)));
+      const std::uint8_t n = static_cast<std::uint8_t>(plan.samples[i]);
+      std::fill(out, out + std::min(left, right), n);
+      std::fill(out + right, out + w, n);
+    }
   }
 }
 
@@ -75,50 +109,78 @@ std::vector<Image> render_planes(const Scene& scene, const RenderPlan& plan, con
                                  const std::vector<int>& active, int threads) {
   const Values<S> value(theta, active);
   const std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
-  const int w = scene.view.width, h = scene.view.height;
+  const int w = scene.view.width, h = scene.view.height, wide = w + 2, planes = static_cast<int>(active.size()) + 1;
   constexpr int kStep = kLanesOf<S>;
-  Grid<std::uint8_t> samples(w + 2, h + 2);
-  parallel_for(h + 2, threads, [&](int r) {
-    for (int c = 0; c < w + 2; ++c) samples(c, r) = static_cast<std::uint8_t>(samples_at(plan, c - 1.0, r - 1.0));
-  });
+  constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
+  // Fresh memory costs as much as the image itself: the work areas stay with the thread.
+  thread_local Grid<std::uint8_t> samples;
+  thread_local std::vector<double> points;
+  if (samples.width() != wide || samples.height() != h + 2) samples = Grid<std::uint8_t>(wide, h + 2);
+  const std::size_t plane_size = static_cast<std::size_t>(wide) * static_cast<std::size_t>(h + 2);
+  points.resize(std::max(points.size(), plane_size * static_cast<std::size_t>(planes)));
+  Grid<std::uint8_t>& map = samples;  // the workers' own thread_locals are others
+  double* const scratch = points.data();
+  const auto scratch_row = [&](std::size_t plane, int r) { return scratch + plane * plane_size + static_cast<std::size_t>(r) * static_cast<std::size_t>(wide); };
+  fill_samples(plan, map);
   // Point values on the image and a rim of one pixel, wherever a one-sample pixel or its neighbour needs them.
-  std::vector<Image> points(active.size() + 1, Image(w + 2, h + 2));
   parallel_for(h + 2, threads, [&](int r) {
-    for (int c0 = 0; c0 < w + 2; c0 += kStep) {
-      const int count = std::min(kStep, w + 2 - c0);
-      bool needed = false;
-      for (int c = c0; c < c0 + count && !needed; ++c)
-        needed = samples(c, r) == 1 || (c > 0 && samples(c - 1, r) == 1) || (c < w + 1 && samples(c + 1, r) == 1) ||
-                 (r > 0 && samples(c, r - 1) == 1) || (r < h + 1 && samples(c, r + 1) == 1);
-      if (!needed) continue;
-      double columns[kLanes];
-      for (int k = 0; k < kLanes; ++k) columns[k] = std::min(c0 + k, w + 1) - 1.0;
-      const S v = model->intensity(load_lanes<PlainOf<S>>(columns), PlainOf<S>(r - 1.0));
-      store(v, points, static_cast<std::size_t>(r) * (w + 2) + c0, 0, count);
+    const std::uint8_t *here = map.row(r), *up = map.row(std::max(r - 1, 0)), *down = map.row(std::min(r + 1, h + 1));
+    const bool all = std::accumulate(here, here + wide, 0) == wide;
+    thread_local std::vector<std::uint8_t> needed;
+    if (!all) {
+      needed.assign(static_cast<std::size_t>(wide) + 2, 0);  // one place to the left and right
+      for (int c = 0; c < wide; ++c)
+        needed[static_cast<std::size_t>(c) + 1] = static_cast<std::uint8_t>((up[c] == 1) | (down[c] == 1));
+      for (int c = 0; c < wide; ++c)
+        if (here[c] == 1) std::fill_n(needed.data() + c, 3, std::uint8_t{1});
+    }
+    std::array<double*, kPlanes> out;
+    for (int c0 = 0; c0 < wide; c0 += kStep) {
+      const int count = std::min(kStep, wide - c0);
+      if (!all) {
+        const std::uint8_t* first = needed.data() + c0 + 1;
+        if (std::find(first, first + count, 1) == first + count) continue;
+      }
+      const S v = model->intensity(load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), PlainOf<S>(r - 1.0));
+      for (int p = 0; p < planes; ++p) out[static_cast<std::size_t>(p)] = scratch_row(static_cast<std::size_t>(p), r) + c0;
+      store(v, out, planes, 0, count);
     }
   });
-  std::vector<Image> planes(active.size() + 1, Image(w, h));
+  std::vector<Image> images(static_cast<std::size_t>(planes));
+  parallel_for(planes, threads, [&](int p) { images[static_cast<std::size_t>(p)] = Image(w, h); });
   parallel_for(h, threads, [&](int r) {
-    for (std::size_t p = 0; p < planes.size(); ++p) {
-      const double *up = points[p].row(r) + 1, *here = points[p].row(r + 1) + 1, *down = points[p].row(r + 2) + 1;
-      double* out = planes[p].row(r);
+    for (std::size_t p = 0; p < images.size(); ++p) {
+      const double *up = scratch_row(p, r) + 1, *here = scratch_row(p, r + 1) + 1, *down = scratch_row(p, r + 2) + 1;
+      double* out = images[p].row(r);
       // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
       for (int c = 0; c < w; ++c)
         out[c] = here[c] + (here[c - 1] + here[c + 1] + up[c] + down[c] - 4 * here[c]) * (1.0 / 24);
     }
-    for (int c0 = 0; c0 < w; c0 += kStep) {
-      const int count = std::min(kStep, w - c0);
-      int most = 1;
-      for (int c = c0; c < c0 + count; ++c) most = std::max<int>(most, samples(c + 1, r + 1));
-      if (most == 1) continue;
+    // Pixels of several samples, packed into lanes by their number.
+    const std::uint8_t* n = map.row(r + 1) + 1;
+    std::array<std::array<int, kLanes>, 9> waiting;
+    std::array<int, 9> count{};
+    std::array<double*, kPlanes> out;
+    const auto flush = [&](std::size_t most) {
       double columns[kLanes];
-      for (int k = 0; k < kLanes; ++k) columns[k] = std::min(c0 + k, w - 1);
-      const S v = mean_over_pixel(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(r)), most);
-      for (int k = 0; k < count; ++k)
-        if (samples(c0 + k + 1, r + 1) > 1) store(v, planes, static_cast<std::size_t>(r) * w + c0 + k, k, 1);
+      for (int k = 0; k < kStep; ++k) columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
+      const S v = mean_over_pixel(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(r)), static_cast<int>(most));
+      for (int k = 0; k < count[most]; ++k) {
+        for (std::size_t p = 0; p < images.size(); ++p) out[p] = images[p].row(r) + waiting[most][static_cast<std::size_t>(k)];
+        store(v, out, planes, k, 1);
+      }
+      count[most] = 0;
+    };
+    for (int c = 0; c < w; ++c) {
+      if (n[c] == 1) continue;
+      const std::size_t most = n[c];
+      waiting[most][static_cast<std::size_t>(count[most]++)] = c;
+      if (count[most] == kStep) flush(most);
     }
+    for (std::size_t most = 2; most < 9; ++most)
+      if (count[most] > 0) flush(most);
   });
-  return planes;
+  return images;
 }
 
 template <class S>
