@@ -393,6 +393,15 @@ struct Complex {
   Complex(const S& r) : re(r), im(S(0.0)) {}  // NOLINT: real numbers are complex numbers
   Complex(const S& r, const S& i) : re(r), im(i) {}
 };
+/// The scalar under a number that may be complex.
+template <class N>
+struct NumberTraits {
+  using Real = N;
+};
+template <class S>
+struct NumberTraits<Complex<S>> {
+  using Real = S;
+};
 template <class S>
 Complex<S> operator+(const Complex<S>& a, const Complex<S>& b) {
   return {a.re + b.re, a.im + b.im};

@@ -1,46 +1,59 @@
 #pragma once
-// Complex 2 x 2 matrices over any scalar, and their exponential.
+// 2 x 2 matrices over any scalar, real and complex, and their exponential.
 
 #include "core/scalar.h"
 
 namespace birefit {
 
-template <class S>
-struct Mat2 {
-  Complex<S> a, b, c, d;  ///< [[a, b], [c, d]]
-  static Mat2 identity() { return {Complex<S>(S(1.0)), Complex<S>(), Complex<S>(), Complex<S>(S(1.0))}; }
+/// N: a scalar, or Complex of one.
+template <class N>
+struct Matrix2 {
+  N a, b, c, d;  ///< [[a, b], [c, d]]
+  static Matrix2 identity() { return {one(), N(), N(), one()}; }
+  static N one() { return N(typename NumberTraits<N>::Real(1.0)); }
 };
 template <class S>
-Mat2<S> operator+(const Mat2<S>& m, const Mat2<S>& n) {
+using Mat2 = Matrix2<Complex<S>>;
+
+template <class N>
+Matrix2<N> operator+(const Matrix2<N>& m, const Matrix2<N>& n) {
   return {m.a + n.a, m.b + n.b, m.c + n.c, m.d + n.d};
 }
-template <class S>
-Mat2<S> operator-(const Mat2<S>& m, const Mat2<S>& n) {
+template <class N>
+Matrix2<N> operator-(const Matrix2<N>& m, const Matrix2<N>& n) {
   return {m.a - n.a, m.b - n.b, m.c - n.c, m.d - n.d};
 }
-template <class S>
-Mat2<S> operator*(const Mat2<S>& m, const Mat2<S>& n) {
+template <class N>
+Matrix2<N> operator*(const Matrix2<N>& m, const Matrix2<N>& n) {
   return {m.a * n.a + m.b * n.c, m.a * n.b + m.b * n.d, m.c * n.a + m.d * n.c, m.c * n.b + m.d * n.d};
 }
 template <class S>
-Mat2<S> operator*(const Complex<S>& s, const Mat2<S>& m) {
+Mat2<S> operator*(const Matrix2<S>& m, const Mat2<S>& n) {
+  return {m.a * n.a + m.b * n.c, m.a * n.b + m.b * n.d, m.c * n.a + m.d * n.c, m.c * n.b + m.d * n.d};
+}
+template <class S>
+Mat2<S> operator*(const Mat2<S>& m, const Matrix2<S>& n) {
+  return {n.a * m.a + n.c * m.b, n.b * m.a + n.d * m.b, n.a * m.c + n.c * m.d, n.b * m.c + n.d * m.d};
+}
+template <class N>
+Matrix2<N> operator*(const N& s, const Matrix2<N>& m) {
   return {s * m.a, s * m.b, s * m.c, s * m.d};
 }
 template <class S>
 Mat2<S> operator*(const S& s, const Mat2<S>& m) {
   return {s * m.a, s * m.b, s * m.c, s * m.d};
 }
-template <class S>
-Complex<S> determinant(const Mat2<S>& m) {
+template <class N>
+N determinant(const Matrix2<N>& m) {
   return m.a * m.d - m.b * m.c;
 }
-template <class S>
-Mat2<S> inverse(const Mat2<S>& m) {
-  const Complex<S> f = Complex<S>(S(1.0)) / determinant(m);
+template <class N>
+Matrix2<N> inverse(const Matrix2<N>& m) {
+  const N f = Matrix2<N>::one() / determinant(m);
   return {f * m.d, -(f * m.b), -(f * m.c), f * m.a};
 }
-template <class S>
-Mat2<S> commutator(const Mat2<S>& m, const Mat2<S>& n) {
+template <class N>
+Matrix2<N> commutator(const Matrix2<N>& m, const Matrix2<N>& n) {
   return m * n - n * m;
 }
 

@@ -18,63 +18,73 @@ enum class Continuity {
   e_only,   ///< tangential E alone: the source paper's transport
 };
 
-template <class S>
+/// N = Complex<S>, or the scalar S itself in a lossless medium without total reflection: a quarter of the arithmetic.
+template <class N>
 struct OneWay {
-  Mat2<S> index;       ///< N
-  Mat2<S> admittance;  ///< Y
+  Matrix2<N> index;       ///< N
+  Matrix2<N> admittance;  ///< Y
 };
 
 /// Admittance of an isotropic medium for forward waves, q its normal component.
-template <class S>
-Mat2<S> isotropic_admittance(const Complex<S>& permittivity, const Complex<S>& q, const S& kx, const S& ky) {
-  const Complex<S> f = Complex<S>(S(1.0)) / q;
-  const Complex<S> xy = Complex<S>(kx * ky);
-  return {-(f * xy), -(f * (permittivity - Complex<S>(kx * kx))), f * (permittivity - Complex<S>(ky * ky)), f * xy};
+template <class N, class S = typename NumberTraits<N>::Real>
+Matrix2<N> isotropic_admittance(const N& permittivity, const N& q, const S& kx, const S& ky) {
+  const N f = Matrix2<N>::one() / q;
+  const N xy(kx * ky);
+  return {-(f * xy), -(f * (permittivity - N(kx * kx))), f * (permittivity - N(ky * ky)), f * xy};
 }
 
 /// `direction` +1: forward pair (N, Y); -1: the backward pair (signs of q_o and of the extraordinary root flipped).
-template <class S>
-OneWay<S> one_way(const OpticalPoint<S>& p, const S& kx, const S& ky, double direction = 1.0) {
-  using C = Complex<S>;
-  const C eo{p.ordinary, p.ordinary_im}, ee{p.extraordinary, p.extraordinary_im};
-  const C de = ee - eo;
-  const S ax = p.axis.x, ay = p.axis.y, az = p.axis.z;
+template <class N, class S = typename NumberTraits<N>::Real>
+OneWay<N> one_way_of(const Vec3<S>& axis, const N& eo, const N& ee, const S& kx, const S& ky, double direction) {
+  const N de = ee - eo;
+  const S ax = axis.x, ay = axis.y, az = axis.z;
   const S ak = ax * kx + ay * ky, kk = kx * kx + ky * ky;
-  const C qo = S(direction) * sqrt(eo - C(kk));
-  const C A = eo + (az * az) * de;
-  const C B = (az * ak) * de;
-  const C Cc = kk * eo + (ak * ak) * de - eo * ee;
-  const C qm = (-B - S(direction) * sqrt(B * B - A * Cc)) / A;
-  const C c = de / (A * (qo - qm));
+  const N qo = S(direction) * sqrt(eo - N(kk));
+  const N A = eo + (az * az) * de;
+  const N B = (az * ak) * de;
+  const N Cc = kk * eo + (ak * ak) * de - eo * ee;
+  const N qm = (-B - S(direction) * sqrt(B * B - A * Cc)) / A;
+  const N c = de / (A * (qo - qm));
   // u = axis x (kx, ky, qo); u.u without conjugation
-  const C ux = ay * qo - C(az * ky), uy = C(az * kx) - ax * qo, uz = C(ax * ky - ay * kx);
-  const C u2 = ux * ux + uy * uy + uz * uz;
-  const C aw = C(ak) + az * qo;
-  const C d = qo - az * (c * (ky * ux - kx * uy));
-  const C shift = az * (c * u2);
-  const C fx = ax * eo - kx * (aw + shift), fy = ay * eo - ky * (aw + shift);
-  const C gx = -uy, gy = ux;
-  const C cd = c / d;
-  OneWay<S> r;
+  const N ux = ay * qo - N(az * ky), uy = N(az * kx) - ax * qo, uz = N(ax * ky - ay * kx);
+  const N u2 = ux * ux + uy * uy + uz * uz;
+  const N aw = N(ak) + az * qo;
+  const N d = qo - az * (c * (ky * ux - kx * uy));
+  const N shift = az * (c * u2);
+  const N fx = ax * eo - kx * (aw + shift), fy = ay * eo - ky * (aw + shift);
+  const N gx = -uy, gy = ux;
+  const N cd = c / d;
+  OneWay<N> r;
   r.index = {qo + cd * fx * gx, cd * fx * gy, cd * fy * gx, qo + cd * fy * gy};
-  const C az_qo = C(az) / qo;
-  const C hx = -(eo * (C(ay) + ky * az_qo)), hy = eo * (C(ax) + kx * az_qo);
-  const Mat2<S> iso = isotropic_admittance(eo, qo, kx, ky);
+  const N az_qo = N(az) / qo;
+  const N hx = -(eo * (N(ay) + ky * az_qo)), hy = eo * (N(ax) + kx * az_qo);
+  const Matrix2<N> iso = isotropic_admittance(eo, qo, kx, ky);
   r.admittance = {iso.a + cd * hx * gx, iso.b + cd * hx * gy, iso.c + cd * hy * gx, iso.d + cd * hy * gy};
   return r;
 }
+template <class S>
+OneWay<Complex<S>> one_way(const OpticalPoint<S>& p, const S& kx, const S& ky, double direction = 1.0) {
+  return one_way_of(p.axis, Complex<S>{p.ordinary, p.ordinary_im}, Complex<S>{p.extraordinary, p.extraordinary_im}, kx, ky,
+                    direction);
+}
+template <class S>
+OneWay<S> one_way_lossless(const OpticalPoint<S>& p, const S& kx, const S& ky, double direction = 1.0) {
+  return one_way_of(p.axis, p.ordinary, p.extraordinary, kx, ky, direction);
+}
 
 /// Factor on E_t when light steps from medium `before` into `after`, backward waves dropped.
-template <class S>
-Mat2<S> step_factor(const Mat2<S>& before_forward, const Mat2<S>& before_backward, const Mat2<S>& after_forward) {
+template <class N>
+Matrix2<N> step_factor(const Matrix2<N>& before_forward, const Matrix2<N>& before_backward, const Matrix2<N>& after_forward) {
   return inverse(after_forward - before_backward) * (before_forward - before_backward);
 }
 
-/// d(generator)/du of E_t at one point, i.e. dE_t/du = generator E_t.
+/// d(generator)/du of E_t at one point, i.e. dE_t/du = generator E_t; `lossless`: imaginary parts are not looked at.
 template <class S>
-Mat2<S> generator_e_only(const OpticalPoint<S>& p, const S& k0, const S& kx, const S& ky) {
-  const OneWay<S> m = one_way(p, kx, ky);
-  return Complex<S>(S(0.0), k0 * p.depth_slope_um) * m.index;
+Mat2<S> generator_e_only(const OpticalPoint<S>& p, const S& k0, const S& kx, const S& ky, bool lossless) {
+  const S k = k0 * p.depth_slope_um;
+  if (!lossless) return Complex<S>(S(0.0), k) * one_way(p, kx, ky).index;
+  const Matrix2<S> n = k * one_way_lossless(p, kx, ky).index;
+  return {{S(0.0), n.a}, {S(0.0), n.b}, {S(0.0), n.c}, {S(0.0), n.d}};
 }
 
 template <class S>
@@ -84,16 +94,34 @@ Mat2<S> part(const Mat2<Slope<S>>& m, bool slope) {
   };
   return {of(m.a), of(m.b), of(m.c), of(m.d)};
 }
+template <class S>
+Matrix2<S> part(const Matrix2<Slope<S>>& m, bool slope) {
+  const auto of = [&](const Slope<S>& x) { return slope ? x.d[0] : x.value; };
+  return {of(m.a), of(m.b), of(m.c), of(m.d)};
+}
+/// The point without its slopes.
+template <class S>
+OpticalPoint<S> without_slope(const OpticalPoint<Slope<S>>& p) {
+  return {{p.axis.x.value, p.axis.y.value, p.axis.z.value}, p.ordinary.value,      p.extraordinary.value,
+          p.ordinary_im.value,                               p.extraordinary_im.value, p.depth_slope_um.value};
+}
 
 /// E and H continuous: [i k0 N - (Y - Y-)^-1 dY/dz] du/dz.
 template <class S>
-Mat2<S> generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0, const S& kx, const S& ky) {
-  const OneWay<Slope<S>> forward = one_way<Slope<S>>(p, Slope<S>(kx), Slope<S>(ky));
+Mat2<S> generator_e_and_h(const OpticalPoint<Slope<S>>& p, const S& k0, const S& kx, const S& ky, bool lossless) {
+  const OpticalPoint<S> q = without_slope(p);
+  const S k = k0 * q.depth_slope_um;
+  if (lossless) {
+    const OneWay<Slope<S>> forward = one_way_lossless<Slope<S>>(p, Slope<S>(kx), Slope<S>(ky));
+    const Matrix2<S> backward = one_way_lossless(q, kx, ky, -1.0).admittance;
+    const Matrix2<S> x = inverse(part(forward.admittance, false) - backward) * part(forward.admittance, true);
+    const Matrix2<S> n = k * part(forward.index, false);
+    return {{-x.a, n.a}, {-x.b, n.b}, {-x.c, n.c}, {-x.d, n.d}};
+  }
+  const OneWay<Complex<Slope<S>>> forward = one_way<Slope<S>>(p, Slope<S>(kx), Slope<S>(ky));
   const Mat2<S> y = part(forward.admittance, false), dy = part(forward.admittance, true);
-  OpticalPoint<S> q{{p.axis.x.value, p.axis.y.value, p.axis.z.value}, p.ordinary.value,      p.extraordinary.value,
-                    p.ordinary_im.value,                               p.extraordinary_im.value, p.depth_slope_um.value};
   const Mat2<S> backward = one_way(q, kx, ky, -1.0).admittance;
-  return Complex<S>(S(0.0), k0 * q.depth_slope_um) * part(forward.index, false) - inverse(y - backward) * dy;
+  return Complex<S>(S(0.0), k) * part(forward.index, false) - inverse(y - backward) * dy;
 }
 
 // ---- normal incidence, lossless -------------------------------------------------------------------------------------

@@ -70,7 +70,7 @@ template <class S>
 std::array<S, 8> oblique_operator(double kx, double ky) {
   const S azimuth = variable<S>(0.4, 0), tilt = variable<S>(0.5, 1), n_e = variable<S>(1.74, 2);
   const OpticalPoint<S> p = TwistedLaw<S>{azimuth, S(1.2), tilt, S(1.52 * 1.52), n_e * n_e, S(5.0)}.at(S(0.3));
-  const OneWay<S> m = one_way(p, S(kx), S(ky));
+  const auto m = one_way(p, S(kx), S(ky));
   return {m.index.a.re, m.index.b.re, m.index.c.re, m.index.d.re, m.admittance.a.re, m.admittance.b.re,
           m.admittance.c.re, m.admittance.d.re};
 }

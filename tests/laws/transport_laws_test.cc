@@ -242,7 +242,7 @@ TEST(OneWayOperator, IntertwinesWithBerremanInRandomMedia) {
     const OpticalPoint<double> p{{a.x(), a.y(), a.z()}, eo.real(), ee.real(), eo.imag(), ee.imag(), 1};
     const Eigen::Matrix4cd d = berreman(eo, ee, a, kx, ky);
     for (const double direction : {1.0, -1.0}) {
-      const OneWay<double> w = one_way(p, kx, ky, direction);
+      const auto w = one_way(p, kx, ky, direction);
       const auto z = [](const Complex<double>& c) { return C(c.re, c.im); };
       Eigen::Matrix2cd n, y;
       n << z(w.index.a), z(w.index.b), z(w.index.c), z(w.index.d);

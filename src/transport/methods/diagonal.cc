@@ -118,11 +118,9 @@ Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const 
     if (ray.continuity == Continuity::e_and_h) {
       // generator = i k0 N du/dz - X, so X M = i k0 M diag(q) du/dz - generator M
       const Complex<S> ik(S(0.0), ray.k0_per_um * points[i].depth_slope_um.value);
-      OpticalPoint<S> q{{points[i].axis.x.value, points[i].axis.y.value, points[i].axis.z.value},
-                        points[i].ordinary.value, points[i].extraordinary.value, points[i].ordinary_im.value,
-                        points[i].extraordinary_im.value, points[i].depth_slope_um.value};
+      const OpticalPoint<S> q = without_slope(points[i]);
       const Mat2<S> index = one_way(q, ray.kx, ray.ky).index;
-      const Mat2<S> x = ik * index - generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky);
+      const Mat2<S> x = ik * index - generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky, false);
       change = change + x * fields;
     }
     const Mat2<S> modal = inverse(fields) * change;

@@ -33,7 +33,7 @@ Mat2<S> LayersMidpoint<S>::transfer(const Column<S>& column, const Ray<S>& ray, 
   OpticalPoint<S> before = face[0];
   for (std::size_t i = 0; i <= u.size(); ++i) {
     const OpticalPoint<S>& after = i < u.size() ? layers[i] : face[1];
-    const OneWay<S> forward = one_way(after, ray.kx, ray.ky);
+    const OneWay<Complex<S>> forward = one_way(after, ray.kx, ray.ky);
     if (faces)
       total = step_factor(one_way(before, ray.kx, ray.ky).admittance, one_way(before, ray.kx, ray.ky, -1.0).admittance,
                           forward.admittance) *

@@ -41,13 +41,13 @@ Mat2<S> Magnus4<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     points.resize(u.size());
     column.sample_with_slope(u, points.data());
     for (std::size_t i = 0; i < u.size(); ++i)
-      generator[i] = generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky);
+      generator[i] = generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky, !column.absorbing);
   } else {
     thread_local std::vector<OpticalPoint<S>> points;
     points.resize(u.size());
     column.sample(u, points.data());
     for (std::size_t i = 0; i < u.size(); ++i)
-      generator[i] = generator_e_only(points[i], ray.k0_per_um, ray.kx, ray.ky);
+      generator[i] = generator_e_only(points[i], ray.k0_per_um, ray.kx, ray.ky, !column.absorbing);
   }
   const bool steps_in_medium = column.jumps && ray.continuity == Continuity::e_and_h;
   Mat2<S> total = Mat2<S>::identity();
