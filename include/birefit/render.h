@@ -27,6 +27,9 @@ struct RenderPlan {
   int steps = 1;                    ///< equal mesh steps in u (diagonal: 8 Gauss nodes each); 0 = use `mesh`
   std::vector<double> mesh;         ///< adapted mesh in u
   int radial_panels = 0;            ///< droplets: panels of the table over the radius; 0 = one ray a point
+  /// Pixels with one sample: the mean of mean + amplitude cos(phase) in closed form from one ray a pixel and its
+  /// neighbours' (plates), instead of the point value's correction.
+  bool fringe_means = false;
   /// Samples per pixel side by distance from (sampling_center_x_px, _y_px), one entry per sampling_bin_px; 1 = the
   /// point value with a second-order correction to the pixel's mean, n > 1 = n x n Gauss points.
   std::vector<int> samples;

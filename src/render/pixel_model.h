@@ -3,10 +3,12 @@
 
 #include <memory>
 #include <numbers>
+#include <stdexcept>
 #include <vector>
 
 #include "birefit/render.h"
 #include "core/scalar.h"
+#include "render/fringe.h"
 
 namespace birefit {
 
@@ -23,6 +25,7 @@ class Values {
     }
     return value;
   }
+  const Theta& theta() const { return theta_; }
   /// The same values as another scalar.
   template <class T>
   Values<T> as() const { return {theta_, active_}; }
@@ -45,6 +48,8 @@ class PixelModel {
  public:
   virtual ~PixelModel() = default;
   virtual S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const = 0;
+  /// The parts of intensity() as smooth functions; only with plan.fringe_means.
+  virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
 };
 
 /// 2 pi / wavelength in 1/um.

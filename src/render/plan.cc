@@ -275,6 +275,54 @@ double planar_phase(const PlanarOptics<double>& o, double tx, double ty, int nod
   return o.k0 * sum;
 }
 
+/// Closed-form pixel means (render/fringe.h) wherever they agree with 8 x 8 Gauss points; around the image of the optic
+/// axis, where the modes turn within a pixel, the points stay. False when the fringes curve too fast for the formula.
+bool plan_fringe_means(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o, RenderPlan& plan) {
+  const int w = scene.view.width, h = scene.view.height;
+  RenderPlan trial = plan;
+  trial.fringe_means = true;
+  // Along the axis inside, the wavevector is n_o a.
+  OpticalPoint<double> face;
+  const double start[1] = {0.0};
+  o.column->sample(start, &face);
+  const double n_o = std::sqrt(face.ordinary), sign = face.axis.z < 0 ? -1 : 1;
+  const double sx = sign * n_o * face.axis.x / o.n_host, sy = sign * n_o * face.axis.y / o.n_host, s2 = sx * sx + sy * sy;
+  constexpr int kAround = 10;  // pixels
+  trial.samples = {1};
+  if (s2 < 1) {
+    const double half = value.radians(std::get<Plate>(scene.sample).half_angle_deg, 15);
+    const double px = 0.5 * std::min(w, h) / std::tan(half) / std::sqrt(1 - s2);
+    const double column = value.get(scene.view.center_x_px, 0.5 * (w - 1)) + sx * px;
+    const double row = value.get(scene.view.center_y_px, 0.5 * (h - 1)) - sy * px;
+    if (column > -kAround && row > -kAround && column < w + kAround && row < h + kAround) {
+      trial.sampling_center_x_px = column;
+      trial.sampling_center_y_px = row;
+      trial.sampling_bin_px = 1;
+      trial.samples.assign(kAround + 1, 1);
+      std::fill(trial.samples.begin(), trial.samples.begin() + 4, 8);
+      std::fill(trial.samples.begin() + 4, trial.samples.begin() + kAround, 4);
+    }
+  }
+  RenderPlan points = trial;
+  points.fringe_means = false;
+  points.samples = {8};
+  std::vector<std::array<int, 2>> pilots;
+  for (int i = 0; i < 64; ++i) {
+    const auto at = [&](double turn, int size) { return std::min(size - 1, static_cast<int>((turn - std::floor(turn)) * size)); };
+    pilots.push_back({at(i * 0.7548776662466927, w), at(i * 0.5698402909980532, h)});  // the plastic number: even in two dimensions
+  }
+  for (int i : {0, w - 1})
+    for (int j : {0, h - 1}) pilots.push_back({i, j});
+  Theta theta = value.theta();
+  const double error = (render_pixels(scene, trial, theta, pilots, {}, 1).intensity - render_pixels(scene, points, theta, pilots, {}, 1).intensity)
+                           .cwiseAbs()
+                           .maxCoeff();
+  if (!(error <= scene.intensity_accuracy)) return false;
+  plan = trial;
+  plan.numerical_error = std::max(plan.numerical_error, error);
+  return true;
+}
+
 RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   const PlanarOptics<double> o = planar_optics(scene, value);
@@ -355,14 +403,20 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
         const double gy = planar_phase(o, x, y + h, 24) - planar_phase(o, x, y - h, 24);
         gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(gx, gy));
       }
-    sample_by_phase(plan, cx, cy, bins, [&](double r) {
-      const double f = std::min(23.999, r / bins * 24);
-      const std::size_t i = static_cast<std::size_t>(f);
-      return std::max(gradient[i], gradient[i + 1]);
-    });
-    const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
-    plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel: up to {} x {} points a pixel",
-                                       *std::max_element(gradient.begin(), gradient.end()), most, most));
+    const double fastest = *std::max_element(gradient.begin(), gradient.end());
+    plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel", fastest));
+    if (plan.method == "diagonal" && !o.column->absorbing && o.continuity == Continuity::e_and_h &&
+        plan_fringe_means(scene, value, o, plan))
+      plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
+    else {
+      sample_by_phase(plan, cx, cy, bins, [&](double r) {
+        const double f = std::min(23.999, r / bins * 24);
+        const std::size_t i = static_cast<std::size_t>(f);
+        return std::max(gradient[i], gradient[i + 1]);
+      });
+      const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+      plan.reasons.push_back(fmt::format("pixel means from up to {} x {} rays a pixel", most, most));
+    }
   } else if (!slab) {
     plan.reasons.push_back("every pixel sees the same ray: one transfer for the whole image");
   }

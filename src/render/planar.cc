@@ -3,7 +3,7 @@
 #include "medium/build.h"
 #include "render/planar.h"
 #include "render/pixel_model.h"
-#include "transport/method.h"
+#include "transport/methods.h"
 
 namespace birefit {
 
@@ -44,6 +44,27 @@ Mat2<S> planar_jones(const PlanarOptics<S>& o, const TransportMethod<S>& method,
   return r;
 }
 
+template <class S>
+FringePoint<S> planar_fringe(const PlanarOptics<S>& o, const Mesh& mesh, const Polarizers<S>& polarizers, const S& tx,
+                             const S& ty) {
+  const S c = 1.0 / sqrt(tx * tx + ty * ty + 1.0);
+  const Ray<S> ray{o.k0, o.n_host * c * tx, o.n_host * c * ty, o.continuity};
+  const ModalTransfer<S> m = Diagonal<S>::modal(*o.column, ray, mesh);
+  const FaceFactors<S> faces = lossless_faces<S>(*o.column, ray, o.n_host);
+  // The polarizer's field rolled onto the plane of incidence (see planar_jones) and through the entry face.
+  const S g = c * c / (c + 1.0) * (polarizers.px * tx + polarizers.py * ty);
+  const S ix = polarizers.px - g * tx, iy = polarizers.py - g * ty;
+  const S ex = faces.entry.a * ix + faces.entry.b * iy, ey = faces.entry.c * ix + faces.entry.d * iy;
+  // The analyser seen from inside the exit face.
+  const S back = c / (c + 1.0) * (polarizers.ax * tx + polarizers.ay * ty);
+  const S ax = polarizers.ax + back * tx, ay = polarizers.ay + back * ty;
+  const S wx = ax * faces.exit.a + ay * faces.exit.c, wy = ax * faces.exit.b + ay * faces.exit.d;
+  const S f = 1.0 / (m.first.ox * m.first.ey - m.first.ex * m.first.oy);
+  const S amplitude_o = f * (m.first.ey * ex - m.first.ex * ey) * (wx * m.last.ox + wy * m.last.oy);
+  const S amplitude_e = f * (m.first.ox * ey - m.first.oy * ex) * (wx * m.last.ex + wy * m.last.ey);
+  return {amplitude_o * amplitude_o + amplitude_e * amplitude_e, 2.0 * amplitude_o * amplitude_e, m.phase_e - m.phase_o};
+}
+
 namespace {
 
 template <class S>
@@ -71,12 +92,17 @@ class PlanarModel final : public PixelModel<S> {
       ty = S(t * std::sin(a));
     }
     constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
+    if (plan.fringe_means) planar_fringe(optics_, mesh_, polarizers_, tx, ty);
     optics_.column->freeze();
   }
   S intensity(const P& column, const P& row) const override {
     if (!conoscopic_) return constant_;
     const S tx = (S(column) - center_x_) * tan_per_px_, ty = (center_y_ - S(row)) * tan_per_px_;
     return intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
+  }
+  FringePoint<S> fringe(const P& column, const P& row) const override {
+    return planar_fringe(optics_, mesh_, polarizers_, (S(column) - center_x_) * tan_per_px_,
+                         (center_y_ - S(row)) * tan_per_px_);
   }
 
  private:
@@ -100,6 +126,7 @@ std::unique_ptr<PixelModel<S>> make_planar_model(const Scene& scene, const Rende
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                      \
   template std::unique_ptr<PixelModel<S>> make_planar_model<S>(const Scene&, const RenderPlan&, const Values<S>&);  \
+  template FringePoint<S> planar_fringe<S>(const PlanarOptics<S>&, const Mesh&, const Polarizers<S>&, const S&, const S&); \
   template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&);                                        \
   template Mat2<S> planar_jones<S>(const PlanarOptics<S>&, const TransportMethod<S>&, const Mesh&, const S&, const S&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)

@@ -22,4 +22,9 @@ template <class S>
 Mat2<S> planar_jones(const PlanarOptics<S>& optics, const TransportMethod<S>& method, const Mesh& mesh, const S& tx,
                      const S& ty);
 
+/// The same between polarizers, for the diagonal method in a lossless medium with E and H continuous.
+template <class S>
+FringePoint<S> planar_fringe(const PlanarOptics<S>& optics, const Mesh& mesh, const Polarizers<S>& polarizers, const S& tx,
+                             const S& ty);
+
 }  // namespace birefit

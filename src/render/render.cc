@@ -103,6 +103,56 @@ void fill_samples(const RenderPlan& plan, Grid<std::uint8_t>& samples) {
   }
 }
 
+/// Which points of a row are needed: one-sample pixels and their eight neighbours. `row` on a picture with a rim.
+struct NeededPoints {
+  bool all = false;
+  std::vector<std::uint8_t> flags;  ///< with one place to the left and right
+  void find(const Grid<std::uint8_t>& samples, int row) {
+    const int w = samples.width();
+    const std::uint8_t* here = samples.row(row);
+    all = std::accumulate(here, here + w, 0) == w;
+    if (all) return;
+    flags.assign(static_cast<std::size_t>(w) + 2, 0);
+    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, samples.height() - 1); ++r)
+      for (int c = 0; c < w; ++c)
+        if (samples(c, r) == 1) std::fill_n(flags.data() + c, 3, std::uint8_t{1});
+  }
+  bool any(int first, int count) const {
+    if (all) return true;
+    const auto from = flags.begin() + first + 1;
+    return std::find(from, from + count, 1) != from + count;
+  }
+};
+
+/// Point values on the image and a rim of one pixel: rows(field * planes + plane, row), rows of at least width + 2 +
+/// kLanes readable places. One field, the intensity, or with plan.fringe_means the three of a FringePoint.
+class PointPlanes {
+ public:
+  PointPlanes(int width, int height, int planes) : wide_(width + 2), plane_(static_cast<std::size_t>(width + 2) * static_cast<std::size_t>(height + 2)) {
+    // Fresh memory costs as much as the image itself: it stays with the thread.
+    thread_local std::vector<double> memory;
+    memory.resize(std::max(memory.size(), plane_ * static_cast<std::size_t>(planes) + kLanes));
+    data_ = memory.data();
+  }
+  double* row(int plane, int r) const {
+    return data_ + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(r) * static_cast<std::size_t>(wide_);
+  }
+
+ private:
+  int wide_;
+  std::size_t plane_;
+  double* data_;
+};
+
+template <class S>
+S load(const PointPlanes& points, int first_plane, int row, int column) {
+  S v(load_lanes<PlainOf<S>>(points.row(first_plane, row) + column));
+  if constexpr (ScalarTraits<S>::derivatives > 0)
+    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
+      v.d[static_cast<std::size_t>(j)] = load_lanes<PlainOf<S>>(points.row(first_plane + 1 + j, row) + column);
+  return v;
+}
+
 /// planes: value and as many derivatives as asked (at most those of S).
 template <class S>
 std::vector<Image> render_planes(const Scene& scene, const RenderPlan& plan, const Theta& theta,
@@ -110,65 +160,68 @@ std::vector<Image> render_planes(const Scene& scene, const RenderPlan& plan, con
   const Values<S> value(theta, active);
   const std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
   const int w = scene.view.width, h = scene.view.height, wide = w + 2, planes = static_cast<int>(active.size()) + 1;
-  constexpr int kStep = kLanesOf<S>;
-  constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
-  // Fresh memory costs as much as the image itself: the work areas stay with the thread.
-  thread_local Grid<std::uint8_t> samples;
-  thread_local std::vector<double> points;
+  constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives;
+  using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
+  thread_local Grid<std::uint8_t> samples_of_thread;
+  Grid<std::uint8_t>& samples = samples_of_thread;  // the workers' own thread_locals are others
   if (samples.width() != wide || samples.height() != h + 2) samples = Grid<std::uint8_t>(wide, h + 2);
-  const std::size_t plane_size = static_cast<std::size_t>(wide) * static_cast<std::size_t>(h + 2);
-  points.resize(std::max(points.size(), plane_size * static_cast<std::size_t>(planes)));
-  Grid<std::uint8_t>& map = samples;  // the workers' own thread_locals are others
-  double* const scratch = points.data();
-  const auto scratch_row = [&](std::size_t plane, int r) { return scratch + plane * plane_size + static_cast<std::size_t>(r) * static_cast<std::size_t>(wide); };
-  fill_samples(plan, map);
-  // Point values on the image and a rim of one pixel, wherever a one-sample pixel or its neighbour needs them.
+  fill_samples(plan, samples);
+  const PointPlanes points(w, h, plan.fringe_means ? 3 * kPlanes : kPlanes);
   parallel_for(h + 2, threads, [&](int r) {
-    const std::uint8_t *here = map.row(r), *up = map.row(std::max(r - 1, 0)), *down = map.row(std::min(r + 1, h + 1));
-    const bool all = std::accumulate(here, here + wide, 0) == wide;
-    thread_local std::vector<std::uint8_t> needed;
-    if (!all) {
-      needed.assign(static_cast<std::size_t>(wide) + 2, 0);  // one place to the left and right
-      for (int c = 0; c < wide; ++c)
-        needed[static_cast<std::size_t>(c) + 1] = static_cast<std::uint8_t>((up[c] == 1) | (down[c] == 1));
-      for (int c = 0; c < wide; ++c)
-        if (here[c] == 1) std::fill_n(needed.data() + c, 3, std::uint8_t{1});
-    }
-    std::array<double*, kPlanes> out;
+    thread_local NeededPoints needed;
+    needed.find(samples, r);
     for (int c0 = 0; c0 < wide; c0 += kStep) {
       const int count = std::min(kStep, wide - c0);
-      if (!all) {
-        const std::uint8_t* first = needed.data() + c0 + 1;
-        if (std::find(first, first + count, 1) == first + count) continue;
+      if (!needed.any(c0, count)) continue;
+      const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), row(r - 1.0);
+      const auto put = [&](const S& v, int field) {
+        Targets out;
+        for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = points.row(field * kPlanes + p, r) + c0;
+        store(v, out, kPlanes, 0, count);
+      };
+      if (plan.fringe_means) {
+        const FringePoint<S> v = model->fringe(column, row);
+        put(v.mean, 0), put(v.amplitude, 1), put(v.phase, 2);
+      } else {
+        put(model->intensity(column, row), 0);
       }
-      const S v = model->intensity(load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), PlainOf<S>(r - 1.0));
-      for (int p = 0; p < planes; ++p) out[static_cast<std::size_t>(p)] = scratch_row(static_cast<std::size_t>(p), r) + c0;
-      store(v, out, planes, 0, count);
     }
   });
   std::vector<Image> images(static_cast<std::size_t>(planes));
   parallel_for(planes, threads, [&](int p) { images[static_cast<std::size_t>(p)] = Image(w, h); });
   parallel_for(h, threads, [&](int r) {
-    for (std::size_t p = 0; p < images.size(); ++p) {
-      const double *up = scratch_row(p, r) + 1, *here = scratch_row(p, r + 1) + 1, *down = scratch_row(p, r + 2) + 1;
-      double* out = images[p].row(r);
-      // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
-      for (int c = 0; c < w; ++c)
-        out[c] = here[c] + (here[c - 1] + here[c + 1] + up[c] + down[c] - 4 * here[c]) * (1.0 / 24);
+    const auto targets = [&](int column) {
+      Targets out{};
+      for (std::size_t p = 0; p < images.size(); ++p) out[p] = images[p].row(r) + column;
+      return out;
+    };
+    if (plan.fringe_means) {
+      for (int c0 = 0; c0 < w; c0 += kStep) {
+        FringePoint<S> p[3][3];
+        for (int j = 0; j < 3; ++j)
+          for (int i = 0; i < 3; ++i)
+            p[j][i] = {load<S>(points, 0, r + j, c0 + i), load<S>(points, kPlanes, r + j, c0 + i),
+                       load<S>(points, 2 * kPlanes, r + j, c0 + i)};
+        store(fringe_mean(p), targets(c0), planes, 0, std::min(kStep, w - c0));
+      }
+    } else {
+      for (int p = 0; p < planes; ++p) {
+        const double *up = points.row(p, r) + 1, *here = points.row(p, r + 1) + 1, *down = points.row(p, r + 2) + 1;
+        double* out = images[static_cast<std::size_t>(p)].row(r);
+        // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
+        for (int c = 0; c < w; ++c)
+          out[c] = here[c] + (here[c - 1] + here[c + 1] + up[c] + down[c] - 4 * here[c]) * (1.0 / 24);
+      }
     }
     // Pixels of several samples, packed into lanes by their number.
-    const std::uint8_t* n = map.row(r + 1) + 1;
+    const std::uint8_t* n = samples.row(r + 1) + 1;
     std::array<std::array<int, kLanes>, 9> waiting;
     std::array<int, 9> count{};
-    std::array<double*, kPlanes> out;
     const auto flush = [&](std::size_t most) {
       double columns[kLanes];
       for (int k = 0; k < kStep; ++k) columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
       const S v = mean_over_pixel(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(r)), static_cast<int>(most));
-      for (int k = 0; k < count[most]; ++k) {
-        for (std::size_t p = 0; p < images.size(); ++p) out[p] = images[p].row(r) + waiting[most][static_cast<std::size_t>(k)];
-        store(v, out, planes, k, 1);
-      }
+      for (int k = 0; k < count[most]; ++k) store(v, targets(waiting[most][static_cast<std::size_t>(k)]), planes, k, 1);
       count[most] = 0;
     };
     for (int c = 0; c < w; ++c) {
@@ -195,14 +248,23 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   parallel_for((groups + 15) / 16, threads, [&](int block) {
     for (int g = 16 * block; g < std::min(groups, 16 * block + 16); ++g) {
       double columns[kLanes], rows[kLanes];
-      int most = 2;  // the point value alone is no pixel mean
+      int most = 1;
       for (int k = 0; k < kLanes; ++k) {
         const auto& pixel = pixels[static_cast<std::size_t>(std::min(g * kStep + k, n - 1))];
         columns[k] = pixel[0];
         rows[k] = pixel[1];
         if (k < kStep) most = std::max(most, samples_at(plan, pixel[0], pixel[1]));
       }
-      const S v = mean_over_pixel(*model, load_lanes<PlainOf<S>>(columns), load_lanes<PlainOf<S>>(rows), most);
+      const PlainOf<S> column = load_lanes<PlainOf<S>>(columns), row = load_lanes<PlainOf<S>>(rows);
+      S v;
+      if (most == 1 && plan.fringe_means) {
+        FringePoint<S> p[3][3];
+        for (int j = 0; j < 3; ++j)
+          for (int i = 0; i < 3; ++i) p[j][i] = model->fringe(column + PlainOf<S>(i - 1.0), row + PlainOf<S>(j - 1.0));
+        v = fringe_mean(p);
+      } else {
+        v = mean_over_pixel(*model, column, row, std::max(most, 2));  // the point value alone is no pixel mean
+      }
       for (int k = 0; k < std::min(kStep, n - g * kStep); ++k) {
         out.intensity(g * kStep + k) = lane(plain(v), k);
         if constexpr (ScalarTraits<S>::derivatives > 0)

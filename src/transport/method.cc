@@ -60,26 +60,26 @@ Mat2<S> exit_factor(const Column<S>& column, const Ray<S>& ray, const S& host_in
                      isotropic_admittance(eps, q, ray.kx, ray.ky));
 }
 
-/// exit * transfer * entry in a lossless column, E and H continuous: the faces' factors are real.
 template <class S>
-Mat2<S> through_lossless_faces(const Mat2<S>& transfer, const Column<S>& column, const Ray<S>& ray, const S& host_index) {
+FaceFactors<S> lossless_faces(const Column<S>& column, const Ray<S>& ray, const S& host_index) {
   const double ends[2] = {0.0, 1.0};
   OpticalPoint<S> p[2];
   column.sample(ends, p);
   const S eps = host_index * host_index;
   const Matrix2<S> outside = isotropic_admittance<S>(eps, sqrt(eps - ray.kx * ray.kx - ray.ky * ray.ky), ray.kx, ray.ky);
-  const Matrix2<S> entry = inverse(outside + one_way_lossless(p[0], ray.kx, ray.ky).admittance) * (S(2.0) * outside);
-  const Matrix2<S> exit = step_factor(one_way_lossless(p[1], ray.kx, ray.ky).admittance,
-                                      one_way_lossless(p[1], ray.kx, ray.ky, -1.0).admittance, outside);
-  return exit * (transfer * entry);
+  return {inverse(outside + one_way_lossless(p[0], ray.kx, ray.ky).admittance) * (S(2.0) * outside),
+          step_factor(one_way_lossless(p[1], ray.kx, ray.ky).admittance,
+                      one_way_lossless(p[1], ray.kx, ray.ky, -1.0).admittance, outside)};
 }
 
 template <class S>
 Mat2<S> transmission(const TransportMethod<S>& method, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
                      const S& host_index) {
   const Mat2<S> inside = method.transfer(column, ray, mesh);
-  if (!column.absorbing && ray.continuity == Continuity::e_and_h)
-    return through_lossless_faces(inside, column, ray, host_index);
+  if (!column.absorbing && ray.continuity == Continuity::e_and_h) {
+    const FaceFactors<S> faces = lossless_faces(column, ray, host_index);
+    return faces.exit * (inside * faces.entry);
+  }
   return exit_factor(column, ray, host_index) * inside * entry_factor(column, ray, host_index);
 }
 
@@ -88,6 +88,7 @@ Mat2<S> transmission(const TransportMethod<S>& method, const Column<S>& column, 
   template const TransportMethod<S>& transport_method<S>(const std::string&);                               \
   template Mat2<S> entry_factor<S>(const Column<S>&, const Ray<S>&, const S&);                              \
   template Mat2<S> exit_factor<S>(const Column<S>&, const Ray<S>&, const S&);                               \
+  template FaceFactors<S> lossless_faces<S>(const Column<S>&, const Ray<S>&, const S&);                     \
   template Mat2<S> transmission<S>(const TransportMethod<S>&, const Column<S>&, const Ray<S>&, const Mesh&, \
                                    const S&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)

@@ -57,6 +57,13 @@ template <class S>
 Mat2<S> entry_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index);
 template <class S>
 Mat2<S> exit_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index);
+/// Both, in a lossless column with E and H continuous, where they are real.
+template <class S>
+struct FaceFactors {
+  Matrix2<S> entry, exit;
+};
+template <class S>
+FaceFactors<S> lossless_faces(const Column<S>& column, const Ray<S>& ray, const S& host_index);
 /// exit * transfer * entry.
 template <class S>
 Mat2<S> transmission(const TransportMethod<S>& method, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,

@@ -103,10 +103,10 @@ TEST(PlateRecovery, TruthIsTheRenderedImage) {
 }
 
 // Start 30 % off, dozens of fringe orders away.
-TEST(LongPlateFit, FourierNumberIsWithinFiveStandardErrors) { recover(1, 3, 4); }
+TEST(PlateFit, FourierNumberIsWithinFiveStandardErrors) { recover(1, 3, 4); }
 
 // The image knows the mean temperature, not how it came about: correlation -0.999998 (issue 2).
-TEST(LongPlateFit, FourierNumberWithHotSideIsNamedAsDegenerate) {
+TEST(PlateFit, FourierNumberWithHotSideIsNamedAsDegenerate) {
   const FitResult r = fit(plate_job(1, 3, 1, true));
   std::printf("  %d evaluations, %.2f s\n", r.evaluations, r.seconds);
   EXPECT_FALSE(r.identifiable) << r.verdict;

@@ -31,13 +31,6 @@ Modes<T> modes(const OpticalPoint<T>& p, const T& kx, const T& ky) {
   return m;
 }
 
-/// Lossless medium, real fields: mode fields scaled to unit flux, H = w x E / (k0 ..): S_z = (E x H)_z with
-/// E_o = a x w_o and E_e = eo a - (a.w_e) w_e, H_e = eo w_e x a.
-template <class S>
-struct FluxModes {
-  S q_o, q_e;
-  S ox, oy, ex, ey;
-};
 template <class S>
 void normal_components(const OpticalPoint<S>& p, const S& kx, const S& ky, S& q_o, S& q_e) {
   const S eo = p.ordinary, de = p.extraordinary - eo;
@@ -47,27 +40,35 @@ void normal_components(const OpticalPoint<S>& p, const S& kx, const S& ky, S& q_
   q_o = sqrt(eo - kk);
   q_e = (sqrt(B * B - A * C) - B) / A;
 }
+/// H = w x E (over k0): S_z = (E x H)_z with E_o = a x w_o and E_e = eo a - (a.w_e) w_e, H_e = eo w_e x a.
 template <class S>
 FluxModes<S> flux_modes(const OpticalPoint<S>& p, const S& kx, const S& ky) {
-  FluxModes<S> m;
-  normal_components(p, kx, ky, m.q_o, m.q_e);
+  S q_o, q_e;
+  normal_components(p, kx, ky, q_o, q_e);
   const auto cross = [](const Vec3<S>& a, const Vec3<S>& b) {
     return Vec3<S>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
   };
-  const Vec3<S> wo{kx, ky, m.q_o}, we{kx, ky, m.q_e};
+  const Vec3<S> wo{kx, ky, q_o}, we{kx, ky, q_e};
   const Vec3<S> eo = cross(p.axis, wo), ho = cross(wo, eo);
   const S aw = dot(p.axis, we);
   const Vec3<S> ee = p.ordinary * p.axis + (S(0.0) - aw) * we, he = cross(we, ee);
   const S fo = 1.0 / sqrt(eo.x * ho.y - eo.y * ho.x), fe = 1.0 / sqrt(ee.x * he.y - ee.y * he.x);
-  m.ox = fo * eo.x, m.oy = fo * eo.y, m.ex = fe * ee.x, m.ey = fe * ee.y;
-  return m;
+  return {fo * eo.x, fo * eo.y, fe * ee.x, fe * ee.y};
 }
 
-/// The whole transfer for a lossless medium with E and H continuous: flux-normalised modes couple antisymmetrically,
-/// with zero diagonal, so nothing but the two phases is left between the faces.
+}  // namespace
+
 template <class S>
-Mat2<S> lossless_transfer(const Column<S>& column, const Ray<S>& ray, const std::vector<double>& u,
-                          const std::vector<double>& weight) {
+const MethodInfo& Diagonal<S>::info() const {
+  return kInfo;
+}
+
+// With E and H continuous, flux-normalised modes of a lossless medium couple antisymmetrically, with zero diagonal: nothing
+// but the two phases is left between the faces.
+template <class S>
+ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
+  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
   points.resize(u.size());
   column.sample(u, points.data());
@@ -82,30 +83,27 @@ Mat2<S> lossless_transfer(const Column<S>& column, const Ray<S>& ray, const std:
   const double ends[2] = {0.0, 1.0};
   OpticalPoint<S> face[2];
   column.sample(ends, face);
-  const FluxModes<S> first = flux_modes(face[0], ray.kx, ray.ky), last = flux_modes(face[1], ray.kx, ray.ky);
-  S so, co, se, ce;
-  sin_cos(ray.k0_per_um * phase_o, so, co);
-  sin_cos(ray.k0_per_um * phase_e, se, ce);
-  const S f = 1.0 / (first.ox * first.ey - first.ex * first.oy);
-  // [o e]_last diag(e^{i phi}) [o e]_first^-1
-  const Complex<S> po{co, so}, pe{ce, se};
-  const S ixx = f * first.ey, ixy = -(f * first.ex), iyx = -(f * first.oy), iyy = f * first.ox;
-  return {(last.ox * ixx) * po + (last.ex * iyx) * pe, (last.ox * ixy) * po + (last.ex * iyy) * pe,
-          (last.oy * ixx) * po + (last.ey * iyx) * pe, (last.oy * ixy) * po + (last.ey * iyy) * pe};
-}
-
-}  // namespace
-
-template <class S>
-const MethodInfo& Diagonal<S>::info() const {
-  return kInfo;
+  return {flux_modes(face[0], ray.kx, ray.ky), flux_modes(face[1], ray.kx, ray.ky), ray.k0_per_um * phase_o,
+          ray.k0_per_um * phase_e};
 }
 
 template <class S>
 Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
+  if (!column.absorbing && ray.continuity == Continuity::e_and_h) {
+    const ModalTransfer<S> m = modal(column, ray, mesh);
+    const FluxModes<S>&first = m.first, &last = m.last;
+    S so, co, se, ce;
+    sin_cos(m.phase_o, so, co);
+    sin_cos(m.phase_e, se, ce);
+    const S f = 1.0 / (first.ox * first.ey - first.ex * first.oy);
+    // [o e]_last diag(e^{i phase}) [o e]_first^-1
+    const Complex<S> po{co, so}, pe{ce, se};
+    const S ixx = f * first.ey, ixy = -(f * first.ex), iyx = -(f * first.oy), iyy = f * first.ox;
+    return {(last.ox * ixx) * po + (last.ex * iyx) * pe, (last.ox * ixy) * po + (last.ex * iyy) * pe,
+            (last.oy * ixx) * po + (last.ey * iyx) * pe, (last.oy * ixy) * po + (last.ey * iyy) * pe};
+  }
   const GaussNodes& nodes = gauss8_nodes(mesh);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
-  if (!column.absorbing && ray.continuity == Continuity::e_and_h) return lossless_transfer(column, ray, u, weight);
   thread_local std::vector<OpticalPoint<Slope<S>>> points;
   points.resize(u.size());
   column.sample_with_slope(u, points.data());
