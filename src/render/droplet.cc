@@ -75,27 +75,6 @@ double RimTable::psi_at(double rho_over_radius) const {
 }
 
 template <class S>
-S rim_edge(const RimTable& rim, const S& ratio, const S& n_host) {
-  const double psi0 = rim.psi_max();
-  if (rim.end() == RimTable::End::total_reflection)
-    return ratio / (2.0 - ratio * ratio);  // sin psi = 1/m, 2 delta = 2 psi - pi
-  const double s1 = std::sin(psi0), c1 = std::cos(psi0);
-  // cos 2 delta and sin 2 delta at fixed psi, as functions of m.
-  const S s2 = ratio * s1, c2 = sqrt(1.0 - s2 * s2);
-  const S sd = s1 * c2 - c1 * s2, cd = c1 * c2 + s1 * s2;
-  const S cos_twice = 1.0 - 2.0 * sd * sd, sin_twice = 2.0 * sd * cd;
-  if (rim.end() == RimTable::End::grazing) return s1 / cos_twice;
-  // |sin 2 delta| is held: by the aperture at NA / n_host, or at its fixed limit. psi follows by one Newton step, which
-  // is exact for value and first derivative.
-  const double sign = lane(plain(sin_twice), 0) < 0 ? -1 : 1;
-  const S held = rim.objective_na() > 0 ? S(sign * rim.objective_na()) / n_host : S(plain(sin_twice));
-  const S slope = 2.0 * cos_twice * (1.0 - ratio * c1 / c2);
-  const S change = (held - sin_twice) / slope;  // of psi
-  const S tip = cos_twice - 2.0 * sin_twice * (1.0 - ratio * c1 / c2) * change;
-  return (s1 + c1 * change) / tip;
-}
-
-template <class S>
 DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho_um) {
   using P = PlainOf<S>;
   // The table's linear interpolation is within 1e-5 rad, so one Newton step leaves 1e-10.

@@ -113,7 +113,7 @@ void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double 
 /// One ray a radius instead of one a point, when that is fewer rays. The table's error stays far below the accuracy, so
 /// that neither the image nor its slope shows the panels.
 void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
-  const double target = std::max(1e-4 * scene.intensity_accuracy, 1e-12);
+  const double target = std::max(1e-4 * scene.intensity_accuracy, 2e-11);
   const double points = static_cast<double>(scene.view.width) * scene.view.height;
   const Values<Pack> lanes = value.template as<Pack>();
   for (int panels = 4; panels * RadialTable<Pack>::kPoints < points / 4; panels += std::max(2, panels / 4)) {

@@ -1,0 +1,128 @@
+// What stands between rays and pixels: means of fringes over a pixel, and the table over a droplet's radius.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "birefit/render.h"
+#include "render/droplet.h"
+#include "render/fringe.h"
+#include "render/radial_table.h"
+#include "scene_builder.h"
+
+namespace birefit {
+namespace {
+
+/// A fringe with curved phase and amplitude, as functions of the place in pixels.
+struct Fringe {
+  double slope_x, slope_y, curvature;
+  template <class T>
+  T mean(const T& x, const T& y) const {
+    return 0.5 + 0.01 * x - 0.02 * y + 0.003 * x * x;
+  }
+  template <class T>
+  T amplitude(const T& x, const T& y) const {
+    return 0.4 + 0.02 * x + 0.01 * y + 0.002 * x * y - 0.003 * y * y;
+  }
+  template <class T>
+  T phase(const T& x, const T& y) const {
+    return 1.3 + slope_x * x + slope_y * y + curvature * (0.5 * x * x + 0.7 * x * y - 0.3 * y * y);
+  }
+};
+
+double mean_by_quadrature(const Fringe& f) {
+  constexpr int n = 400;  // midpoints: slope^2 / (24 n^2) of the amplitude, 1e-5
+  double sum = 0;
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const double x = (i + 0.5) / n - 0.5, y = (j + 0.5) / n - 0.5;
+      sum += f.mean(x, y) + f.amplitude(x, y) * std::cos(f.phase(x, y));
+    }
+  return sum / (n * n);
+}
+
+// Third order in the curvature: (curvature/8)^2 of the amplitude at most, whatever the slope.
+TEST(PixelMeans, FringesOfAnyFinenessHaveTheirMean) {
+  for (const Fringe& f : {Fringe{0, 0, 0}, Fringe{1e-3, 0, 0.05}, Fringe{0.3, -0.2, 0.05}, Fringe{2.5, 1.1, 0.05}, Fringe{-4.7, 5.9, 0.05},
+                          Fringe{2 * std::numbers::pi, 0, 0}}) {
+    FringePoint<double> p[3][3];
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 3; ++i) p[j][i] = {f.mean(i - 1.0, j - 1.0), f.amplitude(i - 1.0, j - 1.0), f.phase(i - 1.0, j - 1.0)};
+    EXPECT_NEAR(fringe_mean(p), mean_by_quadrature(f), 2e-5) << f.slope_x << ' ' << f.slope_y;
+  }
+}
+
+TEST(PixelMeans, DerivativesOfAMeanAreThoseOfDifferences) {
+  using D = Dual<double, 1>;
+  const auto at = [](auto slope) {
+    using T = decltype(slope);
+    FringePoint<T> p[3][3];
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 3; ++i)
+        p[j][i] = {T(0.5) + slope * (0.1 * i), 0.4 + 0.03 * slope * double(j), slope * (i - 1.0) + 0.4 * slope * slope * (j - 1.0)};
+    return fringe_mean(p);
+  };
+  for (double slope : {0.0, 1e-4, 0.17, 0.346, 1.0, 3.0}) {  // q = 0.03, where a series takes over, is slope 0.346
+    D x(slope);
+    x.d[0] = 1;
+    const double h = 1e-3;
+    const double coarse = (at(slope + h) - at(slope - h)) / (2 * h), fine = (at(slope + h / 2) - at(slope - h / 2)) / h;
+    EXPECT_NEAR(at(x).d[0], (4 * fine - coarse) / 3, 1e-9) << slope;
+  }
+}
+
+// Degree 11 on panels of 1/6 of a smooth function of 5 radians: (5/12)^12 / (2^11 12!) = 3e-17; powers lose (1 + sqrt 2)^11
+// = 16,000 units of rounding, derivatives (11^2 x 2 x 6 panels / 2) more at a panel's end.
+TEST(RadialTable, ReadsWhatWasTabulatedWithItsDerivatives) {
+  using D = Dual<Pack, 1>;
+  D scale(Pack(5.0));
+  scale.d[0] = Pack(1.0);
+  const RadialTable<D> table(6, 3, [&](const Pack& v, D* out) {
+    D s, c;
+    sin_cos(scale * D(v), s, c);
+    out[0] = s, out[1] = c, out[2] = scale * D(v * v);
+  });
+  for (double v0 = 0.003; v0 < 1; v0 += 0.0371) {
+    // Lanes in different panels; v itself depends on the parameter.
+    alignas(64) double places[kLanes];
+    for (int k = 0; k < kLanes; ++k) places[k] = std::fmod(v0 + 0.3 * k, 1.0);
+    D v(Pack::load_aligned(places)), basis[3];
+    v.d[0] = Pack(0.7);
+    for (D& b : basis) b = D(Pack(1.0));
+    basis[1].d[0] = Pack(-2.0);
+    const D sum = table.sum<3>(v, basis);
+    for (int k = 0; k < kLanes; ++k) {
+      const double x = places[k];
+      EXPECT_NEAR(lane(sum.value, k), std::sin(5 * x) + std::cos(5 * x) + 5 * x * x, 2e-11);
+      const double along = 5 * std::cos(5 * x) - 5 * std::sin(5 * x) + 10 * x;
+      EXPECT_NEAR(lane(sum.d[0], k),
+                  0.7 * along + x * std::cos(5 * x) - x * std::sin(5 * x) + x * x - 2 * std::cos(5 * x), 2e-9);
+    }
+  }
+}
+
+// The rim's place and its derivatives by the indices, however the accepted rays end.
+TEST(RadialTable, TheRimMovesWithTheIndices) {
+  struct Rim {
+    double n_o, n_host, na;
+    RimTable::End end;
+  };
+  for (const Rim& c : {Rim{1.52, 1.43, 0, RimTable::End::grazing}, Rim{1.52, 1.54, 0, RimTable::End::total_reflection},
+                       Rim{1.52, 1.0, 0.5, RimTable::End::turned}, Rim{1.52, 1.43, 0.2, RimTable::End::turned}}) {
+    const auto rho_max = [&](double n_o, double n_host) { return RimTable(n_host / n_o, n_host, c.na).rho_max(); };
+    using D = Dual<double, 2>;
+    D n_o(c.n_o), n_host(c.n_host);
+    n_o.d[0] = 1, n_host.d[1] = 1;
+    const RimTable rim(c.n_host / c.n_o, c.n_host, c.na);
+    ASSERT_EQ(rim.end(), c.end);
+    const D edge = rim_edge<D>(rim, n_host / n_o, n_host);
+    EXPECT_NEAR(edge.value, rim.rho_max(), 1e-7);  // total reflection: the root of the bisection's 1e-16
+    const double h = 1e-3;
+    EXPECT_NEAR(edge.d[0], (rho_max(c.n_o + h, c.n_host) - rho_max(c.n_o - h, c.n_host)) / (2 * h), 1e-3) << c.na;
+    EXPECT_NEAR(edge.d[1], (rho_max(c.n_o, c.n_host + h) - rho_max(c.n_o, c.n_host - h)) / (2 * h), 1e-3) << c.na;
+  }
+}
+
+}  // namespace
+}  // namespace birefit
