@@ -296,6 +296,23 @@ Image Fit::fitted_image(int g) const {
 /// Poisson weights from the data themselves pull a fit low (bright outliers get small weights): the variance must
 /// come from the fitted signal.
 void Fit::settle_weights() {
+  // What the image's own differences call noise may be fringes. Those of the residual may hold misfit: both are upper
+  // bounds, and the fit takes the residual's when it is clearly lower.
+  constexpr double kClearly = 0.8;
+  bool lower = false;
+  for (int g = 0; g < frames_ && !stopped_; ++g) {
+    if (!noise_[g].estimated) continue;
+    const Image image = fitted_image(g);
+    const NoiseModel again = estimate_noise(job_.micrographs[g], &image);
+    if (mean_variance(job_.micrographs[g], again, image) >= kClearly * mean_variance(job_.micrographs[g], noise_[g], image)) continue;
+    noise_[g] = again;
+    sigma_[g] = standard_deviation(job_.micrographs[g], again, image);
+    lower = true;
+  }
+  if (lower) {
+    rebuild_problem();
+    solve_main("noise from the residual");
+  }
   for (int pass = 0; pass < 3 && !stopped_; ++pass) {
     if (pass > 0 &&
         std::all_of(noise_.begin(), noise_.end(), [](const NoiseModel& n) { return n.counts_per_photon == 0; }))

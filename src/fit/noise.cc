@@ -32,7 +32,7 @@ struct Sample {
 /// The signal is the mean under the squared mask: exactly what the variance of the difference depends on when the
 /// pixel variance is linear in the signal.
 template <int N>
-std::vector<Sample> differences(const Micrograph& micrograph, const std::array<double, N>& mask) {
+std::vector<Sample> differences(const Micrograph& micrograph, const Image* fitted, const std::array<double, N>& mask) {
   constexpr int kHalf = N / 2;
   double norm = 0;
   for (const double m : mask) norm += m * m;
@@ -47,8 +47,9 @@ std::vector<Sample> differences(const Micrograph& micrograph, const std::array<d
           usable = usable && micrograph.mask(x + i, y + j);
           if (!usable) break;
           const double m = mask[i + kHalf] * mask[j + kHalf], value = micrograph.values(x + i, y + j);
-          difference += m * value;
-          signal += m * m * value;
+          const double model = fitted ? (*fitted)(x + i, y + j) : 0;
+          difference += m * (value - model);
+          signal += m * m * (fitted ? model : value);
         }
       if (!usable) continue;
       const double unit = value_per_count(micrograph, x, y);
@@ -75,10 +76,10 @@ double variance_floor(const Micrograph& micrograph) {
 
 }  // namespace
 
-NoiseModel estimate_noise(const Micrograph& micrograph) {
+NoiseModel estimate_noise(const Micrograph& micrograph, const Image* fitted) {
   constexpr std::size_t kEnough = 200;
-  std::vector<Sample> samples = differences<5>(micrograph, {1, -4, 6, -4, 1});
-  if (samples.size() < kEnough) samples = differences<3>(micrograph, {1, -2, 1});
+  std::vector<Sample> samples = differences<5>(micrograph, fitted, {1, -4, 6, -4, 1});
+  if (samples.size() < kEnough) samples = differences<3>(micrograph, fitted, {1, -2, 1});
   NoiseModel noise;
   noise.estimated = true;
   const double floor = variance_floor(micrograph);
@@ -167,6 +168,15 @@ Image standard_deviation(const Micrograph& micrograph, const NoiseModel& noise, 
       result(x, y) = unit * std::sqrt(read_variance + noise.counts_per_photon * counts);
     }
   return result;
+}
+
+double mean_variance(const Micrograph& micrograph, const NoiseModel& noise, const Image& signal) {
+  const Image sd = standard_deviation(micrograph, noise, signal);
+  double sum = 0, count = 0;
+  for (int y = 0; y < sd.height(); ++y)
+    for (int x = 0; x < sd.width(); ++x)
+      if (micrograph.mask(x, y) && std::isfinite(sd(x, y))) sum += sd(x, y) * sd(x, y), ++count;
+  return count > 0 ? sum / count : 0;
 }
 
 }  // namespace birefit::estimation

@@ -6,7 +6,11 @@
 namespace birefit::estimation {
 
 /// Read and photon noise (in counts) from the differences between neighbouring pixels, whatever the fringes do.
-NoiseModel estimate_noise(const Micrograph& micrograph);
+/// With `fitted` (the model's image in the same values) the differences are those of the residual, which no fringe
+/// fills: fringes finer than about six pixels look like noise in the image itself.
+NoiseModel estimate_noise(const Micrograph& micrograph, const Image* fitted = nullptr);
+/// Mean variance of the usable pixels' values under a model.
+double mean_variance(const Micrograph& micrograph, const NoiseModel& noise, const Image& signal);
 
 /// Mean of the usable pixels of each 3 x 3 neighbourhood: a first guess of the signal.
 Image smoothed(const Micrograph& micrograph);

@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <complex>
 #include <cstdio>
 #include <map>
 
 #include "birefit/fit.h"
+#include "independent_cell.h"
 #include "independent_droplet.h"  // camera()
 #include "scene_builder.h"
 
@@ -18,17 +18,7 @@ using namespace testing;
 constexpr int kSide = 8;
 constexpr double kGain = 1000, kOffset = 50, kThickness = 5, kBirefringence = 0.13, kTwistDeg = 90, kAzimuthDeg = 10, kWavelength = 0.55;
 
-// u = 2 d dn/lambda = 2.36, away from the Gooch-Tarry minimum at sqrt(3), where two solutions for (dn, twist) merge.
-double twisted_intensity(double polarizer_deg, double analyzer_deg) {
-  using C = std::complex<double>;
-  const double deg = M_PI / 180, half = M_PI / kWavelength * kThickness * kBirefringence, phi = kTwistDeg * deg;
-  const double x = std::hypot(phi, half), s = std::sin(x) / x, c = std::cos(x);
-  // In the frame that follows the director (n, n_perp).
-  const double in = (polarizer_deg - kAzimuthDeg) * deg, out = (analyzer_deg - kAzimuthDeg - kTwistDeg) * deg;
-  const C e_n = C(c, half * s) * std::cos(in) + phi * s * std::sin(in);
-  const C e_p = -phi * s * std::cos(in) + C(c, -half * s) * std::sin(in);
-  return std::norm(e_n * std::cos(out) + e_p * std::sin(out));
-}
+constexpr IndependentCell kCell{kThickness, kBirefringence, kTwistDeg, kAzimuthDeg, kWavelength};
 
 FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed) {
   TableBuilder b;
@@ -54,7 +44,7 @@ FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed
     Scene here = scene;
     here.microscope.polarizer_deg = b.fixed("polarizer_" + std::to_string(k), p);
     here.microscope.analyzer_deg = b.fixed("analyzer_" + std::to_string(k), a);
-    const std::vector<double> mean(kSide * kSide, kOffset + kGain * twisted_intensity(p, a));
+    const std::vector<double> mean(kSide * kSide, kOffset + kGain * kCell.intensity(p, a));
     job.micrographs.push_back(micrograph_of("image " + std::to_string(k), here,
                                             camera(mean, counts_per_photon, read_counts, 1000 * seed + static_cast<unsigned long>(k), false),
                                             gain, offset, {read_counts, counts_per_photon}));

@@ -1,10 +1,8 @@
 // Makes the image of data/e12_droplet: run from the repository's root,
-//   g++ -std=c++20 -O2 -Itests/support tools/make_data/e12_droplet.cc -o make_e12 && ./make_e12 > e12_9um.pgm
-// 16-bit binary PGM, which any image tool turns into the shipped PNG.
-
-#include <cstdio>
+//   g++ -std=c++20 -O2 -Itests/support tools/make_data/e12_droplet.cc -o make_e12 && ./make_e12
 
 #include "independent_droplet.h"
+#include "pgm.h"
 
 int main() {
   using namespace birefit::testing;
@@ -16,10 +14,5 @@ int main() {
   for (int row = 0; row < kSize; ++row)
     for (int column = 0; column < kSize; ++column) mean.push_back(150 + 3200 * drop.pixel(column, row));
   const std::vector<double> counts = camera(mean, 0.5, 4.0, 20201);
-  std::printf("P5\n%d %d\n65535\n", kSize, kSize);
-  for (double c : counts) {
-    const unsigned value = static_cast<unsigned>(std::min(4095.0, std::max(0.0, c)));
-    std::putchar(static_cast<int>(value >> 8));
-    std::putchar(static_cast<int>(value & 255));
-  }
+  write_pgm("e12_9um.pgm", kSize, kSize, counts);
 }
