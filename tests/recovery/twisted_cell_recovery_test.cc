@@ -15,7 +15,7 @@ namespace birefit {
 namespace {
 using namespace testing;
 
-constexpr int kSide = 8;
+constexpr int kSide = 32;
 constexpr double kGain = 1000, kOffset = 50, kThickness = 5, kBirefringence = 0.13, kTwistDeg = 90, kAzimuthDeg = 10, kWavelength = 0.55;
 
 constexpr IndependentCell kCell{kThickness, kBirefringence, kTwistDeg, kAzimuthDeg, kWavelength};
