@@ -24,7 +24,7 @@ Mat2<S> planar_jones(const PlanarOptics<S>& o, const TransportMethod<S>& method,
   // t = tan(incidence) (cos azimuth, sin azimuth), c = cos(incidence)
   const S c = 1.0 / sqrt(tx * tx + ty * ty + 1.0);
   const Ray<S> ray{o.k0, o.n_host * c * tx, o.n_host * c * ty, o.continuity};
-  const Mat2<S> m = transmission<S>(method, *o.column, ray, mesh, o.n_host);
+  const Mat2<S> m = method.transmission(*o.column, ray, mesh, o.n_host);
   // The s, p pair unrolled into the lab plane: E_t = e - g (e.t) t, g = (1 - c)/t^2, and back with (1/c - 1)/t^2.
   const S g = c * c / (c + 1.0), back = c / (c + 1.0);
   const auto unroll = [&](const Complex<S>& ex, const Complex<S>& ey, const S& f, Complex<S>& x, Complex<S>& y) {

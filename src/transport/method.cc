@@ -61,6 +61,18 @@ Mat2<S> exit_factor(const Column<S>& column, const Ray<S>& ray, const S& host_in
 }
 
 template <class S>
+Mat2<S> step_of_medium(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, std::size_t node) {
+  if (!column.jumps || node == 0 || node + 1 >= mesh.size() ||
+      !std::binary_search(column.breaks.begin(), column.breaks.end(), mesh[node]))
+    return Mat2<S>::identity();
+  const double sides[2] = {mesh[node] - 1e-12, mesh[node] + 1e-12};
+  OpticalPoint<S> p[2];
+  column.sample(sides, p);
+  return step_factor(one_way(p[0], ray.kx, ray.ky).admittance, one_way(p[0], ray.kx, ray.ky, -1.0).admittance,
+                     one_way(p[1], ray.kx, ray.ky).admittance);
+}
+
+template <class S>
 FaceFactors<S> lossless_faces(const Column<S>& column, const Ray<S>& ray, const S& host_index) {
   const double ends[2] = {0.0, 1.0};
   OpticalPoint<S> p[2];
@@ -73,9 +85,9 @@ FaceFactors<S> lossless_faces(const Column<S>& column, const Ray<S>& ray, const 
 }
 
 template <class S>
-Mat2<S> transmission(const TransportMethod<S>& method, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
-                     const S& host_index) {
-  const Mat2<S> inside = method.transfer(column, ray, mesh);
+Mat2<S> TransportMethod<S>::transmission(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
+                                         const S& host_index) const {
+  const Mat2<S> inside = transfer(column, ray, mesh);
   if (!column.absorbing && ray.continuity == Continuity::e_and_h) {
     const FaceFactors<S> faces = lossless_faces(column, ray, host_index);
     return faces.exit * (inside * faces.entry);
@@ -88,9 +100,9 @@ Mat2<S> transmission(const TransportMethod<S>& method, const Column<S>& column, 
   template const TransportMethod<S>& transport_method<S>(const std::string&);                               \
   template Mat2<S> entry_factor<S>(const Column<S>&, const Ray<S>&, const S&);                              \
   template Mat2<S> exit_factor<S>(const Column<S>&, const Ray<S>&, const S&);                               \
+  template Mat2<S> step_of_medium<S>(const Column<S>&, const Ray<S>&, const Mesh&, std::size_t);            \
   template FaceFactors<S> lossless_faces<S>(const Column<S>&, const Ray<S>&, const S&);                     \
-  template Mat2<S> transmission<S>(const TransportMethod<S>&, const Column<S>&, const Ray<S>&, const Mesh&, \
-                                   const S&);
+  template class TransportMethod<S>;
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 Mesh uniform_mesh(int steps, const std::vector<double>& breaks) {

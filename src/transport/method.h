@@ -28,6 +28,7 @@ struct MethodInfo {
   const char* name;
   int order;              ///< global error ~ steps^-order; 0 = spectral (quadrature)
   bool needs_planar;      ///< exact only where transport is diagonal
+  bool reflections;       ///< has transmission() only, backward waves and faces included
   const char* summary;    ///< what it is, one line
   const char* source;
 };
@@ -43,6 +44,9 @@ class TransportMethod {
   /// Normal incidence (kx = ky = 0), lossless, no jumps: the retarder on the flux-normalised field (e_and_h) or on E_t
   /// (e_only), common phase left out.
   virtual Su2<S> retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const = 0;
+  /// E_t behind the column over E_t of the wave that falls on it, host of real index on both sides: exit * transfer *
+  /// entry, unless the method does more.
+  virtual Mat2<S> transmission(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, const S& host_index) const;
 };
 
 /// All methods for scalar S, in the order of methods.def.
@@ -57,6 +61,9 @@ template <class S>
 Mat2<S> entry_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index);
 template <class S>
 Mat2<S> exit_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index);
+/// Factor on E_t where the medium steps at mesh[node], E and H continuous; the identity where it does not.
+template <class S>
+Mat2<S> step_of_medium(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, std::size_t node);
 /// Both, in a lossless column with E and H continuous, where they are real.
 template <class S>
 struct FaceFactors {
@@ -64,11 +71,6 @@ struct FaceFactors {
 };
 template <class S>
 FaceFactors<S> lossless_faces(const Column<S>& column, const Ray<S>& ray, const S& host_index);
-/// exit * transfer * entry.
-template <class S>
-Mat2<S> transmission(const TransportMethod<S>& method, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
-                     const S& host_index);
-
 /// n equal steps between 0 and 1 merged with the column's breaks (each piece gets at least one step).
 Mesh uniform_mesh(int steps, const std::vector<double>& breaks = {});
 /// Steps of magnus4 whose local error (one step against two halves, Frobenius norm) is below tolerance per unit u.

@@ -40,13 +40,57 @@ class Magnus4 final : public TransportMethod<S> {
   Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
 };
 
-/// A stack of homogeneous layers, one a mesh step, with the medium of its middle: order 2.
+/// Exponential integrator of order 6, three Gauss nodes a step. Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 151 (2009).
 template <class S>
-class LayersMidpoint final : public TransportMethod<S> {
+class Magnus6 final : public TransportMethod<S> {
  public:
   const MethodInfo& info() const override;
   Mat2<S> transfer(const Column<S>&, const Ray<S>&, const Mesh&) const override;
   Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
+};
+
+/// A stack of homogeneous layers, one a mesh step, each with the medium at one place of it (0 its upper face, 1/2 its
+/// middle).
+template <class S>
+class Layers : public TransportMethod<S> {
+ public:
+  const MethodInfo& info() const override { return info_; }
+  Mat2<S> transfer(const Column<S>&, const Ray<S>&, const Mesh&) const override;
+  Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
+
+ protected:
+  Layers(const MethodInfo& info, double place) : info_(info), place_(place) {}
+
+ private:
+  const MethodInfo& info_;
+  double place_;
+};
+/// Order 2.
+template <class S>
+class LayersMidpoint final : public Layers<S> {
+ public:
+  LayersMidpoint();
+};
+/// Order 1: the source paper's brute force.
+template <class S>
+class LayersEdge final : public Layers<S> {
+ public:
+  LayersEdge();
+};
+
+/// The whole of Maxwell's equations in a stratified medium, all reflections included, the faces too. Steps of the 4 x 4
+/// transfer (Berreman, J. Opt. Soc. Am. 62, 502 (1972)) by Magnus of order 4, turned into scattering matrices of
+/// the host's waves and joined by Redheffer's star product: stable however thick or absorbing the stack is.
+template <class S>
+class Berreman final : public TransportMethod<S> {
+ public:
+  const MethodInfo& info() const override;
+  /// Has no one-way transfer: these throw std::logic_error.
+  Mat2<S> transfer(const Column<S>&, const Ray<S>&, const Mesh&) const override;
+  Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
+  Mat2<S> transmission(const Column<S>&, const Ray<S>&, const Mesh&, const S& host_index) const override;
+  /// Tangential E of the reflected wave over that of the incident one, in the same axes.
+  Mat2<S> reflection(const Column<S>&, const Ray<S>&, const Mesh&, const S& host_index) const;
 };
 
 }  // namespace birefit

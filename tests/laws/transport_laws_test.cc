@@ -61,16 +61,19 @@ const TiltTwistLaw kIsotropic{10 * kDeg, 50 * kDeg, 20 * kDeg, 35 * kDeg, 80 * k
 Ray<double> normal_ray(Continuity c) { return {2 * std::numbers::pi / 0.59, 0, 0, c}; }
 Ray<double> oblique_ray(Continuity c) { return {2 * std::numbers::pi / 0.59, 0.35, -0.2, c}; }
 bool coupled(const TransportMethod<double>& m) { return !m.info().needs_planar; }
+bool is_layers(const TransportMethod<double>& m) { return std::string(m.info().name).starts_with("layers"); }
 std::string label(const TransportMethod<double>& m, Continuity c) {
   return std::string(m.info().name) + (c == Continuity::e_only ? " e_only" : " e_and_h");
 }
 template <class Body>
 void for_each_method(const Body& body) {
-  for (const TransportMethod<double>* method : transport_methods<double>())
+  for (const TransportMethod<double>* method : transport_methods<double>()) {
+    if (method->info().reflections) continue;  // no one-way transfer; its laws are in berreman_test.cc
     for (const Continuity c : kContinuities) {
       SCOPED_TRACE(label(*method, c));
       body(*method, c);
     }
+  }
 }
 M without_common_phase(const M& m) {
   const std::complex<double> det = [&] {
@@ -110,7 +113,7 @@ TEST(TransportLaws, PartsOfAColumnCompose) {
       const M all = method.transfer(whole, ray, uniform_mesh(64));
       const M parts = method.transfer(second, ray, uniform_mesh(40)) * method.transfer(first, ray, uniform_mesh(24));
       // Layers with E and H continuous meet one face more where the parts meet, of height 1/n.
-      const bool extra_face = std::string(method.info().name) == "layers_midpoint" && c == Continuity::e_and_h;
+      const bool extra_face = is_layers(method) && c == Continuity::e_and_h;
       EXPECT_LT(distance(all, parts), extra_face ? 1e-3 : 1e-11);
     };
     check(kPlanar, normal_ray(c));
@@ -144,6 +147,7 @@ TEST(TransportLaws, AxisAndItsOppositeAreTheSameMedium) {  // C17
 TEST(TransportLaws, LightSentBackMeetsTheTranspose) {
   for_each_method([](const auto& method, Continuity c) {
     if (c == Continuity::e_only && coupled(method)) return;  // E alone conserves no flux, so it knows no reciprocity
+    if (std::string(method.info().name) == "layers_edge") return;  // samples one face: other layers on the way back
     const TiltTwistLaw law = coupled(method) ? kCoupled : kPlanar;
     const LawColumn<double, TiltTwistLaw> column(law);
     const LawColumn<double, Reversed<TiltTwistLaw>> back({law});
@@ -164,8 +168,9 @@ double measured_order(const TransportMethod<double>& method, const Ray<double>& 
 TEST(TransportLaws, MeasuredOrderIsTheDeclaredOne) {
   for_each_method([](const auto& method, Continuity c) {
     if (method.info().order == 0) return;  // spectral
-    if (std::string(method.info().name) == "layers_midpoint" && c == Continuity::e_and_h) return;  // its own fact below
-    EXPECT_NEAR(measured_order(method, oblique_ray(c), 128), method.info().order, 0.25);
+    if (is_layers(method) && c == Continuity::e_and_h) return;  // their own fact below
+    // 128 steps of order 6 already reach rounding.
+    EXPECT_NEAR(measured_order(method, oblique_ray(c), method.info().order > 4 ? 24 : 128), method.info().order, 0.25);
   });
 }
 // Dropping the backward wave at n faces of height ~ 1/n leaves an error ~ n (1/n)^2.

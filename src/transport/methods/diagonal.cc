@@ -4,7 +4,7 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"diagonal", 0, true, "one phase integral per local mode, 8 Gauss nodes a step, flux factors",
+constexpr MethodInfo kInfo{"diagonal", 0, true, false, "one phase integral per local mode, 8 Gauss nodes a step, flux factors",
                            "Born & Wolf 15; flux factors: docs/methods.md"};
 
 /// Normal components and tangential fields of the ordinary and extraordinary waves (columns of `fields`), Steinberg

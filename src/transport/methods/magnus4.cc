@@ -1,11 +1,9 @@
-#include <algorithm>
-
 #include "transport/methods.h"
 
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"magnus4", 4, false, "exponential integrator of order 4, two Gauss nodes a step",
+constexpr MethodInfo kInfo{"magnus4", 4, false, false, "exponential integrator of order 4, two Gauss nodes a step",
                            "Iserles & Norsett, Phil. Trans. R. Soc. A 357 (1999)"};
 constexpr double kSqrt3 = 1.7320508075688772;
 
@@ -49,7 +47,6 @@ Mat2<S> Magnus4<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     for (std::size_t i = 0; i < u.size(); ++i)
       generator[i] = generator_e_only(points[i], ray.k0_per_um, ray.kx, ray.ky, !column.absorbing);
   }
-  const bool steps_in_medium = column.jumps && ray.continuity == Continuity::e_and_h;
   Mat2<S> total = Mat2<S>::identity();
   for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
     const double h = mesh[i + 1] - mesh[i];
@@ -57,15 +54,7 @@ Mat2<S> Magnus4<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     const Mat2<S>& second = generator[2 * i + 1];
     const Mat2<S> omega = S(0.5 * h) * (first + second) - S(kSqrt3 / 12 * h * h) * commutator(first, second);
     total = exp(omega) * total;
-    if (steps_in_medium && i + 2 < mesh.size() &&
-        std::binary_search(column.breaks.begin(), column.breaks.end(), mesh[i + 1])) {
-      const double sides[2] = {mesh[i + 1] - 1e-12, mesh[i + 1] + 1e-12};
-      OpticalPoint<S> p[2];
-      column.sample(sides, p);
-      total = step_factor(one_way(p[0], ray.kx, ray.ky).admittance, one_way(p[0], ray.kx, ray.ky, -1.0).admittance,
-                          one_way(p[1], ray.kx, ray.ky).admittance) *
-              total;
-    }
+    if (ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
   }
   return total;
 }

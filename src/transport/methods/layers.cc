@@ -3,25 +3,27 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"layers_midpoint", 2, false, "homogeneous layers with the medium of their middle",
-                           "Jones, J. Opt. Soc. Am. 38, 671 (1948); interfaces: docs/methods.md"};
+constexpr MethodInfo kMidpoint{"layers_midpoint", 2, false, false, "homogeneous layers with the medium of their middle",
+                               "Jones, J. Opt. Soc. Am. 38, 671 (1948); interfaces: docs/methods.md"};
+constexpr MethodInfo kEdge{"layers_edge", 1, false, false, "homogeneous layers with the medium of their upper face",
+                           "Steinberg, ACM TOG 39(3) (2020): its brute force"};
 
-void middles(const Mesh& mesh, std::vector<double>& u) {
+void sampled_depths(const Mesh& mesh, double place, std::vector<double>& u) {
   u.resize(mesh.size() - 1);
-  for (std::size_t i = 0; i < u.size(); ++i) u[i] = 0.5 * (mesh[i] + mesh[i + 1]);
+  for (std::size_t i = 0; i < u.size(); ++i) u[i] = (1 - place) * mesh[i] + place * mesh[i + 1];
 }
 
 }  // namespace
 
 template <class S>
-const MethodInfo& LayersMidpoint<S>::info() const {
-  return kInfo;
-}
+LayersMidpoint<S>::LayersMidpoint() : Layers<S>(kMidpoint, 0.5) {}
+template <class S>
+LayersEdge<S>::LayersEdge() : Layers<S>(kEdge, 0.0) {}
 
 template <class S>
-Mat2<S> LayersMidpoint<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
+Mat2<S> Layers<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
   thread_local std::vector<double> u;
-  middles(mesh, u);
+  sampled_depths(mesh, place_, u);
   thread_local std::vector<OpticalPoint<S>> layers;
   layers.resize(u.size());
   column.sample(u, layers.data());
@@ -47,9 +49,9 @@ Mat2<S> LayersMidpoint<S>::transfer(const Column<S>& column, const Ray<S>& ray, 
 }
 
 template <class S>
-Su2<S> LayersMidpoint<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
+Su2<S> Layers<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
   thread_local std::vector<double> u;
-  middles(mesh, u);
+  sampled_depths(mesh, place_, u);
   Su2<S> total = Su2<S>::identity();
   const auto advance = [&](std::size_t i, const Vec3<S>& v) {
     total = su2_exp(S(mesh[i + 1] - mesh[i]) * v) * total;
@@ -68,7 +70,10 @@ Su2<S> LayersMidpoint<S>::retarder(const Column<S>& column, const Ray<S>& ray, c
   return total;
 }
 
-#define BIREFIT_INSTANTIATE(S) template class LayersMidpoint<S>;
+#define BIREFIT_INSTANTIATE(S) \
+  template class Layers<S>;    \
+  template class LayersMidpoint<S>; \
+  template class LayersEdge<S>;
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit
