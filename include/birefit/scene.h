@@ -141,6 +141,7 @@ struct View {
 enum class Ceiling {
   one_way,  ///< E and H continuous, backward waves dropped (default)
   e_only,   ///< only tangential E continuous: the source paper's
+  reflections,  ///< all of Maxwell's equations in the layers, both faces included; cells and slabs
 };
 
 struct Scene {

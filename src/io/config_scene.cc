@@ -503,13 +503,15 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
 
   const Block physics = reader.block(root, "physics", {"ceiling", "max_seconds"}, false);
   const YamlNode* ceiling = physics.find("ceiling");
-  if (ceiling && ceiling->is_scalar() && (ceiling->text == "reflections" || ceiling->text == "wave")) {
-    reader.problems.add(ceiling->where, "ceiling: " + ceiling->text + " is not available yet",
-                        "known: one_way, e_only and auto");
+  const bool layered = std::holds_alternative<Cell>(scene.sample) || std::holds_alternative<Slab>(scene.sample);
+  if (ceiling && ceiling->is_scalar() && ceiling->text == "wave") {
+    reader.problems.add(ceiling->where, "ceiling: wave is not available yet", "known: one_way, e_only, reflections and auto");
+  } else if (ceiling && ceiling->is_scalar() && ceiling->text == "reflections" && !layered) {
+    reader.problems.add(ceiling->where, "ceiling: reflections is for cells and slabs",
+                        "use one_way: its model error says how large reflections are here");
   } else {
-    scene.ceiling = reader.choice(physics, "ceiling", {"one_way", "e_only", "auto"}).value_or("auto") == "e_only"
-                        ? Ceiling::e_only
-                        : Ceiling::one_way;
+    const std::string name = reader.choice(physics, "ceiling", {"one_way", "e_only", "reflections", "auto"}).value_or("auto");
+    scene.ceiling = name == "e_only" ? Ceiling::e_only : name == "reflections" ? Ceiling::reflections : Ceiling::one_way;
   }
   if (const YamlNode* seconds = physics.find("max_seconds"))
     reader.problems.add(seconds->where, "max_seconds belongs to ceiling: wave, which is not available yet", "leave it out");

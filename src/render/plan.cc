@@ -55,6 +55,9 @@ void check_method(const Scene& scene) {
   if (std::find(names.begin(), names.end(), scene.method) == names.end())
     throw UserError(Where{}, fmt::format("transport method '{}' does not exist", scene.method),
                     fmt::format("use auto or one of: {}", fmt::join(names, ", ")));
+  if ((scene.method == "berreman") != (scene.ceiling == Ceiling::reflections))
+    throw UserError(Where{}, fmt::format("transport method '{}' and this physics.ceiling exclude each other", scene.method),
+                    "berreman computes all reflections and belongs to ceiling: reflections; leave transport.method at auto");
 }
 
 // ---- what no method here models ------------------------------------------------------------------------------------------
@@ -153,6 +156,8 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
 
 RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
+  if (scene.ceiling == Ceiling::reflections)
+    throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
   const Droplet& droplet = std::get<Droplet>(scene.sample);
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
@@ -323,6 +328,45 @@ bool plan_fringe_means(const Scene& scene, const Values<double>& value, const Pl
   return true;
 }
 
+/// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
+RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o,
+                            const std::vector<std::pair<double, double>>& directions) {
+  RenderPlan plan;
+  plan.method = "berreman";
+  const Berreman<double> method;
+  // Halving a step of order 4 leaves a sixteenth of its error.
+  const auto change = [&](int n) {
+    const Mesh mesh = uniform_mesh(n, o.column->breaks);
+    Mesh halved{0.0};
+    for (std::size_t i = 1; i < mesh.size(); ++i) halved.insert(halved.end(), {0.5 * (mesh[i - 1] + mesh[i]), mesh[i]});
+    double largest = 0;
+    for (const auto& [tx, ty] : directions)
+      largest = std::max(largest, intensity_distance(planar_jones<double>(o, method, mesh, tx, ty),
+                                                     planar_jones<double>(o, method, halved, tx, ty)));
+    return largest;
+  };
+  plan.steps = choose(kSteps, scene.intensity_accuracy, change, plan.numerical_error);
+  plan.reasons.push_back(fmt::format("{} steps of the 4 x 4 transport hold the intensity to {} on {} directions (asked: {})", plan.steps,
+                                     sci(plan.numerical_error), directions.size(), sci(scene.intensity_accuracy)));
+  plan.reasons.push_back("asked for by physics.ceiling: all reflections, between the two faces too");
+  if (plan.numerical_error > scene.intensity_accuracy)
+    plan.warnings.push_back(fmt::format("Even {} steps err by {}.", plan.steps, sci(plan.numerical_error)));
+  double largest_phase = 0, round_trip = 0;
+  OpticalPoint<double> middle;
+  const double half[1] = {0.5};
+  o.column->sample(half, &middle);
+  for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
+  round_trip = 2 * o.k0 * std::sqrt(middle.ordinary) * middle.depth_slope_um;
+  const double bandwidth = scene.microscope.bandwidth_nm / value(scene.microscope.wavelength_nm);
+  if (round_trip * bandwidth > 1)
+    plan.warnings.push_back(fmt::format(
+        "Light of this bandwidth does not interfere between the faces (the phase of a round trip spreads by {:.2g} rad), but is computed "
+        "as if it did: ceiling one_way is nearer to what is seen.", round_trip * bandwidth));
+  note_illumination(scene, value, largest_phase, plan);
+  plan.cost_seconds = 2e-5 * plan.steps * static_cast<double>(directions.size());
+  return plan;
+}
+
 RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   const PlanarOptics<double> o = planar_optics(scene, value);
@@ -338,6 +382,7 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
         throw UserError(Where{}, "a direction of this scene is totally reflected: its tangential wavevector exceeds an index of the sample",
                         "lower the angle of incidence or the surround's index");
   }
+  if (scene.ceiling == Ceiling::reflections) return plan_reflections(scene, value, o, directions);
   // Converged truth on the pilots.
   const double target = scene.intensity_accuracy / 2;
   const Magnus4<double> magnus;
@@ -374,11 +419,11 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
         plan.warnings.push_back(fmt::format("The diagonal method, asked for by name, errs by {} here.", sci(error)));
     }
   }
-  if (plan.method.empty() && scene.method == "layers_midpoint") {
+  if (plan.method.empty() && scene.method != "auto" && scene.method != "magnus4") {
     plan.method = scene.method;
     plan.steps = choose(kSteps, target, [&](int k) { return worst(transport_method<double>(scene.method), uniform_mesh(k, o.column->breaks)); },
                         plan.numerical_error);
-    plan.reasons.push_back(fmt::format("layers were asked for by name: {} of them err by {}", plan.steps, sci(plan.numerical_error)));
+    plan.reasons.push_back(fmt::format("{} was asked for by name: {} steps err by {}", plan.method, plan.steps, sci(plan.numerical_error)));
   }
   if (plan.method.empty()) {
     plan.method = "magnus4";
@@ -481,7 +526,9 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
   } else {
     result = plan_planar(scene, value);
   }
-  result.physics = scene.ceiling == Ceiling::e_only ? "e_only" : "one_way";
+  result.physics = scene.ceiling == Ceiling::e_only        ? "e_only"
+                   : scene.ceiling == Ceiling::reflections ? "reflections"
+                                                           : "one_way";
   return result;
 }
 
