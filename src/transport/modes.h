@@ -2,6 +2,8 @@
 // The ordinary and the extraordinary wave of a uniaxial medium, and transport written in them. Singular where the axis is
 // parallel to the wavevector: the methods that use it say so.
 
+#include <algorithm>
+
 #include "medium/column.h"
 #include "transport/method.h"
 
@@ -102,7 +104,9 @@ inline OpticalPoint<Slope<double>> by_depth(OpticalPoint<Slope<double>> p) {
 inline OpticalPoint<Series<double>> by_depth(OpticalPoint<Series<double>> p) {
   const Series<double> u_per_um = inverse(p.depth_slope_um);
   Series<double> u;
-  for (std::size_t k = 1; k < u.c.size(); ++k) u = integral(u_per_um(u));
+  const bool constant = std::all_of(p.depth_slope_um.c.begin() + 1, p.depth_slope_um.c.end(), [](double c) { return c == 0; });
+  const std::size_t passes = constant ? 1 : u.c.size() - 1;
+  for (std::size_t k = 0; k < passes; ++k) u = integral(u_per_um(u));
   for (Series<double>* x : {&p.axis.x, &p.axis.y, &p.axis.z, &p.ordinary, &p.extraordinary, &p.ordinary_im,
                             &p.extraordinary_im, &p.depth_slope_um})
     *x = (*x)(u);

@@ -122,7 +122,6 @@ TEST(WeiNorman, CoefficientsOfTheModesAgree) {
     check(g.b3, "b3");
   }
   RecordProperty("worst", std::to_string(worst));
-  std::cout << "[worst] " << worst << "\n";
 }
 
 TEST(WeiNorman, TaylorCoefficientsAgree) {
@@ -149,18 +148,18 @@ TEST(WeiNorman, TaylorCoefficientsAgree) {
         const Z value = Z(series.re.c[k], series.im.c[k]) * std::pow(c.law.d, k);
         const double error = std::abs(value - entry(table, row, column)) / largest;
         worst = std::max(worst, error);
-        EXPECT_LT(error, 1e-11) << name << " " << column << " order " << k;
+        // Rounding grows by the condition of the modes (1/angle^2 between axis and light, 80 for P5) over 11 recurrences.
+        EXPECT_LT(error, name == "P5" ? 1e-10 : 1e-12) << name << " " << column << " order " << k;
       }
     }
   }
-  std::cout << "[worst] " << worst << "\n";
 }
 
 struct PlainChord {
   double b, s0;
   template <class T>
   OpticalPoint<T> at(const T& u) const {
-    const T s = s0 + u;
+    const T s = s0 + 0.5 * u;  // RadialLaw counts depth twice: both halves of a chord in one
     const T f = inverse_root(s * s + b * b);
     return {{b * f, T(0.0), s * f}, T(1.52 * 1.52), T(1.74 * 1.74), T(0.0), T(0.0), T(1.0)};  // u is the depth in um
   }
@@ -221,12 +220,11 @@ TEST(WeiNorman, GaussianMomentsAgree) {
       worst = std::max(worst, error);
       // 1e-12 as designed; the recurrence for n = 11 at |x1| > 2 |x2| loses up to 4e-10; the phase itself is known to
       // 1e-16 (|x1| + |x2|).
-      const bool lossy = std::abs(x1) > 2 * std::abs(x2) && std::abs(x1) + std::abs(x2) > 180 && std::abs(x1) < 6 * std::abs(x2) + n + 24;
+      const bool lossy = std::abs(x1) > 2 * std::abs(x2) && std::abs(x1) + 2 * std::abs(x2) > 180 && std::abs(x1) < 6 * std::abs(x2) + n + 24;
       const double phase = 1e-15 * (std::abs(x1) + std::abs(x2));
       EXPECT_LT(error, (lossy ? (n == 7 ? 2e-12 : 4e-10) : 1e-12) + phase) << "x1 " << x1 << " x2 " << x2 << " m " << m << " n " << n;
     }
   }
-  std::cout << "[worst] " << worst << "\n";
 }
 
 // Where one way of evaluation hands over to the next, both must agree: moments are smooth in x1, x2.
@@ -264,20 +262,20 @@ TEST(WeiNorman, ClosedFormOfOneLayerAgrees) {
   for (std::size_t row = 0; row < table.size(); ++row) {
     const std::string name = table.text(row, "profile");
     const Case c = profile(name);
-    const double u = table.number(row, "z_um") / c.law.d;
+    const double u = std::round(16 * table.number(row, "z_um") / c.law.d) / 16;  // 16ths of d, printed to ten decimals
     const WeiNormanLayer layer = wei_norman_layer(*c.column(), c.ray, 0, u, paper(static_cast<int>(table.number(row, "order"))));
     const auto [g1, g2] = g1_g2(layer);
     const Z f = entry(table, row, "f"), g3 = entry(table, row, "g3");
     SCOPED_TRACE(name + " row " + std::to_string(row));
-    // z has ten decimals: 1e-10 um of 20 rad/um. Beyond that, phases keep 1e-14 of their size (1e3 rad times rounding of
-    // their coefficients), series near their radius of convergence the rounding of their largest terms.
-    const double phase = 1e-11 * (1 + std::abs(f));
+    // Phases keep the rounding of their coefficients and terms; beyond the radius of convergence (P5) the terms are larger
+    // than the sum.
+    const double phase = 1e-13 * (1 + std::abs(f)) * (name == "P5" ? 1000 : 1);
     EXPECT_LT(std::abs(z_of(layer.f) - f), phase);
     EXPECT_LT(std::abs(z_of(layer.g3) - g3), phase);
     const auto check = [&](const Z& value, const Z& expected) {
       const double error = std::abs(value - expected) / std::max(std::abs(expected), 1e-5);
-      worst = std::max(worst, error);
-      EXPECT_LT(error, phase + 1e-10);
+      worst = std::max(worst, error / (10 * phase + 1e-12));
+      EXPECT_LT(error, 10 * phase + 1e-12);
     };
     check(g1, entry(table, row, "g1"));
     check(g2, entry(table, row, "g2"));
@@ -285,7 +283,6 @@ TEST(WeiNorman, ClosedFormOfOneLayerAgrees) {
     worst37 = std::max(worst37, std::abs(layer.phase_residual_rad / err37 - 1));
     EXPECT_NEAR(layer.phase_residual_rad, err37, 0.01 * err37 + 1e-9);
   }
-  std::cout << "[worst] " << worst << " eq. 37 " << worst37 << "\n";
 }
 
 TEST(WeiNorman, NothingHappensWhereTheQuadraticPhaseVanishes) {
@@ -303,7 +300,6 @@ TEST(WeiNorman, NothingHappensWhereTheQuadraticPhaseVanishes) {
     // The phase of 21 rad and the envelope's series leave 1e-14 in the prototype's stable form.
     EXPECT_LT(std::max(e1, e2), 1e-12) << "p " << table.text(row, "p") << " order " << table.text(row, "order");
   }
-  std::cout << "[worst] " << worst << "\n";
 }
 
 // ---- errors of the method ----------------------------------------------------------------------------------------------
@@ -367,7 +363,6 @@ TEST(WeiNorman, ErrorsWithSubLayersAreTheMeasuredOnes) {
       check("ierr_", crossed_error(t, expected));
     }
   }
-  std::cout << "[compared] " << compared << "\n";
 }
 
 TEST(WeiNorman, OneLayerErrorsAreTheMeasuredOnes) {
@@ -399,20 +394,21 @@ TEST(WeiNorman, TransferTableAgreesWithMagnusToo) {
   }
 }
 
-TEST(WeiNorman, EstimateBoundsTheErrorOfThePapersForm) {
-  // The estimate is of the simplification alone: the table's `simplified` column, whose ferr it meets within 30 %, and within
-  // a factor 3 for P2 and P5 as one layer, where it comes out high.
+TEST(WeiNorman, EstimateIsTheErrorOfTheSimplification) {
   const ReferenceTable table = table_of("sub_layers.csv");
   for (std::size_t row = 0; row < table.size(); ++row) {
     const std::string name = table.text(row, "profile");
-    const double measured = table.number(row, "ferr_simplified"), layers = table.number(row, "sub_layers");
-    if (measured < 1e-9 || !(measured < 1)) continue;  // a fixed axis: exact
+    const double measured = table.number(row, "ferr_simplified"), improved = table.number(row, "ferr_exp_simplified");
+    const int layers = static_cast<int>(table.number(row, "sub_layers"));
+    if (measured < 1e-9 || !(measured < 1) || layers > 256) continue;  // a fixed axis: exact
     const Case c = profile(name);
-    const WeiNormanReport r = wei_norman_report(*c.column(), c.ray, uniform_mesh(static_cast<int>(layers)), kWeiNormanPaper);
-    EXPECT_LT(r.estimate, 4 * measured) << name << " " << layers;
-    EXPECT_GT(r.estimate, 0.5 * measured) << name << " " << layers;
-    std::cout << name << " " << layers << " " << r.estimate / measured << " valid " << r.valid << " tail " << r.taylor_tail
-              << " b1h " << r.peak_coupling << " v22 " << r.min_v22 << " err37 " << r.phase_residual_rad / table.number(row, "err37_max_rad") << "\n";
+    const WeiNormanReport r = wei_norman_report(*c.column(), c.ray, uniform_mesh(layers), kWeiNormanPaper);
+    SCOPED_TRACE(name + " " + std::to_string(layers));
+    // An estimate to leading order: 30 % where layers are valid, 3 times high for P2 and P5 as single layers.
+    EXPECT_LT(r.estimate, (r.valid ? 1.3 : 4) * measured);
+    EXPECT_GT(r.estimate, 0.7 * measured);
+    EXPECT_GT(1.3 * r.estimate, improved);
+    EXPECT_NEAR(r.phase_residual_rad, table.number(row, "err37_max_rad"), 0.06 * r.phase_residual_rad + 1e-10);
   }
 }
 
@@ -458,7 +454,7 @@ TEST(WeiNorman, LayersOfAUniformTwistConvergeToTheClosedForm) {
   const Z x = std::sqrt(-b3 * b3 - b1 * b2), s = std::sin(5.0 * x) / x, co = std::cos(5.0 * x);
   const Z v[4] = {co + b3 * s, b1 * s, b2 * s, co - b3 * s};
   double before = 0;
-  for (const int layers : {32, 64, 128}) {
+  for (const int layers : {512, 1024, 2048}) {
     Mat2<double> u = Mat2<double>::identity();
     Z f = 0;
     for (int i = 0; i < layers; ++i) {
@@ -474,7 +470,7 @@ TEST(WeiNorman, LayersOfAUniformTwistConvergeToTheClosedForm) {
     }
     before = error;
   }
-  EXPECT_LT(before, 1e-4);
+  EXPECT_LT(before, 1e-6);  // 0.6/layers^2 of a turn by 1.2 rad
 }
 
 TEST(WeiNorman, BothContinuitiesConvergeToMagnus) {
@@ -548,10 +544,13 @@ TEST(WeiNorman, ReportRefusesWhatIsWrong) {
   EXPECT_FALSE(report(profile("P1tn"), 1).valid) << "turns by 90 degrees";
   EXPECT_FALSE(report(profile("P5"), 4).valid) << "beyond the radius of convergence";
   EXPECT_TRUE(report(profile("P5"), 64).valid) << report(profile("P5"), 64).reason;
-  // The axis along the light: no modes. Finite or not, not valid.
-  const auto parallel = column_of<double>(TiltTwistLaw{90 * kDeg, 0, 0, 0, 0, 1.52, 1.74, 5});
-  const Ray<double> ray{10, 0, 0, Continuity::e_only};
-  const WeiNormanReport r = wei_norman_report(*parallel, ray, uniform_mesh(4), kWeiNormanPaper);
+  // An axis that passes the ordinary wavevector at 2e-3 rad: modes turn by 180 degrees within 10 nm.
+  const auto passing = column_of<double>(TiltTwistLaw{0.6, 1.5, 0, 0.002, 0, 1.522, 1.739, 5});
+  const Ray<double> ray{2 * std::numbers::pi / 0.55, 0.3, 0, Continuity::e_only};
+  EXPECT_FALSE(wei_norman_report(*passing, ray, uniform_mesh(256), kWeiNormanPaper).valid);
+  // Exactly along the light at a layer's face there are no modes.
+  const auto along = column_of<double>(TiltTwistLaw{std::numbers::pi / 2, 0.4, 0, 0, 0.5, 1.522, 1.739, 5});
+  const WeiNormanReport r = wei_norman_report(*along, {10, 0, 0, Continuity::e_only}, uniform_mesh(4), kWeiNormanPaper);
   EXPECT_FALSE(r.valid);
 }
 

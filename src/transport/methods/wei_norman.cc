@@ -121,6 +121,16 @@ C coupling_integral(const ComplexSeries& envelope, double c1, double c2, double 
 /// Couplings too small to be seen are not judged: their series is rounding.
 constexpr double kInvisible = 1e-9;
 double tail_of(const Sizes& s) { return s.sum > kInvisible ? s.last / s.sum : 0; }
+/// The terms of f or g3 behind the linear one.
+Sizes varying_part(const ComplexSeries& phase, double end, int order) {
+  Sizes sizes;
+  for (int k = 2; k <= order + 1; ++k) {
+    const double size = magnitude(C(phase.re.c[k], phase.im.c[k])) * std::pow(end, k);
+    sizes.sum += size;
+    if (k == order + 1) sizes.last = size;
+  }
+  return sizes;
+}
 
 WeiNormanLayer closed_layer(const LayerMedium<double>& m, const Ray<double>& ray, const WeiNormanForm& form) {
   const OpticalPoint<Series<double>> medium = by_depth(m.series);
@@ -175,6 +185,9 @@ WeiNormanLayer closed_layer(const LayerMedium<double>& m, const Ray<double>& ray
   layer.G1 = exp(-2.0 * g3_first) * couple(first, 1, sizes[0]);
   layer.G2 = exp(2.0 * g3_first) * couple(second, -1, sizes[1]);
   layer.taylor_tail = std::max(tail_of(sizes[0]), tail_of(sizes[1]));
+  if (form.phase_series)
+    for (const ComplexSeries* s : {&f, &g3})
+      layer.taylor_tail = std::max(layer.taylor_tail, tail_of(varying_part(*s, std::max(behind, -before), form.order)));
 
   for (std::size_t i = 0; i < at_nodes.size(); ++i) {
     const double b1 = magnitude(at_nodes[i].b1), b2 = magnitude(at_nodes[i].b2), b3_size = magnitude(at_nodes[i].b3);
@@ -329,22 +342,21 @@ WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double
   return report;
 }
 
-#define BIREFIT_METHOD(Method, Info)                                                                              \
-  template <class S>                                                                                              \
-  const MethodInfo& Method<S>::info() const {                                                                     \
-    return Info;                                                                                                  \
-  }                                                                                                               \
-  template <class S>                                                                                              \
-  Mat2<S> Method<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {               \
-    return transfer_of(Info.name, column, ray, mesh, form_);                                                      \
-  }                                                                                                               \
-  template <class S>                                                                                              \
-  Su2<S> Method<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {                \
-    return retarder_of(Info.name, column, ray, mesh, form_);                                                      \
+#define BIREFIT_WEI_NORMAN(Method, Info)                                                            \
+  template <class S>                                                                                \
+  const MethodInfo& Method<S>::info() const {                                                       \
+    return Info;                                                                                    \
+  }                                                                                                 \
+  template <class S>                                                                                \
+  Mat2<S> Method<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const { \
+    return transfer_of(Info.name, column, ray, mesh, form_);                                        \
+  }                                                                                                 \
+  template <class S>                                                                                \
+  Su2<S> Method<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {  \
+    return retarder_of(Info.name, column, ray, mesh, form_);                                        \
   }
-BIREFIT_METHOD(WeiNorman, kPaperInfo)
-BIREFIT_METHOD(WeiNormanExp, kExpInfo)
-#undef BIREFIT_METHOD
+BIREFIT_WEI_NORMAN(WeiNorman, kPaperInfo)
+BIREFIT_WEI_NORMAN(WeiNormanExp, kExpInfo)
 
 #define BIREFIT_INSTANTIATE(S) \
   template class WeiNorman<S>; \

@@ -32,20 +32,21 @@ struct WeiNormanLayer {
   double length_um = 0;
   double c1_per_um = 0, c2_per_um2 = 0;
   double phase_residual_rad = 0;  ///< eq. 37: phase of the coupling that c1 z + c2 z^2 leaves out
-  double taylor_tail = 0;         ///< last term of the envelopes' series over the sum of all
+  double taylor_tail = 0;         ///< last term over the sum of all: of the envelopes, and of f and g3 where by series
   double peak_coupling = 0;       ///< max |b1|, |b2| times the length
   double estimate = 0;            ///< see WeiNormanReport
   Matrix2<Complex<double>> mode_transfer(bool exponential) const;  ///< U
 };
-/// Layer [from, to] in u of a column that is smooth there; `check` fills the last four fields but the second (the price
-/// of a quadrature).
+/// Layer [from, to] in u of a column that is smooth there; `check` fills phase_residual_rad, peak_coupling and estimate
+/// too, at the price of a quadrature.
 WeiNormanLayer wei_norman_layer(const Column<double>& column, const Ray<double>& ray, double from, double to,
                                 const WeiNormanForm& form, bool check = true);
 
 /// Can a result be trusted, and how far?
 struct WeiNormanReport {
   /// Relative error of the transfer from dropping -b2 g1 in eq. 27 and from the order of the couplings:
-  /// sum of dz |b1 b2| min(h/2, 1/(2 |b3|)). Measured within a factor 3 for the paper's form; an upper bound for the other.
+  /// sum of dz |b1 b2| min(h/2, 1/(2 |b3|)). Measured within 30 % for the paper's form (a factor 3 high for single layers
+  /// that are not valid anyway), an upper bound, to the same 30 %, for the other.
   double estimate = 0;
   double phase_residual_rad = 0;  ///< the largest of all layers, as are the next two
   double taylor_tail = 0;
