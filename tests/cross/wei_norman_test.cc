@@ -10,6 +10,7 @@
 #include "profiles.h"
 #include "reference_table.h"
 #include "transport/gauss_moments.h"
+#include "transport/methods/ode_scalar.h"
 #include "transport/methods/wei_norman.h"
 #include "transport/modes.h"
 
@@ -97,7 +98,6 @@ ReferenceTable table_of(const std::string& name) { return ReferenceTable(data_pa
 
 TEST(WeiNorman, CoefficientsOfTheModesAgree) {
   const ReferenceTable table = table_of("coefficients.csv");
-  double worst = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
     const Case c = profile(table.text(row, "profile"));
     const double u[1] = {table.number(row, "z_um") / c.law.d};
@@ -106,13 +106,12 @@ TEST(WeiNorman, CoefficientsOfTheModesAgree) {
     p = by_depth(p);
     const ModalGenerator<double> g = modal_generator(p, c.ray);
     const auto m = unit_modes(value_of(p), c.ray.kx, c.ray.ky);
-    // The table holds 1e-14 of the largest entry, k0 q ~ 20; z in it has ten decimals, 1e-10 um of a profile that
-    // turns within 0.5 um.
+    // The table holds 1e-14 of the largest entry, k0 q ~ 20; z in it has ten decimals: 5e-11 um of a profile that turns
+    // within 0.5 um, for the one d that is no round number (P5).
     const double scale = std::abs(entry(table, row, "a"));
     const auto check = [&](const Complex<double>& value, const std::string& name) {
       const double error = std::abs(z_of(value) - entry(table, row, name)) / scale;
-      worst = std::max(worst, error);
-      EXPECT_LT(error, 2e-11) << table.text(row, "profile") << " row " << row << " " << name;
+      EXPECT_LT(error, c.law.shape == Shape::chord ? 2e-11 : 1e-13) << table.text(row, "profile") << " row " << row << " " << name;
     };
     check(m.q_o, "qo");
     check(m.q_e, "qe");
@@ -121,7 +120,6 @@ TEST(WeiNorman, CoefficientsOfTheModesAgree) {
     check(g.b2, "b2");
     check(g.b3, "b3");
   }
-  RecordProperty("worst", std::to_string(worst));
 }
 
 TEST(WeiNorman, TaylorCoefficientsAgree) {
@@ -129,7 +127,6 @@ TEST(WeiNorman, TaylorCoefficientsAgree) {
   std::map<std::string, std::vector<std::size_t>> profiles;
   for (std::size_t row = 0; row < table.size(); ++row) profiles[table.text(row, "profile")].push_back(row);
   ASSERT_EQ(profiles.size(), 14u);
-  double worst = 0;
   for (const auto& [name, rows] : profiles) {
     const Case c = profile(name);
     OpticalPoint<Series<double>> p;
@@ -147,7 +144,6 @@ TEST(WeiNorman, TaylorCoefficientsAgree) {
         const int k = static_cast<int>(table.number(row, "order"));
         const Z value = Z(series.re.c[k], series.im.c[k]) * std::pow(c.law.d, k);
         const double error = std::abs(value - entry(table, row, column)) / largest;
-        worst = std::max(worst, error);
         // Rounding grows by the condition of the modes (1/angle^2 between axis and light, 80 for P5) over 11 recurrences.
         EXPECT_LT(error, name == "P5" ? 1e-10 : 1e-12) << name << " " << column << " order " << k;
       }
@@ -207,7 +203,6 @@ TEST(Taylor, FunctionsMatchTheirKnownSeries) {
 
 TEST(WeiNorman, GaussianMomentsAgree) {
   const ReferenceTable table = table_of("gauss_moments.csv");
-  double worst = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
     const double x1 = table.number(row, "x1"), x2 = table.number(row, "x2");
     const int m = static_cast<int>(table.number(row, "m"));
@@ -217,7 +212,6 @@ TEST(WeiNorman, GaussianMomentsAgree) {
       Complex<double> moments[kMaxMoment + 1];
       gauss_moments(n, x1, x2, moments);
       const double error = std::abs(z_of(moments[m]) - expected) / std::abs(expected);
-      worst = std::max(worst, error);
       // 1e-12 as designed; the recurrence for n = 11 at |x1| > 2 |x2| loses up to 4e-10; the phase itself is known to
       // 1e-16 (|x1| + |x2|).
       const bool lossy = std::abs(x1) > 2 * std::abs(x2) && std::abs(x1) + 2 * std::abs(x2) > 180 && std::abs(x1) < 6 * std::abs(x2) + n + 24;
@@ -258,7 +252,6 @@ WeiNormanForm paper(int order) {
 
 TEST(WeiNorman, ClosedFormOfOneLayerAgrees) {
   const ReferenceTable table = table_of("closed_form.csv");
-  double worst = 0, worst37 = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
     const std::string name = table.text(row, "profile");
     const Case c = profile(name);
@@ -274,20 +267,17 @@ TEST(WeiNorman, ClosedFormOfOneLayerAgrees) {
     EXPECT_LT(std::abs(z_of(layer.g3) - g3), phase);
     const auto check = [&](const Z& value, const Z& expected) {
       const double error = std::abs(value - expected) / std::max(std::abs(expected), 1e-5);
-      worst = std::max(worst, error / (10 * phase + 1e-12));
       EXPECT_LT(error, 10 * phase + 1e-12);
     };
     check(g1, entry(table, row, "g1"));
     check(g2, entry(table, row, "g2"));
     const double err37 = table.number(row, "err37_rad");
-    worst37 = std::max(worst37, std::abs(layer.phase_residual_rad / err37 - 1));
-    EXPECT_NEAR(layer.phase_residual_rad, err37, 0.01 * err37 + 1e-9);
+    EXPECT_NEAR(layer.phase_residual_rad, err37, 1e-3 * err37 + 1e-9);
   }
 }
 
 TEST(WeiNorman, NothingHappensWhereTheQuadraticPhaseVanishes) {
   const ReferenceTable table = table_of("c2_handover.csv");
-  double worst = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
     const Case c = profile("P6(p=" + table.text(row, "p") + ")");
     const WeiNormanLayer layer = wei_norman_layer(*c.column(), c.ray, 0, 1, paper(static_cast<int>(table.number(row, "order"))));
@@ -296,7 +286,6 @@ TEST(WeiNorman, NothingHappensWhereTheQuadraticPhaseVanishes) {
     EXPECT_NEAR(layer.c2_per_um2, table.number(row, "c2"), 1e-14);
     const double e1 = std::abs(g1 - entry(table, row, "g1")) / std::abs(entry(table, row, "g1"));
     const double e2 = std::abs(g2 - entry(table, row, "g2")) / std::abs(entry(table, row, "g2"));
-    worst = std::max({worst, e1, e2});
     // The phase of 21 rad and the envelope's series leave 1e-14 in the prototype's stable form.
     EXPECT_LT(std::max(e1, e2), 1e-12) << "p " << table.text(row, "p") << " order " << table.text(row, "order");
   }
@@ -409,6 +398,101 @@ TEST(WeiNorman, EstimateIsTheErrorOfTheSimplification) {
     EXPECT_GT(r.estimate, 0.7 * measured);
     EXPECT_GT(1.3 * r.estimate, improved);
     EXPECT_NEAR(r.phase_residual_rad, table.number(row, "err37_max_rad"), 0.06 * r.phase_residual_rad + 1e-10);
+  }
+}
+
+// ---- the four equations themselves -------------------------------------------------------------------------------------
+
+constexpr double kNever = 1e300;
+
+TEST(OdeScalar, FunctionsAgree) {
+  const ReferenceTable table = table_of("scalar_functions.csv");
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    const Case c = profile(table.text(row, "profile"));
+    const double u = std::round(16 * table.number(row, "z_um") / c.law.d) / 16;
+    const OdeScalarResult r = ode_scalar(*c.column(), c.ray, 0, u, 1e-11, kNever);
+    EXPECT_EQ(r.restarts, 0);
+    // Local errors of 1e-11 of each function add up over some hundred steps; phases reach 1e4 rad.
+    const auto check = [&](const Complex<double>& value, const std::string& name) {
+      const Z expected = entry(table, row, name);
+      EXPECT_LT(std::abs(z_of(value) - expected), 1e-8 * (1 + std::abs(expected))) << table.text(row, "profile") << " row " << row << " " << name;
+    };
+    check(r.f, "f");
+    check(r.g1, "g1");
+    check(r.g2, "g2");
+    check(r.g3, "g3");
+  }
+}
+
+/// Normal incidence, twist by 135 degrees in 5 um: g1 grows as 1/delta n.
+struct TwistCase {
+  LawColumn<double, TiltTwistLaw> column;
+  Ray<double> ray{2 * std::numbers::pi / 0.55, 0, 0, Continuity::e_only};
+  explicit TwistCase(double delta_n) : column(TiltTwistLaw{0, 0, 0, 0, 135 * kDeg, 1.5, 1.5 + delta_n, 5}) {}
+};
+
+TEST(OdeScalar, RestartsWhereG1HasAPole) {
+  const ReferenceTable table = table_of("poles_twist.csv");
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    const TwistCase c(table.number(row, "delta_n"));
+    const Mat2<double> exact = Magnus4<double>().transfer(c.column, c.ray, uniform_mesh(2048));
+    const bool pole = table.number(row, "max_abs_g1_two_level") > 12;  // of the result's 10
+    EXPECT_EQ(ode_scalar(c.column, c.ray, 0, 1, 1e-9).restarts > 0, pole) << row;
+    EXPECT_LT(distance(OdeScalar<double>(1e-10).transfer(c.column, c.ray, {0, 1}), exact), 1e-7) << row;
+  }
+}
+
+/// f = phi/2 + (phi/4)[tanh((z - 1)/0.15) + tanh((z - 1 - separation)/0.15)], d = separation + 2.
+struct TwoTwistsLaw {
+  double phi, separation;
+  template <class T>
+  OpticalPoint<T> at(const T& u) const {
+    const T z = u * (separation + 2);
+    const auto tanh = [](const T& x) { return 1.0 - 2.0 / (exp(2.0 * x) + 1.0); };
+    const T azimuth = 0.5 * phi + 0.25 * phi * (tanh((z - 1.0) * (1 / 0.15)) + tanh((z - 1.0 - separation) * (1 / 0.15)));
+    return {axis_from_angles<T>(T(0.0), azimuth), T(1.5 * 1.5), T(1.7 * 1.7), T(0.0), T(0.0), T(separation + 2)};
+  }
+};
+
+// V22 = 0 at the exit face: g1 is infinite there, the transfer is not.
+TEST(OdeScalar, ExactPolesAreNoFailureOfTransport) {
+  const ReferenceTable table = table_of("poles_exact.csv");
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    const LawColumn<double, TwoTwistsLaw> column({table.number(row, "phi_rad"), table.number(row, "separation_um")});
+    const Ray<double> ray{2 * std::numbers::pi / 0.5, 0, 0, Continuity::e_only};
+    const Mat2<double> exact = Magnus4<double>().transfer(column, ray, uniform_mesh(4096));
+    EXPECT_LT(distance(OdeScalar<double>(1e-10).transfer(column, ray, {0, 1}), exact), 1e-7) << row;
+    if (table.number(row, "abs_V22_exit") < 2e-6) continue;  // g1 itself is lost to rounding
+    const double g1 = std::sqrt(norm(ode_scalar(column, ray, 0, 1, 1e-11, kNever).g1)), expected = table.number(row, "abs_g1_exit");
+    EXPECT_NEAR(g1, expected, 1e-2 * expected) << row;  // phi and the separation are printed to 12 digits, g1 to 5
+  }
+}
+
+TEST(WeiNorman, TheClosedFormIsFiniteAndWrongAtAPole) {
+  const ReferenceTable table = table_of("poles_twist.csv");
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    const TwistCase c(table.number(row, "delta_n"));
+    const Mat2<double> exact = Magnus4<double>().transfer(c.column, c.ray, uniform_mesh(4096));
+    const auto error = [&](const WeiNormanForm& form, int layers) {
+      return distance(transfer_with(form, c.column, c.ray, uniform_mesh(layers)), exact) / size(exact);
+    };
+    EXPECT_NEAR(error(kWeiNormanPaper, 1), table.number(row, "ferr_closed_n7_L1"), 0.01 * table.number(row, "ferr_closed_n7_L1"));
+    EXPECT_NEAR(error(kWeiNormanPaper, 64), table.number(row, "ferr_closed_n7_L64"), 0.01 * table.number(row, "ferr_closed_n7_L64"));
+    // Down to 4e-9: what 4,096 steps of Magnus leave is below 1e-11.
+    EXPECT_NEAR(error(kWeiNormanExp, 64), table.number(row, "ferr_exp_mid_n7_L64"), 0.02 * table.number(row, "ferr_exp_mid_n7_L64"));
+    EXPECT_FALSE(wei_norman_report(c.column, c.ray, {0, 1}, kWeiNormanPaper).valid);
+    EXPECT_TRUE(wei_norman_report(c.column, c.ray, uniform_mesh(64), kWeiNormanPaper).valid);
+  }
+}
+
+TEST(OdeScalar, AgreesWithTheTransferTable) {
+  const ReferenceTable exact = table_of("transfer.csv");
+  for (std::size_t row = 5; row < exact.size(); row += 6) {
+    const Case c = profile(exact.text(row, "profile"));
+    const Mat2<double> expected = reference_transfer(exact, row);
+    const Mat2<double> t = OdeScalar<double>(1e-10).transfer(*c.column(), c.ray, {0, 1});
+    // 1e-10 a step of phases up to 1e4 rad (P3_800).
+    EXPECT_LT(distance(t, expected), 1e-6) << exact.text(row, "profile");
   }
 }
 

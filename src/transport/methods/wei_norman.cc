@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 
+#include "transport/by_lane.h"
 #include "transport/gauss_moments.h"
 #include "transport/modes.h"
 #include "transport/quadrature.h"
@@ -67,26 +67,6 @@ LayerMedium<S> sample_layer(const Column<S>& column, double from, double to, con
   return m;
 }
 
-// One lane of a value, as plain numbers.
-template <class B, int N>
-Dual<double, N> lane_of(const Dual<B, N>& x, int l) {
-  Dual<double, N> r(lane(x.value, l));
-  for (int i = 0; i < N; ++i) r.d[i] = lane(x.d[i], l);
-  return r;
-}
-template <class B, int N>
-Taylor<double, N> lane_of(const Taylor<B, N>& x, int l) {
-  Taylor<double, N> r;
-  for (int k = 0; k <= N; ++k) r.c[k] = lane(x.c[k], l);
-  return r;
-}
-inline double lane_of(double x, int) { return x; }
-inline double lane_of(const Pack& x, int l) { return lane(x, l); }
-template <class T>
-auto lane_of(const OpticalPoint<T>& p, int l) -> OpticalPoint<decltype(lane_of(p.ordinary, l))> {
-  return {{lane_of(p.axis.x, l), lane_of(p.axis.y, l), lane_of(p.axis.z, l)}, lane_of(p.ordinary, l), lane_of(p.extraordinary, l),
-          lane_of(p.ordinary_im, l), lane_of(p.extraordinary_im, l), lane_of(p.depth_slope_um, l)};
-}
 template <class S>
 LayerMedium<double> lane_of(const LayerMedium<S>& m, int l) {
   LayerMedium<double> r{m.at, m.from, m.to, lane_of(m.series, l), lane_of(m.entry, l), lane_of(m.exit, l), {}, m.weight};
@@ -214,89 +194,11 @@ Mat2<double> layer_transfer(const LayerMedium<double>& m, const Ray<double>& ray
 }
 
 template <class S>
-S from_lanes(const std::array<double, kLanes>& values) {
-  if constexpr (std::is_same_v<S, double>)
-    return values[0];
-  else
-    return S::load_unaligned(values.data());
-}
-
-template <class S>
-Mat2<S> transfer_of(const char* name, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
+Mat2<S> transfer_of(const MethodInfo& info, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
                     const WeiNormanForm& form) {
-  if constexpr (!kHasSeries<S>) {
-    throw std::logic_error(std::string(name) + " has no derivatives");
-  } else {
-    constexpr int lanes = std::is_same_v<S, double> ? 1 : kLanes;
-    std::array<Ray<double>, kLanes> rays;
-    std::array<Mat2<double>, kLanes> total;
-    for (int l = 0; l < lanes; ++l) {
-      rays[l] = {lane(ray.k0_per_um, l), lane(ray.kx, l), lane(ray.ky, l), ray.continuity};
-      total[l] = Mat2<double>::identity();
-    }
-    const bool steps_in_medium = column.jumps && ray.continuity == Continuity::e_and_h;
-    OpticalPoint<S> before;
-    for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
-      const LayerMedium<S> medium = sample_layer(column, mesh[i], mesh[i + 1], form, false);
-      const bool step = steps_in_medium && i > 0 && std::binary_search(column.breaks.begin(), column.breaks.end(), mesh[i]);
-      for (int l = 0; l < lanes; ++l) {
-        const LayerMedium<double> one = lane_of(medium, l);
-        const double kx = rays[l].kx, ky = rays[l].ky;
-        if (step) {
-          const OpticalPoint<double> p = lane_of(before, l);
-          total[l] = step_factor(one_way(p, kx, ky).admittance, one_way(p, kx, ky, -1.0).admittance,
-                                 one_way(one.entry, kx, ky).admittance) *
-                     total[l];
-        }
-        total[l] = layer_transfer(one, rays[l], form) * total[l];
-      }
-      before = medium.exit;
-    }
-    std::array<double, kLanes> lanes_of[8];
-    for (int l = 0; l < kLanes; ++l) {
-      const Mat2<double>& t = total[l < lanes ? l : 0];
-      const double entries[8] = {t.a.re, t.a.im, t.b.re, t.b.im, t.c.re, t.c.im, t.d.re, t.d.im};
-      for (int k = 0; k < 8; ++k) lanes_of[k][l] = entries[k];
-    }
-    const auto z = [&](int k) { return Complex<S>{from_lanes<S>(lanes_of[k]), from_lanes<S>(lanes_of[k + 1])}; };
-    return {z(0), z(2), z(4), z(6)};
-  }
-}
-
-/// N^(1/2) at normal incidence, where N is real and symmetric: (N + sqrt(det) I)/sqrt(trace + 2 sqrt(det)).
-template <class S>
-Mat2<S> flux_root(const Column<S>& column, double u) {
-  OpticalPoint<S> p;
-  const double at[1] = {u};
-  column.sample(at, &p);
-  const Matrix2<S> n = one_way_lossless(p, S(0.0), S(0.0)).index;
-  const S s = sqrt(determinant(n)), f = S(1.0) / sqrt(n.a + n.d + S(2.0) * s);
-  return {Complex<S>(f * (n.a + s)), Complex<S>(f * n.b), Complex<S>(f * n.c), Complex<S>(f * (n.d + s))};
-}
-
-template <class S>
-Su2<S> retarder_of(const char* name, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
-                   const WeiNormanForm& form) {
-  if constexpr (!kHasSeries<S>) {
-    throw std::logic_error(std::string(name) + " has no derivatives");
-  } else {
-    Mat2<S> t = transfer_of(name, column, ray, mesh, form);
-    if (ray.continuity == Continuity::e_and_h) t = flux_root(column, 1) * t * inverse(flux_root(column, 0));
-    // Without the common phase, then the part along {1, i sigma} with real coefficients, at unit length.
-    const Complex<S> det = determinant(t);
-    const S modulus = sqrt(norm(det));
-    // root of det/|det| with real part >= 0, by the formula that never divides by zero: (d + |d|), or i on the negative axis
-    const Complex<S> shifted{det.re + modulus, det.im};
-    const auto turned = det.re < S(0.0);
-    const Complex<S> other = Complex<S>{det.im, modulus - det.re};
-    const Complex<S> half{select(turned, other.re, shifted.re), select(turned, other.im, shifted.im)};
-    const S length = sqrt(norm(half));
-    const Complex<S> phase = (S(1.0) / length) * conj(half);
-    const Complex<S> a = phase * t.a, b = phase * t.b, c = phase * t.c, d = phase * t.d;
-    const S w = a.re + d.re, x = b.im + c.im, y = b.re - c.re, z = a.im - d.im;
-    const S f = S(1.0) / sqrt(w * w + x * x + y * y + z * z);
-    return {f * w, f * x, f * y, f * z};
-  }
+  return transfer_by_lanes(
+      info, column, ray, mesh, [&](auto from, auto to) { return sample_layer(column, from, to, form, false); },
+      [&](const auto& medium, int l, const Ray<double>& one) { return layer_transfer(lane_of(medium, l), one, form); });
 }
 
 }  // namespace
@@ -349,11 +251,11 @@ WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double
   }                                                                                                 \
   template <class S>                                                                                \
   Mat2<S> Method<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const { \
-    return transfer_of(Info.name, column, ray, mesh, form_);                                        \
+    return transfer_of(Info, column, ray, mesh, form_);                                        \
   }                                                                                                 \
   template <class S>                                                                                \
   Su2<S> Method<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {  \
-    return retarder_of(Info.name, column, ray, mesh, form_);                                        \
+    return nearest_retarder(column, ray, transfer(column, ray, mesh));                              \
   }
 BIREFIT_WEI_NORMAN(WeiNorman, kPaperInfo)
 BIREFIT_WEI_NORMAN(WeiNormanExp, kExpInfo)
