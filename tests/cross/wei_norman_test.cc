@@ -328,17 +328,23 @@ TEST(WeiNorman, ErrorsWithSubLayersAreTheMeasuredOnes) {
   const struct {
     const char* column;
     WeiNormanForm form;  // order, centred, exponential, phase_series
-  } forms[] = {{"envelope", {7, false, false, false}}, {"closed", {7, false, false, true}}, {"mid", {7, true, false, true}},
-               {"exp_closed", {7, false, true, true}}, {"exp_mid", {7, true, true, true}}};
+    bool as_measured;
+  } forms[] = {{"envelope", {7, false, false, false}, true},
+               {"closed", {7, false, false, true}, true},
+               {"mid", {7, true, false, true}, true},
+               {"exp_closed", {7, false, true, true}, true},
+               {"exp_mid", {7, true, true, true}, true},
+               {"exp_mid", kWeiNormanExp, false}};  // f and g3 exact, by series in the table: better, never worse
   int compared = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
+    if (table.number(row, "sub_layers") > 256) continue;  // the same slopes, longer
     const std::string name = table.text(row, "profile");
     const Case c = profile(name);
     const auto rows = exact.rows_where("profile", name);
     const Mat2<double> expected = reference_transfer(exact, rows.back());
     const Mesh mesh = uniform_mesh(static_cast<int>(table.number(row, "sub_layers")));
     const auto column = c.column();
-    for (const auto& [label, form] : forms) {
+    for (const auto& [label, form, as_measured] : forms) {
       const Mat2<double> t = transfer_with(form, *column, c.ray, mesh);
       const auto check = [&](const std::string& kind, double error) {
         const double measured = table.number(row, kind + label);
@@ -346,12 +352,15 @@ TEST(WeiNorman, ErrorsWithSubLayersAreTheMeasuredOnes) {
         ++compared;
         // The table's word: a factor 2; below 1e-11 both are rounding.
         EXPECT_LT(error, 2 * measured + 1e-11) << name << " " << mesh.size() - 1 << " " << kind << label;
-        EXPECT_GT(error, 0.5 * measured - 1e-11) << name << " " << mesh.size() - 1 << " " << kind << label;
+        if (as_measured) {
+          EXPECT_GT(error, 0.5 * measured - 1e-11) << name << " " << mesh.size() - 1 << " " << kind << label;
+        }
       };
       check("ferr_", distance(t, expected) / size(expected));
       check("ierr_", crossed_error(t, expected));
     }
   }
+  EXPECT_GT(compared, 1000);
 }
 
 TEST(WeiNorman, OneLayerErrorsAreTheMeasuredOnes) {
