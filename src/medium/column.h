@@ -8,9 +8,12 @@
 #include <memory>
 #include <new>
 #include <span>
+#include <stdexcept>
+#include <type_traits>
 #include <vector>
 
 #include "core/scalar.h"
+#include "core/taylor.h"
 
 namespace birefit {
 
@@ -26,6 +29,15 @@ struct OpticalPoint {
 template <class S>
 using Slope = Dual<S, 1>;
 
+/// The highest order of a series in depth that a transport may use.
+inline constexpr int kTaylorOrder = 11;
+/// One coefficient more, because the coupling of the modes needs the derivative of the medium.
+template <class S>
+using Series = Taylor<S, kTaylorOrder + 1>;
+/// Scalars whose columns give their Taylor series: values without derivatives.
+template <class S>
+inline constexpr bool kHasSeries = std::is_same_v<S, double> || std::is_same_v<S, Pack>;
+
 template <class S>
 class Column {
  public:
@@ -34,6 +46,11 @@ class Column {
   virtual void sample(std::span<const double> u, OpticalPoint<S>* out) const = 0;
   /// The same with d/du of every field in .d[0].
   virtual void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const = 0;
+  /// The Taylor series of every field about u, in powers of u. Only columns made of a law know it, and only for scalars
+  /// with kHasSeries; others throw std::logic_error.
+  virtual void sample_taylor(double, OpticalPoint<Series<S>>*) const {
+    throw std::logic_error("this column has no Taylor series");
+  }
 
   bool absorbing = false;
   /// The axis stays in a plane that contains z and does not turn: transport is diagonal at normal incidence.
@@ -43,7 +60,8 @@ class Column {
   bool jumps = false;
 };
 
-/// Makes a Column of a law with a member template `OpticalPoint<T> at(const T& u) const` for T = S and T = Slope<S>.
+/// Makes a Column of a law with a member template `OpticalPoint<T> at(const T& u) const` for T = S, T = Slope<S> and, where
+/// kHasSeries<S>, T = Series<S>.
 template <class S, class Law>
 class LawColumn final : public Column<S> {
  public:
@@ -57,6 +75,12 @@ class LawColumn final : public Column<S> {
       x.d[0] = S(1.0);
       ::new (static_cast<void*>(out + i)) OpticalPoint<Slope<S>>(law_.template at<Slope<S>>(x));
     }
+  }
+  void sample_taylor(double u, OpticalPoint<Series<S>>* out) const override {
+    if constexpr (kHasSeries<S>)
+      *out = law_.template at<Series<S>>(Series<S>::variable(S(u)));
+    else
+      Column<S>::sample_taylor(u, out);
   }
   Law& law() { return law_; }
 
@@ -82,6 +106,7 @@ class CachedColumn final : public Column<S> {
   void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
     serve(u, out, slopes_, [&](auto* p) { column_->sample_with_slope(u, p); });
   }
+  void sample_taylor(double u, OpticalPoint<Series<S>>* out) const override { column_->sample_taylor(u, out); }
 
  private:
   template <class P>

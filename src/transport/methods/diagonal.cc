@@ -1,4 +1,5 @@
 #include "transport/methods.h"
+#include "transport/modes.h"
 #include "transport/quadrature.h"
 
 namespace birefit {
@@ -6,30 +7,6 @@ namespace {
 
 constexpr MethodInfo kInfo{"diagonal", 0, true, false, "one phase integral per local mode, 8 Gauss nodes a step, flux factors",
                            "Born & Wolf 15; flux factors: docs/methods.md"};
-
-/// Normal components and tangential fields of the ordinary and extraordinary waves (columns of `fields`), Steinberg
-/// TOG 2020 eqs. 70, 72. Singular where the axis is parallel to the wavevector: not for such columns.
-template <class T>
-struct Modes {
-  Complex<T> q_o, q_e;
-  Mat2<T> fields;
-};
-template <class T>
-Modes<T> modes(const OpticalPoint<T>& p, const T& kx, const T& ky) {
-  using C = Complex<T>;
-  const C eo{p.ordinary, p.ordinary_im}, ee{p.extraordinary, p.extraordinary_im};
-  const C de = ee - eo;
-  const T ak = p.axis.x * kx + p.axis.y * ky, kk = kx * kx + ky * ky;
-  const C A = eo + (p.axis.z * p.axis.z) * de, B = (p.axis.z * ak) * de;
-  const C Cc = kk * eo + (ak * ak) * de - eo * ee;
-  Modes<T> m;
-  m.q_o = sqrt(eo - C(kk));
-  m.q_e = (sqrt(B * B - A * Cc) - B) / A;
-  const C aw = C(ak) + p.axis.z * m.q_e;
-  const C ux = p.axis.y * m.q_o - C(p.axis.z * ky), uy = C(p.axis.z * kx) - p.axis.x * m.q_o;
-  m.fields = {ux, p.axis.x * eo - kx * aw, uy, p.axis.y * eo - ky * aw};
-  return m;
-}
 
 template <class S>
 void normal_components(const OpticalPoint<S>& p, const S& kx, const S& ky, S& q_o, S& q_e) {

@@ -1,0 +1,116 @@
+#pragma once
+// The ordinary and the extraordinary wave of a uniaxial medium, and transport written in them. Singular where the axis is
+// parallel to the wavevector: the methods that use it say so.
+
+#include <algorithm>
+
+#include "medium/column.h"
+#include "transport/method.h"
+
+namespace birefit {
+
+/// Normal components (units of k0) and fields of both waves, Steinberg TOG 2020 eqs. 70, 72; fields = tangential parts
+/// as columns (ordinary, extraordinary), z their third components.
+template <class T>
+struct Modes {
+  Complex<T> q_o, q_e;
+  Mat2<T> fields;
+  Complex<T> z_o, z_e;
+};
+template <class T>
+Modes<T> modes(const OpticalPoint<T>& p, const T& kx, const T& ky) {
+  using C = Complex<T>;
+  const C eo{p.ordinary, p.ordinary_im}, ee{p.extraordinary, p.extraordinary_im};
+  const C de = ee - eo;
+  const T ak = p.axis.x * kx + p.axis.y * ky, kk = kx * kx + ky * ky;
+  const C A = eo + (p.axis.z * p.axis.z) * de, B = (p.axis.z * ak) * de;
+  const C Cc = kk * eo + (ak * ak) * de - eo * ee;
+  Modes<T> m;
+  m.q_o = sqrt(eo - C(kk));
+  m.q_e = (sqrt(B * B - A * Cc) - B) / A;
+  const C aw = C(ak) + p.axis.z * m.q_e;
+  const C ux = p.axis.y * m.q_o - C(p.axis.z * ky), uy = C(p.axis.z * kx) - p.axis.x * m.q_o;
+  m.fields = {ux, p.axis.x * eo - kx * aw, uy, p.axis.y * eo - ky * aw};
+  m.z_o = C(p.axis.x * ky - p.axis.y * kx);
+  m.z_e = p.axis.z * eo - m.q_e * aw;
+  return m;
+}
+/// The same with E.E = 1 (no conjugation: |E| = 1 in lossless media, analytic in absorbing ones).
+template <class T>
+Modes<T> unit_modes(const OpticalPoint<T>& p, const T& kx, const T& ky) {
+  Modes<T> m = modes(p, kx, ky);
+  const auto scale = [](Complex<T>& x, Complex<T>& y, Complex<T>& z) {
+    const Complex<T> f = Complex<T>(T(1.0)) / sqrt(x * x + y * y + z * z);
+    x = f * x, y = f * y, z = f * z;
+  };
+  scale(m.fields.a, m.fields.c, m.z_o);
+  scale(m.fields.b, m.fields.d, m.z_e);
+  return m;
+}
+
+/// d psi/dz = [[a + b3, b1], [b2, a - b3]] psi of the mode amplitudes psi = (ordinary, extraordinary), per um; eqs. 20,
+/// 23, 82: b1 couples the extraordinary wave into the ordinary one, b2 the other way.
+template <class T>
+struct ModalGenerator {
+  Complex<T> a, b1, b2, b3;
+};
+
+// Two scalars know a derivative in depth: Slope<double> at a point, Series<double> as a whole.
+inline Mat2<double> value_of(const Mat2<Slope<double>>& m) { return part(m, false); }
+inline Mat2<double> derivative_of(const Mat2<Slope<double>>& m) { return part(m, true); }
+inline OpticalPoint<double> value_of(const OpticalPoint<Slope<double>>& p) { return without_slope(p); }
+inline Complex<double> value_of(const Complex<Slope<double>>& z) { return {z.re.value, z.im.value}; }
+inline const Mat2<Series<double>>& value_of(const Mat2<Series<double>>& m) { return m; }
+inline Mat2<Series<double>> derivative_of(const Mat2<Series<double>>& m) {
+  const auto of = [](const Complex<Series<double>>& z) {
+    return Complex<Series<double>>{derivative(z.re), derivative(z.im)};
+  };
+  return {of(m.a), of(m.b), of(m.c), of(m.d)};
+}
+inline const OpticalPoint<Series<double>>& value_of(const OpticalPoint<Series<double>>& p) { return p; }
+inline const Complex<Series<double>>& value_of(const Complex<Series<double>>& z) { return z; }
+
+/// Of modes scaled to E.E = 1. D = Slope<double> (result in double) or Series<double>; derivatives of p are by depth, in
+/// um; the series of the result are exact up to kTaylorOrder.
+/// E and H continuous adds (Y - Y-)^-1 dY/dz of one_way.h to the coupling, which the source paper has not.
+template <class D>
+auto modal_generator(const OpticalPoint<D>& p, const Ray<double>& ray) {
+  const Modes<D> m = unit_modes(p, D(ray.kx), D(ray.ky));
+  const auto fields = value_of(m.fields);
+  auto change = derivative_of(m.fields);
+  using C = std::remove_cvref_t<decltype(fields.a)>;
+  using T = typename NumberTraits<C>::Real;
+  if (ray.continuity == Continuity::e_and_h) {
+    const Mat2<D> admittance = one_way(p, D(ray.kx), D(ray.ky)).admittance;
+    const OpticalPoint<T> q = value_of(p);
+    const Mat2<T> backward = one_way(q, T(ray.kx), T(ray.ky), -1.0).admittance;
+    change = change + inverse(value_of(admittance) - backward) * derivative_of(admittance) * fields;
+  }
+  const Mat2<T> x = inverse(fields) * change;
+  const C ik(T(0.0), T(ray.k0_per_um));
+  const C o = ik * value_of(m.q_o) - x.a, e = ik * value_of(m.q_e) - x.d;
+  return ModalGenerator<T>{T(0.5) * (o + e), -x.b, -x.c, T(0.5) * (o - e)};
+}
+
+/// p with its derivatives by u turned into derivatives by depth.
+inline OpticalPoint<Slope<double>> by_depth(OpticalPoint<Slope<double>> p) {
+  const double f = 1 / p.depth_slope_um.value;
+  for (Slope<double>* x : {&p.axis.x, &p.axis.y, &p.axis.z, &p.ordinary, &p.extraordinary, &p.ordinary_im,
+                           &p.extraordinary_im, &p.depth_slope_um})
+    x->d[0] *= f;
+  return p;
+}
+/// p as series in depth instead of u: du/dz = 1/slope(u) solved for u(z), one coefficient a pass, and put in.
+inline OpticalPoint<Series<double>> by_depth(OpticalPoint<Series<double>> p) {
+  const Series<double> u_per_um = inverse(p.depth_slope_um);
+  Series<double> u;
+  const bool constant = std::all_of(p.depth_slope_um.c.begin() + 1, p.depth_slope_um.c.end(), [](double c) { return c == 0; });
+  const std::size_t passes = constant ? 1 : u.c.size() - 1;
+  for (std::size_t k = 0; k < passes; ++k) u = integral(u_per_um(u));
+  for (Series<double>* x : {&p.axis.x, &p.axis.y, &p.axis.z, &p.ordinary, &p.extraordinary, &p.ordinary_im,
+                            &p.extraordinary_im, &p.depth_slope_um})
+    *x = (*x)(u);
+  return p;
+}
+
+}  // namespace birefit
