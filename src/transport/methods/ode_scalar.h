@@ -19,7 +19,8 @@ struct OdeScalarResult {
   int restarts = 0;
 };
 /// Part [from, to] in u of a column that is smooth there. `tolerance`: local, absolute and relative, > 0.
-/// Restarts when |g1| or |g2| exceeds `restart_above`. std::logic_error where the axis is parallel to the wavevector.
+/// Restarts when |g1| or |g2| exceeds `restart_above`. std::logic_error where the axis is parallel to the wavevector, and at
+/// a pole that too large a `restart_above` lets happen: never NaN.
 OdeScalarResult ode_scalar(const Column<double>& column, const Ray<double>& ray, double from, double to, double tolerance,
                            double restart_above = 10);
 

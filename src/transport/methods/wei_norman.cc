@@ -21,8 +21,7 @@ constexpr MethodInfo kExpInfo{"wei_norman_exp", 2, false,
 using C = Complex<double>;
 using ComplexSeries = Complex<Series<double>>;
 
-/// The largest mismatch of a series' end that its convergence allows: 2^-n is the last term of a geometric series at half
-/// its radius of convergence, beyond which more terms gain little.
+/// The last term of a geometric series at half its radius of convergence, beyond which more terms gain little.
 double largest_tail(int order) { return std::ldexp(1.0, -order); }
 
 /// What a layer needs to know of the medium, for any scalar that holds values.
@@ -38,7 +37,7 @@ struct LayerMedium {
 template <class S>
 bool constant_slope(const OpticalPoint<Series<S>>& p) {
   for (std::size_t k = 1; k < p.depth_slope_um.c.size(); ++k)
-    for (int l = 0; l < kLanes; ++l)
+    for (int l = 0; l < kRaysOf<S>; ++l)
       if (lane(p.depth_slope_um.c[k], l) != 0) return false;
   return true;
 }
