@@ -68,7 +68,8 @@ LayerMedium<S> sample_layer(const Column<S>& column, double from, double to, con
 
 template <class S>
 LayerMedium<double> lane_of(const LayerMedium<S>& m, int l) {
-  LayerMedium<double> r{m.at, m.from, m.to, lane_of(m.series, l), lane_of(m.entry, l), lane_of(m.exit, l), {}, m.weight};
+  LayerMedium<double> r{m.at, m.from,  m.to, lane_of(m.series, l), lane_of(m.entry, l), lane_of(m.exit, l),
+                        {},   m.weight};
   for (const auto& p : m.nodes) r.nodes.push_back(lane_of(p, l));
   return r;
 }
@@ -188,7 +189,8 @@ bool finite(const Mat2<double>& m) {
 
 /// T = M(exit) U M(entry)^-1: the normalisation of the modes cancels.
 Mat2<double> layer_transfer(const LayerMedium<double>& m, const Ray<double>& ray, const WeiNormanForm& form) {
-  const Mat2<double> first = unit_modes(m.entry, ray.kx, ray.ky).fields, last = unit_modes(m.exit, ray.kx, ray.ky).fields;
+  const Mat2<double> first = unit_modes(m.entry, ray.kx, ray.ky).fields,
+                     last = unit_modes(m.exit, ray.kx, ray.ky).fields;
   return last * closed_layer(m, ray, form).mode_transfer(form.exponential) * inverse(first);
 }
 
@@ -250,7 +252,7 @@ WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double
   }                                                                                                 \
   template <class S>                                                                                \
   Mat2<S> Method<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const { \
-    return transfer_of(Info, column, ray, mesh, form_);                                        \
+    return transfer_of(Info, column, ray, mesh, form_);                                             \
   }                                                                                                 \
   template <class S>                                                                                \
   Su2<S> Method<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {  \
