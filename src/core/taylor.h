@@ -18,8 +18,8 @@ struct Taylor {
     c[0] = v;
   }
   template <class T>
-    requires(std::is_arithmetic_v<T> && !std::is_same_v<T, B>)
-  Taylor(T v) : Taylor(B(static_cast<double>(v))) {}  // NOLINT
+  requires(std::is_arithmetic_v<T> && !std::is_same_v<T, B>) Taylor(T v)
+      : Taylor(B(static_cast<double>(v))) {}  // NOLINT
   /// at + x
   static Taylor variable(const B& at) {
     Taylor r(at);

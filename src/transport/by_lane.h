@@ -30,8 +30,12 @@ inline double lane_of(double x, int) { return x; }
 inline double lane_of(const Pack& x, int l) { return lane(x, l); }
 template <class T>
 auto lane_of(const OpticalPoint<T>& p, int l) -> OpticalPoint<decltype(lane_of(p.ordinary, l))> {
-  return {{lane_of(p.axis.x, l), lane_of(p.axis.y, l), lane_of(p.axis.z, l)}, lane_of(p.ordinary, l), lane_of(p.extraordinary, l),
-          lane_of(p.ordinary_im, l), lane_of(p.extraordinary_im, l), lane_of(p.depth_slope_um, l)};
+  return {{lane_of(p.axis.x, l), lane_of(p.axis.y, l), lane_of(p.axis.z, l)},
+          lane_of(p.ordinary, l),
+          lane_of(p.extraordinary, l),
+          lane_of(p.ordinary_im, l),
+          lane_of(p.extraordinary_im, l),
+          lane_of(p.depth_slope_um, l)};
 }
 template <class S>
 S from_lanes(const std::array<double, kLanes>& values) {
@@ -52,8 +56,8 @@ Mat2<S> from_lanes(const std::array<Mat2<double>, kLanes>& m) {
 }
 
 /// Product over the mesh of step(medium, lane, ray of that lane), medium = prepare(from, to) with members `entry` and
-/// `exit` (OpticalPoint<S>), both generic lambdas, so that they need not compile where they cannot run; steps of the medium at its breaks included. Values only: std::logic_error for scalars with
-/// derivatives.
+/// `exit` (OpticalPoint<S>), both generic lambdas, so that they need not compile where they cannot run; steps of the
+/// medium at its breaks included. Values only: std::logic_error for scalars with derivatives.
 template <class S, class Prepare, class Step>
 Mat2<S> transfer_by_lanes(const MethodInfo& info, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
                           const Prepare& prepare, const Step& step) {
@@ -70,12 +74,14 @@ Mat2<S> transfer_by_lanes(const MethodInfo& info, const Column<S>& column, const
     OpticalPoint<S> before;
     for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
       const auto medium = prepare(mesh[i], mesh[i + 1]);
-      const bool jump = steps_in_medium && i > 0 && std::binary_search(column.breaks.begin(), column.breaks.end(), mesh[i]);
+      const bool jump =
+          steps_in_medium && i > 0 && std::binary_search(column.breaks.begin(), column.breaks.end(), mesh[i]);
       for (int l = 0; l < kRaysOf<S>; ++l) {
         if (jump) {
           const OpticalPoint<double> p = lane_of(before, l), q = lane_of(medium.entry, l);
           const double kx = rays[l].kx, ky = rays[l].ky;
-          total[l] = step_factor(one_way(p, kx, ky).admittance, one_way(p, kx, ky, -1.0).admittance, one_way(q, kx, ky).admittance) *
+          total[l] = step_factor(one_way(p, kx, ky).admittance, one_way(p, kx, ky, -1.0).admittance,
+                                 one_way(q, kx, ky).admittance) *
                      total[l];
         }
         total[l] = step(medium, l, rays[l]) * total[l];

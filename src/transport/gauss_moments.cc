@@ -18,7 +18,8 @@ struct Rule {
   std::vector<double> t, weight;
 };
 
-/// Gauss-Legendre on [0, 1]: roots of P_n by Newton's iteration from their asymptotic places (Abramowitz & Stegun 22.16.6).
+/// Gauss-Legendre on [0, 1]: roots of P_n by Newton's iteration from their asymptotic places (Abramowitz &
+/// Stegun 22.16.6).
 Rule legendre(int n, double phase) {
   Rule rule{phase, {}, {}};
   for (int i = 1; i <= n; ++i) {
@@ -40,7 +41,7 @@ Rule legendre(int n, double phase) {
 }
 
 const std::array<Rule, 6>& rules() {
-  static const std::array<Rule, 6> all{legendre(16, 10), legendre(24, 25), legendre(32, 43),
+  static const std::array<Rule, 6> all{legendre(16, 10), legendre(24, 25),  legendre(32, 43),
                                        legendre(48, 80), legendre(64, 120), legendre(96, 180)};
   return all;
 }

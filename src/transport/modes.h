@@ -1,6 +1,6 @@
 #pragma once
-// The ordinary and the extraordinary wave of a uniaxial medium, and transport written in them. Singular where the axis is
-// parallel to the wavevector: the methods that use it say so.
+// The ordinary and the extraordinary wave of a uniaxial medium, and transport written in them. Singular where the axis
+// is parallel to the wavevector: the methods that use it say so.
 
 #include <algorithm>
 
@@ -70,9 +70,9 @@ inline Mat2<Series<double>> derivative_of(const Mat2<Series<double>>& m) {
 inline const OpticalPoint<Series<double>>& value_of(const OpticalPoint<Series<double>>& p) { return p; }
 inline const Complex<Series<double>>& value_of(const Complex<Series<double>>& z) { return z; }
 
-/// Of modes scaled to E.E = 1. D = Slope<double> (result in double) or Series<double>; derivatives of p are by depth, in
-/// um; the series of the result are exact up to kTaylorOrder.
-/// E and H continuous adds (Y - Y-)^-1 dY/dz of one_way.h to the coupling, which the source paper has not.
+/// Of modes scaled to E.E = 1. D = Slope<double> (result in double) or Series<double>; derivatives of p are by depth,
+/// in um; the series of the result are exact up to kTaylorOrder. E and H continuous adds (Y - Y-)^-1 dY/dz of one_way.h
+/// to the coupling, which the source paper has not.
 template <class D>
 auto modal_generator(const OpticalPoint<D>& p, const Ray<double>& ray) {
   const Modes<D> m = unit_modes(p, D(ray.kx), D(ray.ky));
@@ -104,7 +104,8 @@ inline OpticalPoint<Slope<double>> by_depth(OpticalPoint<Slope<double>> p) {
 inline OpticalPoint<Series<double>> by_depth(OpticalPoint<Series<double>> p) {
   const Series<double> u_per_um = inverse(p.depth_slope_um);
   Series<double> u;
-  const bool constant = std::all_of(p.depth_slope_um.c.begin() + 1, p.depth_slope_um.c.end(), [](double c) { return c == 0; });
+  const bool constant =
+      std::all_of(p.depth_slope_um.c.begin() + 1, p.depth_slope_um.c.end(), [](double c) { return c == 0; });
   const std::size_t passes = constant ? 1 : u.c.size() - 1;
   for (std::size_t k = 0; k < passes; ++k) u = integral(u_per_um(u));
   for (Series<double>* x : {&p.axis.x, &p.axis.y, &p.axis.z, &p.ordinary, &p.extraordinary, &p.ordinary_im,

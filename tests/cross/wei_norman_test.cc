@@ -24,7 +24,7 @@ Z entry(const ReferenceTable& table, std::size_t row, const std::string& name) {
   return {table.number(row, "re_" + name), table.number(row, "im_" + name)};
 }
 
-// ---- the profiles P1 .. P6 -------------------------------------------------------------------------------------------
+// ---- the profiles P1 .. P6 -----------------------------------------------------------------------------------------
 
 enum class Shape { twist, tilt, heat, slab, chord, ramp };
 struct ProfileLawP {
@@ -38,8 +38,10 @@ struct ProfileLawP {
       return OpticalPoint<T>{axis, T(o * o), T(e * e), T(0.0), T(0.0), T(d)};
     };
     switch (shape) {
-      case Shape::twist: return lossless(axis_from_angles<T>(T(0.0), 0.3 + parameter * u), no, ne);
-      case Shape::tilt: return lossless(axis_from_angles<T>(0.1 + 1.1 * u, T(0.6)), no, ne);
+      case Shape::twist:
+        return lossless(axis_from_angles<T>(T(0.0), 0.3 + parameter * u), no, ne);
+      case Shape::tilt:
+        return lossless(axis_from_angles<T>(0.1 + 1.1 * u, T(0.6)), no, ne);
       case Shape::heat: {
         const double a = 1 / (2 * std::sqrt(2.0));
         const T n = 2.1942 - (278.0 + 90.0 * (u - parameter * sin(u * std::numbers::pi))) * (1.0 / 750);
@@ -48,7 +50,11 @@ struct ProfileLawP {
       case Shape::slab: {
         const T n = 1.70 + 0.03 * cos(2.2 * u + 0.5);
         return {axis_from_angles<T>(0.5 + 0.35 * sin(2.0 * u + 0.4), 0.3 + 0.8 * u + 0.2 * cos(2.5 * u)),
-                T(1.52 * 1.52), n * n, T(0.0), 1e-3 * (1.0 + 0.6 * sin(3.0 * u)), T(d)};
+                T(1.52 * 1.52),
+                n * n,
+                T(0.0),
+                1e-3 * (1.0 + 0.6 * sin(3.0 * u)),
+                T(d)};
       }
       case Shape::chord: {
         const T s = d * u - 0.5 * d, azimuth = 0.4 + 0.15 * d * u;
@@ -58,7 +64,12 @@ struct ProfileLawP {
       }
       case Shape::ramp: {
         const T n = 1.70 + parameter * u + 0.02 * u * u * u;
-        return {axis_from_angles<T>(T(0.0), 0.3 + 0.4 * u + 0.15 * sin(2.0 * u)), T(1.52 * 1.52), n * n, T(0.0), 0.004 * n, T(d)};
+        return {axis_from_angles<T>(T(0.0), 0.3 + 0.4 * u + 0.15 * sin(2.0 * u)),
+                T(1.52 * 1.52),
+                n * n,
+                T(0.0),
+                0.004 * n,
+                T(d)};
       }
     }
     throw std::logic_error("no such shape");
@@ -94,7 +105,7 @@ Case profile(const std::string& name) {
 }
 ReferenceTable table_of(const std::string& name) { return ReferenceTable(data_path("wei_norman/" + name)); }
 
-// ---- coefficients and their series -----------------------------------------------------------------------------------
+// ---- coefficients and their series ---------------------------------------------------------------------------------
 
 TEST(WeiNorman, CoefficientsOfTheModesAgree) {
   const ReferenceTable table = table_of("coefficients.csv");
@@ -111,7 +122,8 @@ TEST(WeiNorman, CoefficientsOfTheModesAgree) {
     const double scale = std::abs(entry(table, row, "a"));
     const auto check = [&](const Complex<double>& value, const std::string& name) {
       const double error = std::abs(z_of(value) - entry(table, row, name)) / scale;
-      EXPECT_LT(error, c.law.shape == Shape::chord ? 2e-11 : 1e-13) << table.text(row, "profile") << " row " << row << " " << name;
+      EXPECT_LT(error, c.law.shape == Shape::chord ? 2e-11 : 1e-13)
+          << table.text(row, "profile") << " row " << row << " " << name;
     };
     check(m.q_o, "qo");
     check(m.q_e, "qe");
@@ -133,8 +145,12 @@ TEST(WeiNorman, TaylorCoefficientsAgree) {
     c.column()->sample_taylor(0, &p);
     const auto g = modal_generator(by_depth(p), c.ray);
     const Series<double> growth = exp(2.0 * integral(g.b3.re));
-    const std::pair<const char*, Complex<Series<double>>> all[] = {
-        {"a", g.a}, {"b1", g.b1}, {"b2", g.b2}, {"b3", g.b3}, {"env1", inverse(growth) * g.b1}, {"env2", growth * g.b2}};
+    const std::pair<const char*, Complex<Series<double>>> all[] = {{"a", g.a},
+                                                                   {"b1", g.b1},
+                                                                   {"b2", g.b2},
+                                                                   {"b3", g.b3},
+                                                                   {"env1", inverse(growth) * g.b1},
+                                                                   {"env2", growth * g.b2}};
     for (const auto& [column, series] : all) {
       double largest = 0;
       for (const std::size_t row : rows) largest = std::max(largest, std::abs(entry(table, row, column)));
@@ -144,7 +160,8 @@ TEST(WeiNorman, TaylorCoefficientsAgree) {
         const int k = static_cast<int>(table.number(row, "order"));
         const Z value = Z(series.re.c[k], series.im.c[k]) * std::pow(c.law.d, k);
         const double error = std::abs(value - entry(table, row, column)) / largest;
-        // Rounding grows by the condition of the modes (1/angle^2 between axis and light, 80 for P5) over 11 recurrences.
+        // Rounding grows by the condition of the modes (1/angle^2 between axis and light, 80 for P5) over 11
+        // recurrences.
         EXPECT_LT(error, name == "P5" ? 1e-10 : 1e-12) << name << " " << column << " order " << k;
       }
     }
@@ -171,7 +188,8 @@ TEST(WeiNorman, SeriesInDepthDoesNotDependOnTheMapOfU) {
   LawColumn<double, PlainChord>({b, s0}).sample_taylor(0, &q);
   p = by_depth(p);
   for (std::size_t k = 0; k < p.axis.x.c.size(); ++k) {
-    const double scale = std::pow(std::hypot(b, s0), -double(k));  // of the k-th coefficient: r is the radius of convergence
+    const double scale =
+        std::pow(std::hypot(b, s0), -double(k));  // of the k-th coefficient: r is the radius of convergence
     EXPECT_NEAR(p.axis.x.c[k], q.axis.x.c[k], 1e-11 * scale) << k;
     EXPECT_NEAR(p.axis.z.c[k], q.axis.z.c[k], 1e-11 * scale) << k;
   }
@@ -199,7 +217,7 @@ TEST(Taylor, FunctionsMatchTheirKnownSeries) {
   }
 }
 
-// ---- integrals ---------------------------------------------------------------------------------------------------------
+// ---- integrals -----------------------------------------------------------------------------------------------------
 
 TEST(WeiNorman, GaussianMomentsAgree) {
   const ReferenceTable table = table_of("gauss_moments.csv");
@@ -214,9 +232,11 @@ TEST(WeiNorman, GaussianMomentsAgree) {
       const double error = std::abs(z_of(moments[m]) - expected) / std::abs(expected);
       // 1e-12 as designed; the recurrence for n = 11 at |x1| > 2 |x2| loses up to 4e-10; the phase itself is known to
       // 1e-16 (|x1| + |x2|).
-      const bool lossy = std::abs(x1) > 2 * std::abs(x2) && std::abs(x1) + 2 * std::abs(x2) > 180 && std::abs(x1) < 6 * std::abs(x2) + n + 24;
+      const bool lossy = std::abs(x1) > 2 * std::abs(x2) && std::abs(x1) + 2 * std::abs(x2) > 180 &&
+                         std::abs(x1) < 6 * std::abs(x2) + n + 24;
       const double phase = 1e-15 * (std::abs(x1) + std::abs(x2));
-      EXPECT_LT(error, (lossy ? (n == 7 ? 2e-12 : 4e-10) : 1e-12) + phase) << "x1 " << x1 << " x2 " << x2 << " m " << m << " n " << n;
+      EXPECT_LT(error, (lossy ? (n == 7 ? 2e-12 : 4e-10) : 1e-12) + phase)
+          << "x1 " << x1 << " x2 " << x2 << " m " << m << " n " << n;
     }
   }
 }
@@ -235,7 +255,8 @@ TEST(WeiNorman, GaussianMomentsAreContinuousAcrossTheirRegimes) {
             gauss_moments(n, x1 * (1 + e), x2 * (1 + e), above);
             for (int m = 0; m + 2 <= n; ++m) {  // d I_m = -i (x1 I_{m+1} + x2 I_{m+2})
               const Z change = Z(0, -2 * e) * (x1 * z_of(below[m + 1]) + x2 * z_of(below[m + 2]));
-              EXPECT_LT(std::abs(z_of(above[m]) - z_of(below[m]) - change), 2e-12) << x1 << " " << x2 << " " << m << " of " << n;
+              EXPECT_LT(std::abs(z_of(above[m]) - z_of(below[m]) - change), 2e-12)
+                  << x1 << " " << x2 << " " << m << " of " << n;
             }
           }
 }
@@ -256,12 +277,13 @@ TEST(WeiNorman, ClosedFormOfOneLayerAgrees) {
     const std::string name = table.text(row, "profile");
     const Case c = profile(name);
     const double u = std::round(16 * table.number(row, "z_um") / c.law.d) / 16;  // 16ths of d, printed to ten decimals
-    const WeiNormanLayer layer = wei_norman_layer(*c.column(), c.ray, 0, u, paper(static_cast<int>(table.number(row, "order"))));
+    const WeiNormanLayer layer =
+        wei_norman_layer(*c.column(), c.ray, 0, u, paper(static_cast<int>(table.number(row, "order"))));
     const auto [g1, g2] = g1_g2(layer);
     const Z f = entry(table, row, "f"), g3 = entry(table, row, "g3");
     SCOPED_TRACE(name + " row " + std::to_string(row));
-    // Phases keep the rounding of their coefficients and terms; beyond the radius of convergence (P5) the terms are larger
-    // than the sum.
+    // Phases keep the rounding of their coefficients and terms; beyond the radius of convergence (P5) the terms are
+    // larger than the sum.
     const double phase = 1e-13 * (1 + std::abs(f)) * (name == "P5" ? 1000 : 1);
     EXPECT_LT(std::abs(z_of(layer.f) - f), phase);
     EXPECT_LT(std::abs(z_of(layer.g3) - g3), phase);
@@ -280,7 +302,8 @@ TEST(WeiNorman, NothingHappensWhereTheQuadraticPhaseVanishes) {
   const ReferenceTable table = table_of("c2_handover.csv");
   for (std::size_t row = 0; row < table.size(); ++row) {
     const Case c = profile("P6(p=" + table.text(row, "p") + ")");
-    const WeiNormanLayer layer = wei_norman_layer(*c.column(), c.ray, 0, 1, paper(static_cast<int>(table.number(row, "order"))));
+    const WeiNormanLayer layer =
+        wei_norman_layer(*c.column(), c.ray, 0, 1, paper(static_cast<int>(table.number(row, "order"))));
     const auto [g1, g2] = g1_g2(layer);
     EXPECT_NEAR(layer.c1_per_um, table.number(row, "c1"), 1e-13);
     EXPECT_NEAR(layer.c2_per_um2, table.number(row, "c2"), 1e-14);
@@ -291,7 +314,7 @@ TEST(WeiNorman, NothingHappensWhereTheQuadraticPhaseVanishes) {
   }
 }
 
-// ---- errors of the method ----------------------------------------------------------------------------------------------
+// ---- errors of the method ------------------------------------------------------------------------------------------
 
 Mat2<double> reference_transfer(const ReferenceTable& table, std::size_t row) {
   const auto z = [&](const char* name) {
@@ -311,7 +334,8 @@ double crossed_error(const Mat2<double>& t, const Mat2<double>& exact) {
   }
   return worst;
 }
-Mat2<double> transfer_with(const WeiNormanForm& form, const Column<double>& column, const Ray<double>& ray, const Mesh& mesh) {
+Mat2<double> transfer_with(const WeiNormanForm& form, const Column<double>& column, const Ray<double>& ray,
+                           const Mesh& mesh) {
   Mat2<double> total = Mat2<double>::identity();
   for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
     const double ends[2] = {mesh[i], mesh[i + 1]};
@@ -372,7 +396,8 @@ TEST(WeiNorman, OneLayerErrorsAreTheMeasuredOnes) {
     for (const std::size_t at : exact.rows_where("profile", name)) {
       if (exact.text(at, "z_um") != table.text(row, "z_um")) continue;
       const Mat2<double> expected = reference_transfer(exact, at);
-      const Mat2<double> t = WeiNorman<double>(7).transfer(*c.column(), c.ray, {0, table.number(row, "z_um") / c.law.d});
+      const Mat2<double> t =
+          WeiNorman<double>(7).transfer(*c.column(), c.ray, {0, table.number(row, "z_um") / c.law.d});
       const double ferr = table.number(row, "ferr"), error = distance(t, expected) / size(expected);
       if (!(ferr < 1)) continue;
       EXPECT_LT(error, 2 * ferr + 1e-11) << name << " row " << row;
@@ -410,7 +435,7 @@ TEST(WeiNorman, EstimateIsTheErrorOfTheSimplification) {
   }
 }
 
-// ---- the four equations themselves -------------------------------------------------------------------------------------
+// ---- the four equations themselves ---------------------------------------------------------------------------------
 
 constexpr double kNever = 1e300;
 
@@ -424,7 +449,8 @@ TEST(OdeScalar, FunctionsAgree) {
     // Local errors of 1e-11 of each function add up over some hundred steps; phases reach 1e4 rad.
     const auto check = [&](const Complex<double>& value, const std::string& name) {
       const Z expected = entry(table, row, name);
-      EXPECT_LT(std::abs(z_of(value) - expected), 1e-8 * (1 + std::abs(expected))) << table.text(row, "profile") << " row " << row << " " << name;
+      EXPECT_LT(std::abs(z_of(value) - expected), 1e-8 * (1 + std::abs(expected)))
+          << table.text(row, "profile") << " row " << row << " " << name;
     };
     check(r.f, "f");
     check(r.g1, "g1");
@@ -458,7 +484,8 @@ struct TwoTwistsLaw {
   OpticalPoint<T> at(const T& u) const {
     const T z = u * (separation + 2);
     const auto tanh = [](const T& x) { return 1.0 - 2.0 / (exp(2.0 * x) + 1.0); };
-    const T azimuth = 0.5 * phi + 0.25 * phi * (tanh((z - 1.0) * (1 / 0.15)) + tanh((z - 1.0 - separation) * (1 / 0.15)));
+    const T azimuth =
+        0.5 * phi + 0.25 * phi * (tanh((z - 1.0) * (1 / 0.15)) + tanh((z - 1.0 - separation) * (1 / 0.15)));
     return {axis_from_angles<T>(T(0.0), azimuth), T(1.5 * 1.5), T(1.7 * 1.7), T(0.0), T(0.0), T(separation + 2)};
   }
 };
@@ -472,7 +499,8 @@ TEST(OdeScalar, ExactPolesAreNoFailureOfTransport) {
     const Mat2<double> exact = Magnus4<double>().transfer(column, ray, uniform_mesh(4096));
     EXPECT_LT(distance(OdeScalar<double>(1e-10).transfer(column, ray, {0, 1}), exact), 1e-7) << row;
     if (table.number(row, "abs_V22_exit") < 2e-6) continue;  // g1 itself is lost to rounding
-    const double g1 = std::sqrt(norm(ode_scalar(column, ray, 0, 1, 1e-11, kNever).g1)), expected = table.number(row, "abs_g1_exit");
+    const double g1 = std::sqrt(norm(ode_scalar(column, ray, 0, 1, 1e-11, kNever).g1)),
+                 expected = table.number(row, "abs_g1_exit");
     EXPECT_NEAR(g1, expected, 1e-2 * expected) << row;  // phi and the separation are printed to 12 digits, g1 to 5
   }
 }
@@ -485,10 +513,13 @@ TEST(WeiNorman, TheClosedFormIsFiniteAndWrongAtAPole) {
     const auto error = [&](const WeiNormanForm& form, int layers) {
       return distance(transfer_with(form, c.column, c.ray, uniform_mesh(layers)), exact) / size(exact);
     };
-    EXPECT_NEAR(error(kWeiNormanPaper, 1), table.number(row, "ferr_closed_n7_L1"), 0.01 * table.number(row, "ferr_closed_n7_L1"));
-    EXPECT_NEAR(error(kWeiNormanPaper, 64), table.number(row, "ferr_closed_n7_L64"), 0.01 * table.number(row, "ferr_closed_n7_L64"));
+    EXPECT_NEAR(error(kWeiNormanPaper, 1), table.number(row, "ferr_closed_n7_L1"),
+                0.01 * table.number(row, "ferr_closed_n7_L1"));
+    EXPECT_NEAR(error(kWeiNormanPaper, 64), table.number(row, "ferr_closed_n7_L64"),
+                0.01 * table.number(row, "ferr_closed_n7_L64"));
     // Down to 4e-9: what 4,096 steps of Magnus leave is below 1e-11.
-    EXPECT_NEAR(error(kWeiNormanExp, 64), table.number(row, "ferr_exp_mid_n7_L64"), 0.02 * table.number(row, "ferr_exp_mid_n7_L64"));
+    EXPECT_NEAR(error(kWeiNormanExp, 64), table.number(row, "ferr_exp_mid_n7_L64"),
+                0.02 * table.number(row, "ferr_exp_mid_n7_L64"));
     EXPECT_FALSE(wei_norman_report(c.column, c.ray, {0, 1}, kWeiNormanPaper).valid);
     EXPECT_TRUE(wei_norman_report(c.column, c.ray, uniform_mesh(64), kWeiNormanPaper).valid);
   }
@@ -505,7 +536,7 @@ TEST(OdeScalar, AgreesWithTheTransferTable) {
   }
 }
 
-// ---- properties that need no table ---------------------------------------------------------------------------------------
+// ---- properties that need no table ---------------------------------------------------------------------------------
 
 TEST(WeiNorman, DeterminantIsThatOfThePhase) {
   for (const char* name : {"P1tn", "P2", "P4_20", "P5"}) {
@@ -535,7 +566,8 @@ TEST(WeiNorman, ExactWhereTheAxisIsFixed) {
   EXPECT_LT(distance(WeiNormanExp<double>().transfer(*column, c.ray, uniform_mesh(256)), expected), 1e-9);
 }
 
-// Uniform twist at normal incidence has constant coefficients, b3 constant, b1 = -b2 times a constant: V in closed form.
+// Uniform twist at normal incidence has constant coefficients, b3 constant, b1 = -b2 times a constant: V in closed
+// form.
 TEST(WeiNorman, LayersOfAUniformTwistConvergeToTheClosedForm) {
   const Case c{{Shape::twist, 5, 1.2}, {2 * std::numbers::pi / 0.55, 0, 0, Continuity::e_only}};
   const auto column = c.column();
@@ -551,7 +583,8 @@ TEST(WeiNorman, LayersOfAUniformTwistConvergeToTheClosedForm) {
     Mat2<double> u = Mat2<double>::identity();
     Z f = 0;
     for (int i = 0; i < layers; ++i) {
-      const WeiNormanLayer layer = wei_norman_layer(*column, c.ray, double(i) / layers, double(i + 1) / layers, kWeiNormanExp);
+      const WeiNormanLayer layer =
+          wei_norman_layer(*column, c.ray, double(i) / layers, double(i + 1) / layers, kWeiNormanExp);
       u = layer.mode_transfer(true) * u;
       f += z_of(layer.f);
     }

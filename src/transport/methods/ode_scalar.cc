@@ -17,8 +17,9 @@ namespace birefit {
 namespace {
 
 namespace odeint = boost::numeric::odeint;
-constexpr MethodInfo kInfo{"ode_scalar", 0, false, "the four Wei-Norman equations by adaptive Dormand-Prince steps",
-                           "Steinberg, ACM Trans. Graph. 39 (2020), eqs. 25-28; Dormand & Prince, J. Comput. Appl. Math. 6 (1980)"};
+constexpr MethodInfo kInfo{
+    "ode_scalar", 0, false, "the four Wei-Norman equations by adaptive Dormand-Prince steps",
+    "Steinberg, ACM Trans. Graph. 39 (2020), eqs. 25-28; Dormand & Prince, J. Comput. Appl. Math. 6 (1980)"};
 
 using C = Complex<double>;
 using State = std::array<double, 8>;  // f, g1, g2, g3
@@ -60,17 +61,16 @@ OdeScalarResult integrate(const Sample& sample, const Ray<double>& ray, double f
     double h = final_step ? to - u : step;
     const bool accepted = stepper.try_step(rates, state, u, h) == odeint::success;
     for (const double x : state)
-      if (!std::isfinite(x)) throw std::logic_error("ode_scalar: the axis is parallel to the wavevector, modes are undefined");
+      if (!std::isfinite(x))
+        throw std::logic_error("ode_scalar: the axis is parallel to the wavevector, modes are undefined");
     if (accepted && final_step) u = to;
     step = h;  // proposed
-    const bool stuck = step < 1e-13 * (to - from);
-    if (u < to && (std::max(norm(number(state, 1)), norm(number(state, 2))) > restart_above * restart_above || stuck)) {
-      if (stuck && ++result.restarts > 1000) throw std::logic_error("ode_scalar: steps vanish");
+    if (u < to && step < 1e-13 * (to - from)) throw std::logic_error("ode_scalar: steps vanish at a pole");
+    if (u < to && std::max(norm(number(state, 1)), norm(number(state, 2))) > restart_above * restart_above) {
       result.mode_transfer = product(state) * result.mode_transfer;
       state = State{};
       stepper = fresh();  // its last slope belongs to the old functions
-      step = (to - from) / 64;
-      if (!stuck) ++result.restarts;
+      ++result.restarts;
     }
   }
   result.mode_transfer = product(state) * result.mode_transfer;
@@ -86,8 +86,8 @@ struct Faces {
 
 }  // namespace
 
-OdeScalarResult ode_scalar(const Column<double>& column, const Ray<double>& ray, double from, double to, double tolerance,
-                           double restart_above) {
+OdeScalarResult ode_scalar(const Column<double>& column, const Ray<double>& ray, double from, double to,
+                           double tolerance, double restart_above) {
   const auto sample = [&](double u) {
     OpticalPoint<Slope<double>> p;
     column.sample_with_slope({&u, 1}, &p);

@@ -21,8 +21,7 @@ constexpr MethodInfo kExpInfo{"wei_norman_exp", 2, false,
 using C = Complex<double>;
 using ComplexSeries = Complex<Series<double>>;
 
-/// The largest mismatch of a series' end that its convergence allows: 2^-n is the last term of a geometric series at half
-/// its radius of convergence, beyond which more terms gain little.
+/// The last term of a geometric series at half its radius of convergence, beyond which more terms gain little.
 double largest_tail(int order) { return std::ldexp(1.0, -order); }
 
 /// What a layer needs to know of the medium, for any scalar that holds values.
@@ -38,7 +37,7 @@ struct LayerMedium {
 template <class S>
 bool constant_slope(const OpticalPoint<Series<S>>& p) {
   for (std::size_t k = 1; k < p.depth_slope_um.c.size(); ++k)
-    for (int l = 0; l < kLanes; ++l)
+    for (int l = 0; l < kRaysOf<S>; ++l)
       if (lane(p.depth_slope_um.c[k], l) != 0) return false;
   return true;
 }
@@ -69,7 +68,8 @@ LayerMedium<S> sample_layer(const Column<S>& column, double from, double to, con
 
 template <class S>
 LayerMedium<double> lane_of(const LayerMedium<S>& m, int l) {
-  LayerMedium<double> r{m.at, m.from, m.to, lane_of(m.series, l), lane_of(m.entry, l), lane_of(m.exit, l), {}, m.weight};
+  LayerMedium<double> r{m.at, m.from,  m.to, lane_of(m.series, l), lane_of(m.entry, l), lane_of(m.exit, l),
+                        {},   m.weight};
   for (const auto& p : m.nodes) r.nodes.push_back(lane_of(p, l));
   return r;
 }
@@ -189,7 +189,8 @@ bool finite(const Mat2<double>& m) {
 
 /// T = M(exit) U M(entry)^-1: the normalisation of the modes cancels.
 Mat2<double> layer_transfer(const LayerMedium<double>& m, const Ray<double>& ray, const WeiNormanForm& form) {
-  const Mat2<double> first = unit_modes(m.entry, ray.kx, ray.ky).fields, last = unit_modes(m.exit, ray.kx, ray.ky).fields;
+  const Mat2<double> first = unit_modes(m.entry, ray.kx, ray.ky).fields,
+                     last = unit_modes(m.exit, ray.kx, ray.ky).fields;
   return last * closed_layer(m, ray, form).mode_transfer(form.exponential) * inverse(first);
 }
 
@@ -251,7 +252,7 @@ WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double
   }                                                                                                 \
   template <class S>                                                                                \
   Mat2<S> Method<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const { \
-    return transfer_of(Info, column, ray, mesh, form_);                                        \
+    return transfer_of(Info, column, ray, mesh, form_);                                             \
   }                                                                                                 \
   template <class S>                                                                                \
   Su2<S> Method<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {  \

@@ -6,9 +6,9 @@
 //   S = [[1 + G1 G2, G1], [G2, 1]]     the paper (eq. 29; its g1 = G1 e^{2 g3}, g2 = G2 e^{-2 g3} can overflow)
 //   S = exp [[0, G1], [G2, 0]]         the same integrals without an order of the two couplings: one order better
 //
-// G1, G2: Taylor series of the envelopes e^{-2 Re g3} b1, e^{2 Re g3} b2 against exp(-+ 2 i (c1 z + c2 z^2)), z from the
-// point of expansion, c1 = Im b3, c2 = Im b3'/2 there (eqs. 30-36). Wherever b2 vanishes (an axis that does not turn
-// and constant n_o) nothing but the series is approximate.
+// G1, G2: Taylor series of the envelopes e^{-2 Re g3} b1, e^{2 Re g3} b2 against exp(-+ 2 i (c1 z + c2 z^2)), z from
+// the point of expansion, c1 = Im b3, c2 = Im b3'/2 there (eqs. 30-36). Wherever b2 vanishes (an axis that does not
+// turn and constant n_o) nothing but the series is approximate.
 
 #include <string>
 
@@ -18,10 +18,10 @@ namespace birefit {
 
 /// The choices in which the two methods differ.
 struct WeiNormanForm {
-  int order = 7;              ///< of the Taylor series, 1 .. kTaylorOrder
-  bool centred = false;       ///< expanded about the layer's middle, else about its entry face
-  bool exponential = false;   ///< S = exp(..), else the ordered product
-  bool phase_series = true;   ///< f and g3 by their Taylor series (eqs. 32, 33), else by 2 x 16 Gauss nodes
+  int order = 7;             ///< of the Taylor series, 1 .. kTaylorOrder
+  bool centred = false;      ///< expanded about the layer's middle, else about its entry face
+  bool exponential = false;  ///< S = exp(..), else the ordered product
+  bool phase_series = true;  ///< f and g3 by their Taylor series (eqs. 32, 33), else by 2 x 16 Gauss nodes
 };
 inline constexpr WeiNormanForm kWeiNormanPaper{};
 inline constexpr WeiNormanForm kWeiNormanExp{7, true, true, false};
@@ -45,21 +45,21 @@ WeiNormanLayer wei_norman_layer(const Column<double>& column, const Ray<double>&
 /// Can a result be trusted, and how far?
 struct WeiNormanReport {
   /// Relative error of the transfer from dropping -b2 g1 in eq. 27 and from the order of the couplings:
-  /// sum of dz |b1 b2| min(h/2, 1/(2 |b3|)). Measured within 30 % for the paper's form (a factor 3 high for single layers
-  /// that are not valid anyway), an upper bound, to the same 30 %, for the other.
+  /// sum of dz |b1 b2| min(h/2, 1/(2 |b3|)). Measured within 30 % for the paper's form (a factor 3 high for single
+  /// layers that are not valid anyway), an upper bound, to the same 30 %, for the other.
   double estimate = 0;
   double phase_residual_rad = 0;  ///< the largest of all layers, as are the next two
   double taylor_tail = 0;
   double peak_coupling = 0;
-  double min_v22 = 1;             ///< smallest |V22| of a layer over its common amplitude: g1 has a pole where it is 0
+  double min_v22 = 1;  ///< smallest |V22| of a layer over its common amplitude: g1 has a pole where it is 0
   bool valid = true;
-  std::string reason;             ///< why not
+  std::string reason;  ///< why not
 };
 WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double>& ray, const Mesh& mesh,
                                   const WeiNormanForm& form);
 
-/// The method of the source paper, whole: entry face, ordered product, f and g3 by series. One layer a mesh step. Order 1.
-/// Values only: throws std::logic_error for scalars with derivatives, and for columns without a law.
+/// The method of the source paper, whole: entry face, ordered product, f and g3 by series. One layer a mesh step.
+/// Order 1. Values only: throws std::logic_error for scalars with derivatives, and for columns without a law.
 template <class S>
 class WeiNorman final : public TransportMethod<S> {
  public:
