@@ -12,9 +12,9 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kPaperInfo{"wei_norman", 1, false, "product of exponentials, coupling integrals in closed form",
+constexpr MethodInfo kPaperInfo{"wei_norman", 1, false, false, "product of exponentials, coupling integrals in closed form",
                                 "Steinberg, ACM Trans. Graph. 39 (2020), eqs. 25-37; docs/methods.md"};
-constexpr MethodInfo kExpInfo{"wei_norman_exp", 2, false,
+constexpr MethodInfo kExpInfo{"wei_norman_exp", 2, false, false,
                               "closed coupling integrals about layer centres, one exponential of both",
                               "Steinberg, ACM Trans. Graph. 39 (2020); docs/methods.md"};
 

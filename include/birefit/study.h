@@ -1,0 +1,46 @@
+#pragma once
+// How fast and how accurate every transport method is, measured on fixed rays and frames: the charts of docs/methods.md.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace birefit {
+
+/// One method at one effort on one ray. Errors are against a reference that two methods of different order agree on
+/// (ChartScene::reference_agreement); not a number where a method does not offer the quantity.
+struct ChartPoint {
+  std::string scene, method;
+  std::string effort;          ///< "n=64" steps, panels or layers; "tol=1e-6" of an adaptive solver
+  double seconds = 0;          ///< one ray in plain doubles
+  double seconds_in_lanes = 0; ///< one ray of a full pack of them
+  double samples = 0;          ///< of the medium, per ray
+  double jones_error = 0;      ///< |T - T_ref| / |T_ref|, Frobenius
+  double intensity_error = 0;  ///< largest change of |q T p|^2 over 91 angles p of the polarizer, q crossed, unit field in
+  double gradient_error = 0;   ///< the same as jones_error, of dT / d n_e
+};
+
+struct ChartScene {
+  std::string name, what;
+  double reference_agreement = 0;        ///< of two methods of different order, relative, Frobenius
+  double phase_rad = 0;                  ///< retardance along the ray, between its two modes
+  /// Largest intensity error (as above, faces included, host on both sides) of a physics against all reflections.
+  double e_only_error = 0, one_way_error = 0;
+};
+
+/// A whole 500 x 500 frame as the planner would compute it for an asked accuracy; errors against accuracy 1e-10.
+struct ChartFrame {
+  std::string scene, method;
+  double asked = 0, seconds = 0, worst_error = 0, rms_error = 0;
+};
+
+struct Chart {
+  std::vector<ChartScene> scenes;
+  std::vector<ChartPoint> points;
+  std::vector<ChartFrame> frames;
+};
+
+/// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.
+Chart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
+
+}  // namespace birefit

@@ -1,0 +1,264 @@
+#include "birefit/study.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "birefit/render.h"
+#include "study/rays.h"
+#include "transport/methods.h"
+#include "transport/methods/ode_operator.h"
+#include "transport/methods/ode_scalar.h"
+#include "transport/methods/wei_norman.h"
+
+namespace birefit {
+namespace {
+
+using namespace study;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+using M = Mat2<double>;
+
+double frobenius(const M& m) { return std::sqrt(norm(m.a) + norm(m.b) + norm(m.c) + norm(m.d)); }
+double relative(const M& m, const M& reference) { return frobenius(m - reference) / frobenius(reference); }
+double intensity_error(const M& m, const M& reference) {
+  double worst = 0;
+  for (int i = 0; i <= 90; ++i) {
+    const double angle = 2 * i * std::numbers::pi / 180, px = std::cos(angle), py = std::sin(angle);
+    const auto crossed = [&](const M& t) { return norm(-py * (px * t.a + py * t.b) + px * (px * t.c + py * t.d)); };
+    worst = std::max(worst, std::abs(crossed(m) - crossed(reference)));
+  }
+  return worst;
+}
+/// Value and derivative of the first lane.
+M first_lane(const Mat2<Dual1>& m, bool derivative) {
+  const auto z = [&](const Complex<Dual1>& c) {
+    return derivative ? Complex<double>{lane(c.re.d[0], 0), lane(c.im.d[0], 0)} : Complex<double>{lane(c.re.value, 0), lane(c.im.value, 0)};
+  };
+  return {z(m.a), z(m.b), z(m.c), z(m.d)};
+}
+
+/// Seconds of one call: the best of a few timings that each last long enough for the clock.
+template <class Work>
+double seconds_of(const Work& work) {
+  using Clock = std::chrono::steady_clock;
+  double best = std::numeric_limits<double>::infinity();
+  int calls = 1;
+  for (int timing = 0; timing < 5; ++timing) {
+    for (;;) {
+      const auto start = Clock::now();
+      for (int i = 0; i < calls; ++i) work();
+      const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+      if (seconds < 1e-3) {
+        calls *= 4;
+        continue;
+      }
+      best = std::min(best, seconds / calls);
+      if (seconds > 0.2) return best;  // slow enough for one timing
+      break;
+    }
+  }
+  return best;
+}
+
+template <class S>
+Ray<S> ray_of(const RaySpec& spec, Continuity continuity) {
+  return {S(2 * std::numbers::pi / spec.wavelength_um), S(spec.kx), S(spec.ky), continuity};
+}
+
+/// Everything that is compared on one ray. Methods are compared in the source paper's physics, tangential E continuous, the
+/// one that all of them can do.
+struct RayBench {
+  RaySpec spec;
+  std::unique_ptr<Column<double>> column;
+  std::unique_ptr<Column<Pack>> lanes;
+  std::unique_ptr<Column<Dual1>> slopes;
+  M reference, gradient;
+  double agreement = 0;
+
+  explicit RayBench(const RaySpec& s) : spec(s), column(ray_column<double>(s.name, 0.0)), lanes(ray_column<Pack>(s.name, Pack(0.0))) {
+    Dual1 shift(Pack(0.0));
+    shift.d[0] = Pack(1.0);
+    slopes = ray_column<Dual1>(s.name, shift);
+    constexpr int kSteps = 16384;
+    const Mat2<Dual1> exact = Magnus6<Dual1>().transfer(*slopes, ray_of<Dual1>(spec, Continuity::e_only), uniform_mesh(kSteps));
+    reference = first_lane(exact, false);
+    gradient = first_lane(exact, true);
+    agreement = relative(Magnus4<double>().transfer(*column, ray_of<double>(spec, Continuity::e_only), uniform_mesh(4 * kSteps)), reference);
+  }
+
+  /// A method of the registry: any scalar.
+  template <template <class> class Method>
+  ChartPoint measure(int n) const {
+    const Mesh mesh = uniform_mesh(n);
+    const Method<double> plain_method{};
+    const Ray<double> ray = ray_of<double>(spec, Continuity::e_only);
+    const Ray<Pack> ray_lanes = ray_of<Pack>(spec, Continuity::e_only);
+    const Ray<Dual1> ray_slopes = ray_of<Dual1>(spec, Continuity::e_only);
+    ChartPoint p = value_point(plain_method, ray, mesh, plain_method.info().name, fmt::format("n={}", n));
+    const Method<Pack> lane_method{};
+    p.seconds_in_lanes = seconds_of([&] { keep(lane_method.transfer(*lanes, ray_lanes, mesh)); }) / kLanes;
+    const M slope = first_lane(Method<Dual1>{}.transfer(*slopes, ray_slopes, mesh), true);
+    p.gradient_error = relative(slope, gradient);
+    return p;
+  }
+  /// A method for plain doubles only.
+  ChartPoint value_point(const TransportMethod<double>& method, const Ray<double>& ray, const Mesh& mesh, const std::string& name,
+                         const std::string& effort) const {
+    ChartPoint p;
+    p.scene = spec.name, p.method = name, p.effort = effort;
+    p.seconds_in_lanes = p.gradient_error = kNone;
+    const CountingColumn<double> counted(*column);
+    p.samples = kNone;
+    M result;
+    try {
+      result = method.transfer(*column, ray, mesh);
+    } catch (const std::exception&) {  // says itself that it cannot do this ray
+      p.seconds = p.jones_error = p.intensity_error = kNone;
+      return p;
+    }
+    p.seconds = seconds_of([&] { keep(method.transfer(*column, ray, mesh)); });
+    if (counts_samples(method)) {
+      method.transfer(counted, ray, mesh);
+      p.samples = counted.count();
+    }
+    p.jones_error = relative(result, reference);
+    p.intensity_error = intensity_error(result, reference);
+    return p;
+  }
+
+ private:
+  /// Methods that work on series of the medium ask the column for them, not for samples.
+  static bool counts_samples(const TransportMethod<double>& method) { return std::string(method.info().name).find("wei_norman") == std::string::npos; }
+  /// The compiler must not drop the work.
+  template <class T>
+  static void keep(const T& value) {
+    static volatile double sink;
+    sink = lane(plain(value.a.re), 0);
+  }
+};
+
+ChartScene describe(const RayBench& bench) {
+  ChartScene scene{bench.spec.name, bench.spec.what, bench.agreement, 0, 0, 0};
+  const Ray<double> ray = ray_of<double>(bench.spec, Continuity::e_and_h);
+  const ModalTransfer<double> modes = Diagonal<double>::modal(*bench.column, ray, uniform_mesh(64));
+  scene.phase_rad = std::abs(modes.phase_e - modes.phase_o);
+  const Mesh mesh = uniform_mesh(4096);
+  const M everything = Berreman<double>().transmission(*bench.column, ray, mesh, bench.spec.host_index);
+  const Magnus4<double> method;
+  scene.one_way_error = intensity_error(method.transmission(*bench.column, ray, mesh, bench.spec.host_index), everything);
+  scene.e_only_error = intensity_error(
+      method.transmission(*bench.column, ray_of<double>(bench.spec, Continuity::e_only), mesh, bench.spec.host_index), everything);
+  return scene;
+}
+
+// ---- whole frames --------------------------------------------------------------------------------------------------------
+
+struct FrameScene {
+  std::string name;
+  ParameterTable table;
+  Scene scene;
+};
+std::vector<FrameScene> frame_scenes() {
+  std::vector<FrameScene> all(3);
+  for (int i = 0; i < 3; ++i) {
+    FrameScene& f = all[static_cast<std::size_t>(i)];
+    f.scene.view.width = f.scene.view.height = 500;
+    f.scene.microscope.polarizer_deg = f.table.add_constant("polarizer_deg", 0);
+    f.scene.microscope.analyzer_deg = f.table.add_constant("analyzer_deg", 90);
+    if (i == 2) {
+      f.name = "e44_plate";
+      Plate plate;
+      plate.thickness_um = f.table.add_constant("thickness_um", 800);
+      plate.director.axis = {f.table.add_constant("x", -0.353553), f.table.add_constant("y", 0.353553), f.table.add_constant("z", -0.866025)};
+      HeatStep heat;
+      heat.fourier_number = f.table.add_constant("fourier_number", 0.1);
+      heat.cold_k = f.table.add_constant("cold_k", 278);
+      heat.hot_k = f.table.add_constant("hot_k", 368);
+      plate.heat = heat;
+      plate.half_angle_deg = f.table.add_constant("half_angle_deg", 15);
+      f.scene.sample = plate;
+      f.scene.material = E44Steinberg2020{};
+      f.scene.surround_index = f.table.add_constant("index", 1.0);
+      f.scene.microscope.wavelength_nm = f.table.add_constant("wavelength_nm", 640);
+      continue;
+    }
+    f.name = i == 0 ? "hedgehog" : "twisted_droplet";
+    Droplet droplet;
+    droplet.diameter_um = f.table.add_constant("diameter_um", 9);
+    if (i == 1) droplet.director.twist_deg = f.table.add_constant("twist_deg", 60);
+    f.scene.sample = droplet;
+    ConstantIndices material;
+    material.ordinary = f.table.add_constant("ordinary", 1.52);
+    material.birefringence = f.table.add_constant("birefringence", 0.22);
+    f.scene.material = material;
+    f.scene.surround_index = f.table.add_constant("index", 1.43);
+    f.scene.microscope.wavelength_nm = f.table.add_constant("wavelength_nm", 590);
+    f.scene.view.pixel_size_um = 0.025;
+    f.scene.view.center_x_px = f.table.add_constant("center_x", 249.8);
+    f.scene.view.center_y_px = f.table.add_constant("center_y", 250.3);
+  }
+  return all;
+}
+
+void measure_frames(Chart& chart, const std::function<void(const std::string&)>& say) {
+  for (FrameScene& f : frame_scenes()) {
+    if (say) say("frames of " + f.name);
+    const Theta theta = f.table.values();
+    f.scene.intensity_accuracy = 1e-10;
+    const Image exact = render(f.scene, plan(f.scene, theta), theta).intensity;
+    for (const double asked : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
+      f.scene.intensity_accuracy = asked;
+      const RenderPlan chosen = plan(f.scene, theta);
+      ChartFrame frame{f.name, chosen.method, asked, 0, 0, 0};
+      const Image image = render(f.scene, chosen, theta).intensity;
+      frame.seconds = seconds_of([&] { render(f.scene, chosen, theta); });
+      double sum = 0;
+      for (std::size_t i = 0; i < image.size(); ++i) {
+        const double d = image.values()[i] - exact.values()[i];
+        sum += d * d;
+        frame.worst_error = std::max(frame.worst_error, std::abs(d));
+      }
+      frame.rms_error = std::sqrt(sum / static_cast<double>(image.size()));
+      chart.frames.push_back(frame);
+    }
+  }
+}
+
+}  // namespace
+
+Chart measure_chart(bool quick, const std::function<void(const std::string&)>& say) {
+  Chart chart;
+  for (const RaySpec& spec : ray_specs()) {
+    if (say) say("rays of " + spec.name);
+    const RayBench bench(spec);
+    chart.scenes.push_back(describe(bench));
+    const Ray<double> ray = ray_of<double>(spec, Continuity::e_only);
+    const int most = quick ? 256 : 8192;
+    for (int n = 4; n <= most; n *= quick ? 4 : 2) {
+      if (n <= 64) chart.points.push_back(bench.measure<Diagonal>(n / 4));
+      chart.points.push_back(bench.measure<Magnus4>(n));
+      chart.points.push_back(bench.measure<Magnus6>(n));
+      chart.points.push_back(bench.measure<LayersMidpoint>(n));
+      chart.points.push_back(bench.measure<LayersEdge>(n));
+    }
+    for (int n = 1; n <= (quick ? 16 : 1024); n *= 4) {
+      const Mesh mesh = uniform_mesh(n);
+      const std::string effort = fmt::format("n={}", n);
+      chart.points.push_back(bench.value_point(WeiNorman<double>(), ray, mesh, "wei_norman", effort));
+      chart.points.push_back(bench.value_point(WeiNormanExp<double>(), ray, mesh, "wei_norman_exp", effort));
+    }
+    for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
+      if (quick && tolerance < 1e-6) break;
+      const std::string effort = fmt::format("tol={:g}", tolerance);
+      chart.points.push_back(bench.value_point(OdeOperator(tolerance), ray, uniform_mesh(2), "ode_operator", effort));
+      chart.points.push_back(bench.value_point(OdeScalar<double>(tolerance), ray, uniform_mesh(2), "ode_scalar", effort));
+    }
+  }
+  if (!quick) measure_frames(chart, say);
+  return chart;
+}
+
+}  // namespace birefit
