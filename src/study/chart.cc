@@ -28,7 +28,9 @@ double intensity_error(const M& m, const M& reference) {
   for (int i = 0; i <= 90; ++i) {
     const double angle = 2 * i * std::numbers::pi / 180, px = std::cos(angle), py = std::sin(angle);
     const auto crossed = [&](const M& t) { return norm(-py * (px * t.a + py * t.b) + px * (px * t.c + py * t.d)); };
-    worst = std::max(worst, std::abs(crossed(m) - crossed(reference)));
+    const double error = std::abs(crossed(m) - crossed(reference));
+    if (!(error <= worst)) worst = error;  // NaN stays NaN
+    if (std::isnan(worst)) return worst;
   }
   return worst;
 }

@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# birefit chart: its tables hold together, and say what theory says they must.
+set -uo pipefail
+program=$1
+rm -rf out
+"$program" chart --quick --quiet --out out || { echo "FAILED: exit code $?"; exit 1; }
+awk -F, '
+  function fail(text) { print "FAILED: " text; bad = 1 }
+  FNR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }
+  FILENAME ~ /scenes/ {
+    # Two methods of different order agree on every reference (the columns count from the end: "what" holds commas).
+    if (!($(NF - 2) < 1e-11)) fail($1 ": the reference is agreed on to " $(NF - 2) " only")
+    ++scenes; next
+  }
+  { error[$1, $2, $3] = $column["jones_error"]; time[$1, $2, $3] = $column["seconds_per_ray"]; samples[$1, $2, $3] = $column["medium_samples_per_ray"] }
+  END {
+    if (scenes != 7) fail(scenes " scenes")
+    # Orders on the twisted cell, from 64 to 256 steps: errors fall by 4^order.
+    split("layers_edge 1 layers_midpoint 2 magnus4 4", order, " ")
+    for (i = 1; i <= 5; i += 2) {
+      measured = log(error["twisted_cell", order[i], "n=64"] / error["twisted_cell", order[i], "n=256"]) / log(4)
+      if (measured < order[i + 1] - 0.3 || measured > order[i + 1] + 0.3) fail(order[i] " has order " measured)
+    }
+    # A radial droplet needs one phase integral; a cholesteric is what that cannot do.
+    if (!(error["hedgehog", "diagonal", "n=16"] < 1e-10)) fail("diagonal on the hedgehog: " error["hedgehog", "diagonal", "n=16"])
+    if (!(error["cholesteric", "diagonal", "n=16"] > 1e-2)) fail("diagonal on the cholesteric: " error["cholesteric", "diagonal", "n=16"])
+    # An axis that does not turn is the best case of the closed form (b2 = 0).
+    if (!(error["e44_plate", "wei_norman", "n=16"] < 1e-5)) fail("wei_norman on the heated plate")
+    if (samples["twisted_cell", "magnus4", "n=64"] != 128) fail("magnus4 samples the medium twice a step")
+    exit bad
+  }' out/scenes.csv out/chart.csv || exit 1
+if command -v gnuplot > /dev/null; then
+  grep -q "</svg>" out/chart.svg || { echo "FAILED: chart.svg is not complete"; exit 1; }
+fi
+echo "all as required"
