@@ -43,4 +43,17 @@ struct Chart {
 /// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.
 Chart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
 
+/// One method asked for 1e-6 (the two wei_norman: 1e-3) at one place of a sweep into a trap.
+struct StressPoint {
+  std::string sweep;
+  double value = 0;
+  std::string method;
+  double error = 0;     ///< relative, Frobenius; not a number where flagged or the truth itself is not known
+  double estimate = 0;  ///< what the method says of its error; infinite where flagged
+  double samples = 0;   ///< of the medium
+  std::string flag;     ///< why its answer must not be used; empty = it stands by the estimate
+};
+/// The law: error <= estimate, or flagged; never not a number, never unbounded work (tests/laws/stress_test.cc).
+std::vector<StressPoint> measure_stress(bool quick, const std::function<void(const std::string&)>& say = {});
+
 }  // namespace birefit

@@ -48,6 +48,23 @@ Modes<T> unit_modes(const OpticalPoint<T>& p, const T& kx, const T& ky) {
   return m;
 }
 
+/// Where the axis passes the wavevector the ordinary field a x w turns over, and whoever follows the modes by steps that
+/// miss the place ends with the wrong sign of one of them. True when the field turns by more than 60 degrees between two of
+/// `places` + 1 equally spaced u; medium(u) gives the OpticalPoint<double>.
+template <class Medium>
+bool modes_turn_over(const Medium& medium, const Ray<double>& ray, double from, double to, int places) {
+  Vec3<double> last{0, 0, 0};
+  for (int i = 0; i <= places; ++i) {
+    const double inside = 1e-12 + (1 - 2e-12) * i / places;
+    const OpticalPoint<double> p = medium(from + (to - from) * inside);
+    const double q = std::sqrt(std::max(0.0, p.ordinary - ray.kx * ray.kx - ray.ky * ray.ky));
+    const Vec3<double> now{p.axis.y * q - p.axis.z * ray.ky, p.axis.z * ray.kx - p.axis.x * q, p.axis.x * ray.ky - p.axis.y * ray.kx};
+    if (i > 0 && dot(now, last) <= 0.5 * std::sqrt(dot(now, now) * dot(last, last))) return true;
+    last = now;
+  }
+  return false;
+}
+
 /// d psi/dz = [[a + b3, b1], [b2, a - b3]] psi of the mode amplitudes psi = (ordinary, extraordinary), per um; eqs. 20,
 /// 23, 82: b1 couples the extraordinary wave into the ordinary one, b2 the other way.
 template <class T>

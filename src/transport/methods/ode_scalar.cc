@@ -115,6 +115,8 @@ Mat2<S> OdeScalar<S>::transfer(const Column<S>& column, const Ray<S>& ray, const
       column.sample_with_slope({&u, 1}, &p);
       return lane_of(p, l);
     };
+    if (modes_turn_over([&](double u) { return value_of(sample(u)); }, one, faces.from, faces.to, 256))
+      throw std::logic_error("ode_scalar: the axis passes the wavevector, where the modes change places");
     const Mat2<double> u = integrate(sample, one, faces.from, faces.to, tolerance_, 10).mode_transfer;
     const auto fields = [&](const auto& p) { return unit_modes(lane_of(p, l), one.kx, one.ky).fields; };
     return fields(faces.exit) * u * inverse(fields(faces.entry));

@@ -228,6 +228,12 @@ WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double
   for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
     const LayerMedium<double> medium = sample_layer(column, mesh[i], mesh[i + 1], form, true);
     const WeiNormanLayer layer = closed_layer(medium, ray, form);
+    const auto at = [&](double u) {
+      OpticalPoint<double> p;
+      column.sample({&u, 1}, &p);
+      return p;
+    };
+    if (modes_turn_over(at, ray, mesh[i], mesh[i + 1], 16)) refuse("the axis passes the wavevector, where the modes change places");
     if (!finite(layer_transfer(medium, ray, form)) || !std::isfinite(layer.estimate)) {
       refuse("not finite: the axis is parallel to the wavevector, or a layer far too thick");
       continue;

@@ -1,0 +1,24 @@
+#pragma once
+// Pictures by gnuplot, for the commands that measure.
+
+#include <filesystem>
+#include <string>
+
+namespace birefit {
+
+/// Runs a script; false (and a message to stderr) when gnuplot is not there or fails.
+bool draw(const std::string& script);
+/// 'path' as gnuplot reads it, quotes included.
+std::string plot_path(const std::filesystem::path& path);
+/// Makes the folder; UserError when it cannot.
+void make_folder(const std::string& folder);
+/// As CSV: empty when not finite.
+std::string csv_number(double x);
+
+/// Okabe and Ito's colours, told apart by every eye.
+inline constexpr const char* kColours[] = {"#999999", "#000000", "#F0E442", "#E69F00", "#D55E00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73"};
+/// The methods in the order of kColours.
+inline constexpr const char* kChartedMethods[] = {"layers_edge", "layers_midpoint", "ode_operator", "ode_scalar", "wei_norman",
+                                                  "wei_norman_exp", "magnus4", "magnus6", "diagonal"};
+
+}  // namespace birefit

@@ -1,0 +1,34 @@
+#pragma once
+// What a method answers when asked for an accuracy, and what it says about its own answer.
+
+#include <functional>
+#include <string>
+
+#include "transport/method.h"
+
+namespace birefit::study {
+
+struct Answer {
+  Mat2<double> transfer;
+  double estimate = 0;     ///< of the relative error (Frobenius) the method stands by
+  double samples = 0;      ///< of the medium
+  std::string flag;        ///< why the answer must not be used; empty = it may
+};
+
+double frobenius(const Mat2<double>& m);
+double relative_distance(const Mat2<double>& m, const Mat2<double>& reference);
+bool finite(const Mat2<double>& m);
+
+/// Halves the steps of a method with a known order until the change is below `tolerance`, at most to `most` steps. The
+/// changes must fall at least by half the order a halving, and the estimate is twice what then is left: a method that
+/// has not begun to converge may agree with itself by accident.
+Answer by_halving(const TransportMethod<double>& method, const Column<double>& column, const Ray<double>& ray, double tolerance,
+                  int most = 16384);
+/// The diagonal method: the change under halving, and twice the amplitude that the coupling it leaves out can reach.
+Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance);
+/// wei_norman (exponential = false) or wei_norman_exp: layers halved until the method's own report is below `tolerance`.
+Answer wei_norman_answer(bool exponential, const Column<double>& column, const Ray<double>& ray, double tolerance);
+/// ode_operator (scalar = false) or ode_scalar at `tolerance`, against itself at a tenth of it.
+Answer ode_answer(bool scalar, const Column<double>& column, const Ray<double>& ray, double tolerance);
+
+}  // namespace birefit::study

@@ -1,0 +1,55 @@
+// The law of every method in every trap: its answer is within its own estimate, or flagged.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "birefit/study.h"
+
+namespace birefit {
+namespace {
+
+const std::vector<StressPoint>& sweeps() {
+  static const std::vector<StressPoint> points = measure_stress(true);
+  return points;
+}
+
+TEST(Stress, AnswersAreWithinTheirOwnEstimateOrFlagged) {
+  const std::vector<StressPoint>& points = sweeps();
+  std::map<std::string, int> answered;
+  int judged = 0;
+  for (const StressPoint& p : points) {
+    SCOPED_TRACE(p.sweep + " " + std::to_string(p.value) + " " + p.method);
+    EXPECT_FALSE(std::isnan(p.estimate));
+    EXPECT_LT(p.samples, 3e6);  // bounded work
+    if (!p.flag.empty()) continue;
+    EXPECT_TRUE(std::isfinite(p.estimate));
+    ++answered[p.method];
+    if (std::isnan(p.error)) continue;  // nobody knows the truth here
+    ++judged;
+    EXPECT_LE(p.error, p.estimate + 1e-10);  // the truth is known to 1e-11
+  }
+  EXPECT_GT(judged, 150);
+  // Flagging everything is no answer: the workhorses answer nearly everywhere.
+  const int places = static_cast<int>(std::count_if(points.begin(), points.end(), [](const StressPoint& p) { return p.method == "magnus4"; }));
+  EXPECT_GT(answered["magnus4"], 0.8 * places);
+  EXPECT_GT(answered["magnus6"], 0.8 * places);
+}
+
+// An estimate that always says 1 would obey the law too: the median of estimate over error stays below 100.
+TEST(Stress, EstimatesAreSharp) {
+  std::map<std::string, std::vector<double>> sharpness;
+  for (const StressPoint& p : sweeps())
+    if (p.flag.empty() && p.error > 1e-10) sharpness[p.method].push_back(p.estimate / p.error);
+  for (auto& [method, ratios] : sharpness) {
+    std::nth_element(ratios.begin(), ratios.begin() + static_cast<long>(ratios.size() / 2), ratios.end());
+    std::printf("  %-16s median estimate/error %.1f of %zu\n", method.c_str(), ratios[ratios.size() / 2], ratios.size());
+    EXPECT_LT(ratios[ratios.size() / 2], 100) << method;
+  }
+  EXPECT_GE(sharpness.size(), 6u);
+}
+
+}  // namespace
+}  // namespace birefit
