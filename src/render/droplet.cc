@@ -170,7 +170,9 @@ Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const T
     // to the surface, so s is ordinary and p sees q_e = (n_o/n_e) sqrt(n_e^2 - kappa^2), Y = n_o^2 / q_e.
     const S s1 = o.n_host * r.cos_out, s2 = o.n_o * r.cos_in;
     const S kappa = o.n_host * r.sin_out;
-    const S p1 = o.n_host * inverse(r.cos_out), p2 = o.n_o * o.n_e * inverse_root(o.n_e * o.n_e - kappa * kappa);
+    // Beyond kappa = n_e (n_e below the host's index) p is totally reflected: p2 grows without end and t_p vanishes.
+    const S inside = max_of(o.n_e * o.n_e - kappa * kappa, S(1e-14));
+    const S p1 = o.n_host * inverse(r.cos_out), p2 = o.n_o * o.n_e * inverse_root(inside);
     const S sum_s = s1 + s2, sum_p = p1 + p2;
     const S over_s = inverse(sum_s), over_p = inverse(sum_p);
     const S t_s = 4.0 * s1 * s2 * over_s * over_s, t_p = 4.0 * p1 * p2 * over_p * over_p;
