@@ -34,14 +34,14 @@ struct ChartFrame {
   double asked = 0, seconds = 0, worst_error = 0, rms_error = 0;
 };
 
-struct Chart {
+struct MethodChart {
   std::vector<ChartScene> scenes;
   std::vector<ChartPoint> points;
   std::vector<ChartFrame> frames;
 };
 
 /// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.
-Chart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
+MethodChart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
 
 /// One method asked for 1e-6 (the two wei_norman: 1e-3) at one place of a sweep into a trap.
 struct StressPoint {

@@ -22,7 +22,7 @@ struct Arguments {
   bool quick = false, quiet = false;
 };
 
-std::string points_csv(const Chart& chart) {
+std::string points_csv(const MethodChart& chart) {
   std::string text =
       "scene,method,effort,seconds_per_ray,seconds_per_ray_in_lanes,medium_samples_per_ray,jones_error,intensity_error,gradient_error\n";
   for (const ChartPoint& p : chart.points)
@@ -30,21 +30,21 @@ std::string points_csv(const Chart& chart) {
                         csv_number(p.samples), csv_number(p.jones_error), csv_number(p.intensity_error), csv_number(p.gradient_error));
   return text;
 }
-std::string scenes_csv(const Chart& chart) {
+std::string scenes_csv(const MethodChart& chart) {
   std::string text = "scene,what,phase_rad,reference_agreement,intensity_error_e_only,intensity_error_one_way\n";
   for (const ChartScene& s : chart.scenes)
     text += fmt::format("{},\"{}\",{},{},{},{}\n", s.name, s.what, csv_number(s.phase_rad), csv_number(s.reference_agreement),
                         csv_number(s.e_only_error), csv_number(s.one_way_error));
   return text;
 }
-std::string frames_csv(const Chart& chart) {
+std::string frames_csv(const MethodChart& chart) {
   std::string text = "scene,method,accuracy_asked,seconds_per_frame,worst_error,rms_error\n";
   for (const ChartFrame& f : chart.frames)
     text += fmt::format("{},{},{},{},{},{}\n", f.scene, f.method, csv_number(f.asked), csv_number(f.seconds), csv_number(f.worst_error), csv_number(f.rms_error));
   return text;
 }
 
-std::string rays_script(const Chart& chart, const std::string& svg) {
+std::string rays_script(const MethodChart& chart, const std::string& svg) {
   std::string script = fmt::format(
       "set terminal svg size 1500,820 dynamic font 'sans,13' background rgb 'white'\nset output {}\n"
       "set logscale xy\nset format x '10^{{%T}}'\nset format y '10^{{%T}}'\nset grid lc rgb '#dddddd'\n"
@@ -74,7 +74,7 @@ std::string rays_script(const Chart& chart, const std::string& svg) {
   return script + "\nunset multiplot\n";
 }
 
-std::string frames_script(const Chart& chart, const std::string& svg) {
+std::string frames_script(const MethodChart& chart, const std::string& svg) {
   std::string script = fmt::format(
       "set terminal svg size 820,520 dynamic font 'sans,13' background rgb 'white'\nset output {}\nset logscale xy\n"
       "set format x '10^{{%T}}'\nset grid lc rgb '#dddddd'\nset key top right noenhanced\n"
@@ -98,7 +98,7 @@ std::string frames_script(const Chart& chart, const std::string& svg) {
 int run_chart(const Arguments& arguments) {
   const std::filesystem::path out = arguments.out;
   make_folder(arguments.out);
-  const Chart chart = measure_chart(arguments.quick, [&](const std::string& what) {
+  const MethodChart chart = measure_chart(arguments.quick, [&](const std::string& what) {
     if (!arguments.quiet) std::cerr << "measuring " << what << "\n";
   });
   write_file((out / "chart.csv").string(), points_csv(chart));

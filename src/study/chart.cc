@@ -205,7 +205,7 @@ std::vector<FrameScene> frame_scenes() {
   return all;
 }
 
-void measure_frames(Chart& chart, const std::function<void(const std::string&)>& say) {
+void measure_frames(MethodChart& chart, const std::function<void(const std::string&)>& say) {
   for (FrameScene& f : frame_scenes()) {
     if (say) say("frames of " + f.name);
     const Theta theta = f.table.values();
@@ -231,8 +231,8 @@ void measure_frames(Chart& chart, const std::function<void(const std::string&)>&
 
 }  // namespace
 
-Chart measure_chart(bool quick, const std::function<void(const std::string&)>& say) {
-  Chart chart;
+MethodChart measure_chart(bool quick, const std::function<void(const std::string&)>& say) {
+  MethodChart chart;
   for (const RaySpec& spec : ray_specs()) {
     if (say) say("rays of " + spec.name);
     const RayBench bench(spec);
