@@ -311,6 +311,7 @@ void Fit::settle_weights() {
   }
   if (lower) {
     rebuild_problem();
+    result_.iterations.clear();  // chi-square in other units; the report draws one curve
     solve_main("noise from the residual");
   }
   for (int pass = 0; pass < 3 && !stopped_; ++pass) {
