@@ -21,7 +21,7 @@ class RimTable {
   double psi_max() const { return psi_max_; }
   double rho_max() const { return rho_max_; }          ///< largest image radius / R that light reaches
   double rho_over_radius(double psi) const;
-  double psi_at(double rho_over_radius) const;          ///< within 1e-5 rad
+  double psi_at(double rho_over_radius) const;          ///< within 5e-5 rad
 
  private:
   static constexpr int kNodes = 512;

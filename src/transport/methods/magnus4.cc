@@ -54,7 +54,7 @@ Mat2<S> Magnus4<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     const Mat2<S>& second = generator[2 * i + 1];
     const Mat2<S> omega = S(0.5 * h) * (first + second) - S(kSqrt3 / 12 * h * h) * commutator(first, second);
     total = exp(omega) * total;
-    if (ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
+    if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
   }
   return total;
 }

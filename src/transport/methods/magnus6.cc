@@ -69,7 +69,7 @@ Mat2<S> Magnus6<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
         [](double f, const Mat2<S>& m) { return S(f) * m; }, [](const Mat2<S>& m, const Mat2<S>& n) { return m + n; },
         [](const Mat2<S>& m, const Mat2<S>& n) { return commutator(m, n); });
     total = exp(w) * total;
-    if (ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
+    if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
   }
   return total;
 }
