@@ -3,6 +3,7 @@
 
 #include <array>
 #include <complex>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -27,9 +28,13 @@ struct RenderPlan {
   int steps = 1;                    ///< equal mesh steps in u (diagonal: 8 Gauss nodes each); 0 = use `mesh`
   std::vector<double> mesh;         ///< adapted mesh in u
   int radial_panels = 0;            ///< droplets: panels of the table over the radius; 0 = one ray a point
-  /// Pixels with one sample: the mean of mean + amplitude cos(phase) in closed form from one ray a pixel and its
+  int centre_panels = 0;            ///< of its innermost part
+  /// Pixels with one sample: the mean of a fringe in closed form from one ray a pixel and its
   /// neighbours' (plates), instead of the point value's correction.
   bool fringe_means = false;
+  /// Which squares of so many pixels have their fringes interpolated from a few rays (render/fringe_table.h); 0 = none.
+  int fringe_block_px = 0;
+  std::vector<std::uint8_t> fringe_blocks;
   /// Samples per pixel side by distance from (sampling_center_x_px, _y_px), one entry per sampling_bin_px; 1 = the
   /// point value with a second-order correction to the pixel's mean, n > 1 = n x n Gauss points.
   std::vector<int> samples;
@@ -50,6 +55,9 @@ struct Rendering {
 /// in degrees, lengths in the unit of the parameter). Same bits whatever the number of threads (0 = all cores).
 Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active = {},
                  int threads = 0);
+/// The same into images that are there already: fresh memory costs as much as the image itself.
+void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
+            Rendering& into);
 
 /// The same at chosen pixels only (column, row pairs): value[i], derivative(i, j). Used by the coarse scan.
 struct PixelRendering {

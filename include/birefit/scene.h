@@ -105,6 +105,7 @@ struct SlabProfile {
 };
 struct Slab {
   SlabProfile profile;
+  ParameterRef half_angle_deg;  ///< of a converging cone in the outside medium, (0, 80]; none: the microscope's directions
 };
 
 using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab>;

@@ -38,7 +38,7 @@ int run_jones(const Arguments& arguments) {
   const Theta theta = config.job.parameters.values();
   const RenderPlan chosen = plan(config.scene, theta);
   const std::vector<JonesRow> rows = jones(config.scene, chosen, theta);
-  const bool slab = std::holds_alternative<Slab>(config.scene.sample);
+  const bool slab = !config.scene.microscope.directions.empty();  // one row a direction
   std::string text = slab ? "theta_deg,azimuth_deg" : "row,col";
   text += ",wavelength_nm,re_ss,im_ss,re_ps,im_ps,re_sp,im_sp,re_pp,im_pp\n";
   const auto out = std::back_inserter(text);

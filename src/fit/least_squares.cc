@@ -172,7 +172,8 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
     auto intensity = intensity_.segment(frame.begin, frame.count);
     // A whole image is cheaper by its symmetries and rows; a small part of it pixel by pixel.
     if (2 * pixels.size() > static_cast<std::size_t>(scene.view.width) * scene.view.height) {
-      const Rendering rendering = render(scene, plans_[g], theta_, active, job_.options.threads);
+      render(scene, plans_[g], theta_, active, job_.options.threads, frame.rendering);
+      const Rendering& rendering = frame.rendering;
       const auto gather = [&](const Image& image, auto&& out) {
         for (Eigen::Index i = 0; i < frame.count; ++i) out[i] = image(pixels[i][0], pixels[i][1]);
       };

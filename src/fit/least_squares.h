@@ -119,6 +119,7 @@ class LeastSquares {
     int gain = -1, offset = -1;                ///< index among the linear unknowns, -1 = known
     double shape_factor = 1, mean_factor = 1;  ///< whitening of the parts across and along the mean
     double intensity_low = 0, intensity_high = 0;
+    Rendering rendering;                       ///< kept for its memory
   };
   void whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const;
   void set_priors();

@@ -119,7 +119,8 @@ ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::st
 
 void read_center(ConfigReader& reader, const Block& block, const Scene& scene, MicrographSettings& settings) {
   const bool droplet = std::holds_alternative<Droplet>(scene.sample);
-  const bool plate = std::holds_alternative<Plate>(scene.sample);
+  const Slab* slab = std::get_if<Slab>(&scene.sample);
+  const bool cone = std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
   const YamlNode* node = block.find("center_px");
   const std::string path = "micrograph.center_px";
   if (node && node->is_sequence() && node->items.size() == 2) {
@@ -141,7 +142,7 @@ void read_center(ConfigReader& reader, const Block& block, const Scene& scene, M
     }
   }
   const bool fitted = reader.table[settings.center_x].free || reader.table[settings.center_y].free;
-  if (node && fitted && !droplet && !plate)
+  if (node && fitted && !droplet && !cone)
     reader.problems.add(node->where, "center_px has no effect on this sample and cannot be fitted", "leave it out");
 }
 
@@ -791,7 +792,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       }
     } else if (root.find("image_size_px")) {
       // Its mistake was reported.
-    } else if (std::holds_alternative<Slab>(scene.sample)) {
+    } else if (!scene.microscope.directions.empty()) {
       set_view(reader, settings, 1, 1, 0, name, scene);
       resolve_automatic(reader, scene, nullptr, nullptr, name);
     } else {

@@ -177,6 +177,12 @@ Cell read_cell(ConfigReader& reader, const Block& parent) {
   return cell;
 }
 
+ParameterRef read_half_angle(ConfigReader& reader, const Block& view) {
+  NumberSpec half_angle = angle_within(0, 80);
+  half_angle.lower_open = true;
+  return reader.number(view, "half_angle_deg", half_angle);
+}
+
 Plate read_plate(ConfigReader& reader, const Block& parent) {
   Plate plate;
   const Block block = reader.block(parent, "plate", {"thickness_um", "director", "heat", "view"}, true);
@@ -194,10 +200,7 @@ Plate read_plate(ConfigReader& reader, const Block& parent) {
     step.hot_k = reader.number(heat, "hot_k", kelvin());
     plate.heat = step;
   }
-  const Block view = reader.block(block, "view", {"half_angle_deg"}, true);
-  NumberSpec half_angle = angle_within(0, 80);
-  half_angle.lower_open = true;
-  plate.half_angle_deg = reader.number(view, "half_angle_deg", half_angle);
+  plate.half_angle_deg = read_half_angle(reader, reader.block(block, "view", {"half_angle_deg"}, true));
   return plate;
 }
 
@@ -257,7 +260,8 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
 
 Slab read_slab(ConfigReader& reader, const Block& parent) {
   Slab slab;
-  const Block block = reader.block(parent, "slab", {"profile", "interpolation"}, true);
+  const Block block = reader.block(parent, "slab", {"profile", "interpolation", "view"}, true);
+  if (block.find("view")) slab.half_angle_deg = read_half_angle(reader, reader.block(block, "view", {"half_angle_deg"}, true));
   const std::string interpolation =
       reader.choice(block, "interpolation", {"constant", "linear", "cubic"}).value_or("constant");
   using Interpolation = SlabProfile::Interpolation;
@@ -466,7 +470,8 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   bandwidth.upper = 5000;
   microscope.bandwidth_nm = reader.plain(light, "bandwidth_nm", bandwidth).value_or(0);
 
-  const bool slab = std::holds_alternative<Slab>(scene.sample);
+  const Slab* slab_sample = std::get_if<Slab>(&scene.sample);
+  const bool slab = slab_sample && !slab_sample->half_angle_deg;
   microscope.polarizer_deg = polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab);
   microscope.analyzer_deg = polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab);
   microscope.objective_na = reader.plain(block, "objective_na", aperture()).value_or(0);
@@ -478,7 +483,8 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
 
   if (const YamlNode* directions = block.find("directions")) {
     if (!slab)
-      reader.problems.add(directions->where, "directions belong to slab scenes");
+      reader.problems.add(directions->where, slab_sample ? "a slab with a view in a cone has a direction for every pixel"
+                                                         : "directions belong to slab scenes", slab_sample ? "give one of the two" : "");
     if (!directions->is_sequence() || directions->items.empty()) {
       reader.problems.add(directions->where, "directions must be a list of {theta_deg, azimuth_deg}, found " +
                                                  (directions->is_sequence() ? "an empty one" : directions->describe()));
@@ -503,7 +509,8 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
 
   const Block physics = reader.block(root, "physics", {"ceiling", "max_seconds"}, false);
   const YamlNode* ceiling = physics.find("ceiling");
-  const bool layered = std::holds_alternative<Cell>(scene.sample) || std::holds_alternative<Slab>(scene.sample);
+  const Slab* slab = std::get_if<Slab>(&scene.sample);
+  const bool layered = std::holds_alternative<Cell>(scene.sample) || (slab && !slab->half_angle_deg);
   if (ceiling && ceiling->is_scalar() && ceiling->text == "wave") {
     reader.problems.add(ceiling->where, "ceiling: wave is not available yet", "known: one_way, e_only, reflections and auto");
   } else if (ceiling && ceiling->is_scalar() && ceiling->text == "reflections" && !layered) {

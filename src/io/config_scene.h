@@ -44,6 +44,8 @@ void for_each_ref(Scene& scene, F&& f) {
     for (ParameterRef& coefficient : crystal->field_legendre) f(coefficient);
     f(crystal->electrode_low_px);
     f(crystal->electrode_high_px);
+  } else if (auto* slab = std::get_if<Slab>(&scene.sample)) {
+    f(slab->half_angle_deg);
   }
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material)) {
     f(constant->ordinary);

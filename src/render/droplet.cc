@@ -66,31 +66,35 @@ double RimTable::rho_over_radius(double psi) const {
   return std::sin(psi) / std::cos(2 * delta);
 }
 
-double RimTable::psi_at(double rho_over_radius) const {
-  const double t = std::sqrt(std::max(0.0, 1 - rho_over_radius / rho_max_)) * kNodes;
-  const int i = std::min(static_cast<int>(t), kNodes - 1);
-  const double f = t - i;
-  const std::size_t k = static_cast<std::size_t>(i);
-  return psi_[k] * (1 - f) + psi_[k + 1] * f;
+template <class P>
+P RimTable::psi_at(const P& rho_over_radius) const {
+  using std::floor;
+  const P t = root(max_of(P(1.0) - rho_over_radius * P(1 / rho_max_), P(1e-300))) * P(static_cast<double>(kNodes));
+  const P cell = min_of(floor(t), P(kNodes - 1.0)), f = t - cell;
+  if constexpr (std::is_same_v<P, double>) {
+    const std::size_t k = static_cast<std::size_t>(cell);
+    return psi_[k] + f * (psi_[k + 1] - psi_[k]);
+  } else {
+    alignas(64) double cells[kLanes], low[kLanes], high[kLanes];
+    cell.store_aligned(cells);
+    for (int i = 0; i < kLanes; ++i) {
+      const std::size_t k = static_cast<std::size_t>(cells[i]);
+      low[i] = psi_[k];
+      high[i] = psi_[k + 1];
+    }
+    const P from = P::load_aligned(low);
+    return from + f * (P::load_aligned(high) - from);
+  }
 }
+template double RimTable::psi_at<double>(const double&) const;
+template Pack RimTable::psi_at<Pack>(const Pack&) const;
 
 template <class S>
 DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho_um) {
   using P = PlainOf<S>;
   // The table is within 5e-5 rad: one Newton step leaves some 1e-9, two leave rounding.
   constexpr int kNewtonSteps = 2;
-  P start;
-  {
-    const P scaled = plain(rho_um) * inverse(plain(o.radius_um));
-    if constexpr (kLanesOf<S> == 1) {
-      start = rim.psi_at(scaled);
-    } else {
-      alignas(64) double lanes[kLanes];
-      scaled.store_aligned(lanes);
-      for (double& x : lanes) x = rim.psi_at(x);
-      start = Pack::load_aligned(lanes);
-    }
-  }
+  P start = rim.psi_at(plain(rho_um) * inverse(plain(o.radius_um)));
   // No step leaves the accepted interval: at its end the intensity vanishes.
   const P limit(rim.psi_max());
   DropletRay<S> ray;
@@ -184,38 +188,34 @@ Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const T
 
 namespace {
 
-/// The image is symmetric up to the turn of the polarizers: with a_r, a_f (p_r, p_f) the analyser's (polarizer's)
-/// components along the radius and around the axis,
-///   I = sum of tube |field|^2 terms = sum_k basis_k(a_r, a_f, p_r, p_f) f_k(rho),
-/// nine terms, three when the transport is diagonal.
-constexpr int kTerms = 9, kDiagonalTerms = 3;
+/// Where the two parts of the tables meet: w = 1 - sqrt(1 - rho/edge), about 1/30 of the radius.
+constexpr double kCentre = 1.0 / 64;
+
+/// With the Jones matrix [[j0 + j1, j2 + j3], [j2 - j3, j0 - j1]] in the (radial, azimuthal) frame, analyser at alpha,
+/// polarizer at beta and q, s = cos, sin (2 azimuth - alpha - beta), the field behind the analyser is D + j1 q - j2 s,
+/// D = j0 cos(alpha - beta) - j3 sin(alpha - beta), and
+///   I = sum of tube |field|^2 terms = f . (q^2, q, 1, s, q s),
+/// the last two only where the transport is not diagonal; between crossed polarizers a diagonal one leaves the first alone.
 template <class S>
-void intensity_terms(const Mat2<S>& j, const S& tube, bool diagonal, S* f) {
+void intensity_terms(const Mat2<S>& j, const S& tube, const S& cos_between, const S& sin_between, bool diagonal, S* f) {
   const auto cross = [](const Complex<S>& a, const Complex<S>& b) { return a.re * b.re + a.im * b.im; };
-  f[0] = tube * norm(j.a);
-  f[1] = tube * norm(j.d);
-  f[2] = 2.0 * tube * cross(j.a, j.d);
-  if (diagonal) return;
-  f[2] = f[2] + 2.0 * tube * cross(j.b, j.c);
-  f[3] = tube * norm(j.b);
-  f[4] = tube * norm(j.c);
-  f[5] = 2.0 * tube * cross(j.a, j.b);
-  f[6] = 2.0 * tube * cross(j.c, j.d);
-  f[7] = 2.0 * tube * cross(j.a, j.c);
-  f[8] = 2.0 * tube * cross(j.b, j.d);
-}
-template <class S>
-void intensity_basis(const S& a_r, const S& a_f, const S& p_r, const S& p_f, bool diagonal, S* basis) {
-  const S arf = a_r * a_f, prf = p_r * p_f;
+  const S half(0.5), twice = 2.0 * tube;
+  const Complex<S> j1 = half * (j.a - j.d);
+  Complex<S> direct = (half * cos_between) * (j.a + j.d);
   if (diagonal) {
-    const S r = a_r * p_r, f = a_f * p_f;
-    basis[0] = r * r, basis[1] = f * f, basis[2] = r * f;
+    f[0] = tube * norm(j1);
+    f[1] = twice * cross(direct, j1);
+    f[2] = tube * norm(direct);
     return;
   }
-  const S arr = a_r * a_r, aff = a_f * a_f, prr = p_r * p_r, pff = p_f * p_f;
-  basis[0] = arr * prr, basis[1] = aff * pff, basis[2] = arf * prf;
-  basis[3] = arr * pff, basis[4] = aff * prr, basis[5] = arr * prf;
-  basis[6] = aff * prf, basis[7] = arf * prr, basis[8] = arf * pff;
+  direct = direct - (half * sin_between) * (j.b - j.c);
+  const Complex<S> j2 = half * (j.b + j.c);
+  const S square2 = norm(j2);
+  f[0] = tube * (norm(j1) - square2);
+  f[1] = twice * cross(direct, j1);
+  f[2] = tube * (norm(direct) + square2);
+  f[3] = S(0.0) - twice * cross(direct, j2);
+  f[4] = S(0.0) - twice * cross(j1, j2);
 }
 
 }  // namespace
@@ -228,26 +228,37 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       twisted_(static_cast<bool>(std::get<Droplet>(scene.sample).director.twist_deg)),
       aplanatic_(scene.microscope.aplanatic),
-      polarizers_(polarizers(scene, value)),
+      sum_rad_(value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg)),
       pixel_um_(scene.view.pixel_size_um),
       center_x_(value(scene.view.center_x_px)),
       center_y_(value(scene.view.center_y_px)),
-      edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)) {
-  const S along = polarizers_.px * polarizers_.ax + polarizers_.py * polarizers_.ay;
-  open_ = along * along;
-  if (plan.radial_panels > 0)
-    table_ = RadialTable<S>(plan.radial_panels, twisted_ ? kTerms : kDiagonalTerms,
-                            [this](const P& v, S* out) { terms(S(v), out); });
+      edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)),
+      inverse_edge_(inverse(edge_um_)) {
+  sin_cos(sum_rad_, sin_sum_, cos_sum_);
+  sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
+  open_ = cos_between_ * cos_between_;
+  dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
+  if (plan.radial_panels > 0) {
+    const auto part = [&](Part which, int panels) {
+      return RadialTable<S>(panels, number_of_terms(), [&](const P& v, S* out) { terms(which, S(v), out); });
+    };
+    centre_ = part(Part::centre, plan.centre_panels);
+    rest_ = part(Part::rest, plan.radial_panels);
+  }
   tabulated_ = plan.radial_panels > 0;
 }
 
-// v = (1 - sqrt(1 - rho/edge))^(1/4): edge - rho is quadratic in v at the rim, where everything is a function of
-// sqrt(edge - rho), and rho ~ v^4 at the centre, where a twist leaves rho^2 log rho and the mesh along the chord changes
-// its shape at rho ~ 0.003 edge.
+// Functions of the radius end at the rim as functions of root = sqrt(1 - rho/edge). At the centre a twist leaves
+// rho^2 log rho and the mesh along the chord changes its shape at rho ~ 0.003 edge: there w = 1 - root is stretched.
 template <class S>
-void DropletImage<S>::terms(const S& v, S* out) const {
-  const S v2 = v * v, w = 1.0 - v2 * v2;
-  terms_at(edge_um_ * (1.0 - w * w), out);
+void DropletImage<S>::terms(Part part, const S& v, S* out) const {
+  if (part == Part::centre) {
+    const S v2 = v * v, w = kCentre * v2 * v2;
+    terms_at(edge_um_ * w * (2.0 - w), out);
+  } else {
+    const S root = (1 - kCentre) * v;
+    terms_at(edge_um_ * (1.0 - root * root), out);
+  }
 }
 
 template <class S>
@@ -261,37 +272,75 @@ void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
     jones.b = ray.cos_twice * jones.b;
     tube = tube * inverse(ray.cos_twice);
   }
-  intensity_terms(jones, tube, !twisted_, out);
+  intensity_terms(jones, tube, cos_between_, sin_between_, !twisted_, out);
+}
+
+/// sum_k basis[k] f_k(rho), rho < edge.
+template <class S>
+S DropletImage<S>::through(const S& rho_um, const P* basis, const P* turned, P* turned_sum) const {
+  if (!tabulated_) {
+    S f[kMostTerms];
+    terms_at(rho_um, f);
+    S total(P(0.0));
+    if (turned) *turned_sum = P(0.0);
+    for (int k = 0; k < number_of_terms(); ++k) {
+      if constexpr (ScalarTraits<S>::derivatives > 0)
+        total = total + f[k].chain(f[k].value * basis[k], basis[k]);
+      else
+        total = total + f[k] * basis[k];
+      if (turned) *turned_sum = *turned_sum + plain(f[k]) * turned[k];
+    }
+    return total;
+  }
+  const S fraction = rho_um * inverse_edge_, to_rim = root(1.0 - fraction);
+  const auto central = plain(to_rim) > P(1 - kCentre);
+  S total(P(0.0));
+  if (!all(central)) total = tabulated_sum(Part::rest, to_rim * (1 / (1 - kCentre)), basis, turned, turned_sum);
+  if (none(central)) return total;
+  P turned_here;
+  const S v = root(root(fraction * inverse(1.0 + to_rim) * (1 / kCentre)));
+  const S centre = tabulated_sum(Part::centre, v, basis, turned, &turned_here);
+  if (turned) *turned_sum = all(central) ? turned_here : select(central, turned_here, *turned_sum);
+  return all(central) ? centre : select(central, centre, total);
 }
 
 template <class S>
 S DropletImage<S>::intensity(const P& column, const P& row) const {
-  const S x = (S(column) - center_x_) * pixel_um_, y = (center_y_ - S(row)) * pixel_um_;
-  const S rho2 = x * x + y * y + S(1e-18);
-  const S inverse_rho = inverse_root(rho2);
-  const S rho = rho2 * inverse_rho;
+  const P x = (column - plain(center_x_)) * P(pixel_um_), y = (plain(center_y_) - row) * P(pixel_um_);
+  const P rho2 = x * x + y * y + P(1e-18), over_rho = inverse_root(rho2), rho_um = rho2 * over_rho;
   const P edge = plain(edge_um_) * P(1 - 1e-12);
-  const auto inside = plain(rho) < edge;
-  S beside(0.0);
-  if (!all(plain(rho) < plain(optics_.radius_um) - P(pixel_um_)))  // light that passes by; averaged over a pixel
-    beside = open_ * min_of(max_of((rho - optics_.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
-  if (none(inside)) return beside;
-  const S cr = x * inverse_rho, sr = y * inverse_rho;
-  const S p_r = polarizers_.px * cr + polarizers_.py * sr, p_f = polarizers_.py * cr - polarizers_.px * sr;
-  const S a_r = polarizers_.ax * cr + polarizers_.ay * sr, a_f = polarizers_.ay * cr - polarizers_.ax * sr;
-  S basis[kTerms];
-  intensity_basis(a_r, a_f, p_r, p_f, !twisted_, basis);
-  S through;
-  if (tabulated_) {
-    const S fraction = select(inside, rho * inverse(edge_um_), S(0.5));
-    through = tabulated_sum(root(root(fraction * inverse(1.0 + root(1.0 - fraction)))), basis);
-  } else {
-    S f[kTerms];
-    terms_at(select(inside, rho, S(plain(edge_um_) * P(0.5))), f);
-    through = basis[0] * f[0];
-    for (int k = 1; k < number_of_terms(); ++k) through = through + basis[k] * f[k];
+  const auto inside = rho_um < edge;
+  S rho(select(inside, rho_um, plain(edge_um_) * P(0.5)));
+  if constexpr (ScalarTraits<S>::derivatives > 0) {
+    const P px(pixel_um_);
+    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j) rho.d[j] = (y * center_y_.d[j] - x * center_x_.d[j]) * over_rho * px;
   }
-  return beside + select(inside, through, S(0.0));
+  S result(P(0.0));
+  if (!dark_ && !all(rho_um < plain(optics_.radius_um) - P(pixel_um_))) {  // light that passes by; averaged over a pixel
+    S everywhere(rho);
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      everywhere.value = rho_um;
+    else
+      everywhere = rho_um;
+    result = open_ * min_of(max_of((everywhere - optics_.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
+  }
+  if (none(inside)) return result;
+  const P square = over_rho * over_rho, c2 = (x * x - y * y) * square, s2 = P(2.0) * x * y * square;
+  const P q = plain(cos_sum_) * c2 + plain(sin_sum_) * s2, s = plain(cos_sum_) * s2 - plain(sin_sum_) * c2;
+  const P basis[kMostTerms] = {q * q, q, P(1.0), s, q * s};
+  S light;
+  if constexpr (ScalarTraits<S>::derivatives == 0) {
+    light = through(rho, basis, nullptr, nullptr);
+  } else {
+    // The basis by 2 azimuth: q' = -s, s' = q.
+    const P turned[kMostTerms] = {P(-2.0) * q * s, -s, P(0.0), q, q * q - s * s};
+    P by_angle(0.0);
+    light = through(rho, basis, turned, &by_angle);
+    const P to_angle = by_angle * P(2 * pixel_um_) * square;
+    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
+      light.d[j] = light.d[j] + to_angle * (x * center_y_.d[j] + y * center_x_.d[j]) - by_angle * sum_rad_.d[j];
+  }
+  return result + select(inside, light, S(0.0));
 }
 
 template <class S>

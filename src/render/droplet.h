@@ -21,7 +21,8 @@ class RimTable {
   double psi_max() const { return psi_max_; }
   double rho_max() const { return rho_max_; }          ///< largest image radius / R that light reaches
   double rho_over_radius(double psi) const;
-  double psi_at(double rho_over_radius) const;          ///< within 5e-5 rad
+  template <class P>
+  P psi_at(const P& rho_over_radius) const;             ///< P = double or Pack; within 5e-5 rad
 
  private:
   static constexpr int kNodes = 512;
@@ -86,12 +87,17 @@ class DropletImage final : public PixelModel<S> {
   using P = PlainOf<S>;
   DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value);
   S intensity(const P& column, const P& row) const override;
-  /// What the image is made of, as functions of v in (0, 1) (centre to rim); out has number_of_terms() places.
-  void terms(const S& v, S* out) const;
-  int number_of_terms() const { return twisted_ ? 9 : 3; }
-  /// sum_k basis[k] terms_k(v) as the image reads it; only with plan.radial_panels > 0.
-  S tabulated_sum(const S& v, const S* basis) const {
-    return twisted_ ? table_.template sum<9>(v, basis) : table_.template sum<3>(v, basis);
+  /// The image is sum_k basis_k(azimuth) f_k(radius). Tables hold the f_k in two parts, each over v in [0, 1]: the
+  /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim.
+  enum class Part { centre, rest };
+  static constexpr int kMostTerms = 5;
+  int number_of_terms() const { return twisted_ ? 5 : 3; }
+  /// f_k at v of the part; out has number_of_terms() places.
+  void terms(Part part, const S& v, S* out) const;
+  /// sum_k basis[k] f_k(v) as the image reads it; only with plan.radial_panels > 0.
+  S tabulated_sum(Part part, const S& v, const P* basis, const P* turned = nullptr, P* turned_sum = nullptr) const {
+    const RadialTable<S>& table = part == Part::centre ? centre_ : rest_;
+    return twisted_ ? table.template sum<5>(v, basis, turned, turned_sum) : table.template sum<3>(v, basis, turned, turned_sum);
   }
 
  private:
@@ -100,17 +106,19 @@ class DropletImage final : public PixelModel<S> {
   static bool all(bool inside) { return inside; }
   static bool all(const Pack::batch_bool_type& inside) { return xsimd::all(inside); }
   void terms_at(const S& rho_um, S* out) const;
+  S through(const S& rho_um, const P* basis, const P* turned, P* turned_sum) const;
 
   DropletOptics<S> optics_;
   RimTable rim_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
   bool twisted_, aplanatic_;
-  Polarizers<S> polarizers_;
+  S cos_between_, sin_between_, cos_sum_, sin_sum_, sum_rad_;  ///< of analyser - polarizer, of analyser + polarizer
   double pixel_um_;
-  S center_x_, center_y_, edge_um_, open_;
+  S center_x_, center_y_, edge_um_, inverse_edge_, open_;
+  bool dark_ = false;  ///< no light beside the droplet
   bool tabulated_ = false;
-  RadialTable<S> table_;
+  RadialTable<S> centre_, rest_;
 };
 
 }  // namespace birefit

@@ -50,6 +50,10 @@ class PixelModel {
   virtual S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const = 0;
   /// The parts of intensity() as smooth functions; only with plan.fringe_means.
   virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
+  /// FringePoint::quadrature is zero everywhere.
+  virtual bool in_phase() const { return false; }
+  /// Before a whole picture is asked for: tables that pay only then.
+  virtual void tabulate(int /*threads*/) {}
 };
 
 /// 2 pi / wavelength in 1/um.

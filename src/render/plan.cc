@@ -10,6 +10,7 @@
 #include "birefit/render.h"
 #include "medium/build.h"
 #include "render/droplet.h"
+#include "render/fringe_table.h"
 #include "render/planar.h"
 #include "render/sampling.h"
 #include "transport/methods.h"
@@ -113,42 +114,59 @@ void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double 
   for (int i = 0; i < bins; ++i) plan.samples.push_back(samples_for(phase_step(i + 0.5)));
 }
 
-/// One ray a radius instead of one a point, when that is fewer rays. The table's error stays far below the accuracy, so
-/// that neither the image nor its slope shows the panels.
+/// Of the accuracy asked for: the table's error stays far below it, so that neither the image nor its slope shows the
+/// panels.
+constexpr double kTableShare = 1e-4;
+
+/// One ray a radius instead of one a point, when that is fewer rays.
 void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
-  const double target = std::max(1e-4 * scene.intensity_accuracy, 2e-11);
+  using Image = DropletImage<Pack>;
+  const double target = std::max(kTableShare * scene.intensity_accuracy, 2e-11);
   const double points = static_cast<double>(scene.view.width) * scene.view.height;
   const Values<Pack> lanes = value.template as<Pack>();
-  for (int panels = 4; panels * RadialTable<Pack>::kPoints < points / 4; panels += std::max(2, panels / 4)) {
-    plan.radial_panels = panels;
-    const DropletImage<Pack> image(scene, plan, lanes);
-    std::array<Pack, 9> direct;
+  // The largest error of one part read at `places` places.
+  const auto error_of = [&](const Image& image, Image::Part part, int panels) {
+    std::array<Pack, Image::kMostTerms> direct;
     double error = 0;
     // A panel's error is largest near its ends; the golden ratio meets all places of a panel, the ends of the table too.
+    // Closer to the centre than 1/1000 of the radius (v = 0.4 of that part) the mesh along the chord no longer resolves
+    // the defect; the ripple this leaves is far below the accuracy but not smooth.
+    const double from = part == Image::Part::centre ? 0.4 : 0;
     for (int i = 0; i < 96; i += kLanes) {
       alignas(64) double v[kLanes];
       for (int k = 0; k < kLanes; ++k) {
-        // Closer to the centre than 1/1000 of the radius (v = 0.15) the mesh along the chord no longer resolves the
-        // defect; the ripple this leaves is far below the accuracy but not smooth.
         const double turn = (i + k + 0.5) * 0.6180339887498949;
-        v[k] = i + k < 8 ? 1 - (i + k + 0.1) / 8.2 / panels : 0.15 + 0.85 * (turn - std::floor(turn));
+        const double in_panel = (i + k + 0.1) / 8.2 / panels;
+        v[k] = i + k >= 8                       ? from + (1 - from) * (turn - std::floor(turn))
+               : part == Image::Part::centre ? 1 - in_panel
+                                             : in_panel;  // the rim
       }
-      image.terms(Pack::load_aligned(v), direct.data());
+      image.terms(part, Pack::load_aligned(v), direct.data());
       for (int f = 0; f < image.number_of_terms(); ++f) {
-        std::array<Pack, 9> basis;
+        std::array<Pack, Image::kMostTerms> basis;
         basis.fill(Pack(0.0));
         basis[static_cast<std::size_t>(f)] = Pack(1.0);
-        const Pack read = image.tabulated_sum(Pack::load_aligned(v), basis.data());
+        const Pack read = image.tabulated_sum(part, Pack::load_aligned(v), basis.data());
         error = std::max(error, largest(max_of(direct[static_cast<std::size_t>(f)] - read, read - direct[static_cast<std::size_t>(f)])));
       }
     }
-    if (error <= target) {
+    return error;
+  };
+  plan.radial_panels = 2;
+  plan.centre_panels = 2;
+  while ((plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints < points / 4) {
+    const Image image(scene, plan, lanes);
+    const double rest = error_of(image, Image::Part::rest, plan.radial_panels);
+    const double centre = error_of(image, Image::Part::centre, plan.centre_panels);
+    if (rest <= target && centre <= target) {
       plan.reasons.push_back(fmt::format(
           "the droplet looks the same from all sides of the viewing axis: {} rays, one a radius, serve all pixels "
           "(interpolated to {})",
-          panels * RadialTable<Pack>::kPoints, sci(error)));
+          (plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints, sci(std::max(rest, centre))));
       return;
     }
+    if (rest > target) plan.radial_panels += std::max(1, plan.radial_panels / 4);
+    if (centre > target) plan.centre_panels += std::max(1, plan.centre_panels / 4);
   }
   plan.radial_panels = 0;
   plan.reasons.push_back("the picture has too few pixels for a table over the radius: one ray a point");
@@ -246,8 +264,8 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
 
 std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value) {
   std::vector<std::pair<double, double>> t;
-  if (const auto* plate = std::get_if<Plate>(&scene.sample)) {
-    const double edge = std::tan(value.radians(plate->half_angle_deg, 15));
+  if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
+    const double edge = std::tan(value.radians(*half_angle, 15));
     // Pixels beyond the inscribed circle, up to the corners of the image.
     const double corner = std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);
     t.push_back({0.0, 0.0});
@@ -305,7 +323,7 @@ bool plan_fringe_means(const Scene& scene, const Values<double>& value, const Pl
   constexpr int kAround = 10;  // pixels
   trial.samples = {1};
   if (s2 < 1) {
-    const double half = value.radians(std::get<Plate>(scene.sample).half_angle_deg, 15);
+    const double half = value.radians(*cone_half_angle(scene), 15);
     const double px = 0.5 * std::min(w, h) / std::tan(half) / std::sqrt(1 - s2);
     const double column = value.get(scene.view.center_x_px, 0.5 * (w - 1)) + sx * px;
     const double row = value.get(scene.view.center_y_px, 0.5 * (h - 1)) - sy * px;
@@ -336,6 +354,52 @@ bool plan_fringe_means(const Scene& scene, const Values<double>& value, const Pl
   plan = trial;
   plan.numerical_error = std::max(plan.numerical_error, error);
   return true;
+}
+
+/// Squares of the picture whose fringes are smooth enough to be interpolated from 64 rays each; of the sizes tried the one
+/// with the fewest rays.
+void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
+  const int w = scene.view.width, h = scene.view.height;
+  const double target = std::max(kTableShare * scene.intensity_accuracy, 1e-9);
+  const Values<Pack> lanes = value.template as<Pack>();
+  const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
+  double fewest = 0.5 * w * h;
+  for (int size = 128; size >= 16; size /= 2) {
+    const FringeBlocks blocks(w, h, size);
+    const double least = static_cast<double>(blocks.count()) * FringeTable<Pack>::kRays;
+    if (least >= fewest) break;
+    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), 0,
+                                  [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
+    std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
+    parallel_for(blocks.count(), 0, [&](int b) {
+      const double left = (b % blocks.columns) * size - 1.0, top = (b / blocks.columns) * size - 1.0;
+      double error = 0;
+      for (const double down : {0.02, 0.31, 0.77, 0.98}) {  // none a Chebyshev point, the ends among them
+        alignas(64) double column[kLanes];
+        for (int k = 0; k < kLanes; ++k) column[k] = left + size * (0.01 + 0.98 * k / std::max(1, kLanes - 1));
+        const Pack x = Pack::load_aligned(column), y(top + down * size);
+        const FringePoint<Pack> exact = model->fringe(x, y);
+        FringePoint<Pack> read;
+        if (!table.read(x, y, true, read)) return;
+        const auto distance = [](const Pack& a, const Pack& c) { return max_of(a - c, c - a); };
+        // Every part counts as the intensity it changes.
+        const Pack size_of_fringe = max_of(exact.amplitude, -exact.amplitude) + max_of(exact.quadrature, -exact.quadrature);
+        error = std::max(error, largest(distance(exact.mean, read.mean) + distance(exact.amplitude, read.amplitude) +
+                                        distance(exact.quadrature, read.quadrature) + size_of_fringe * distance(exact.phase, read.phase)));
+      }
+      smooth[static_cast<std::size_t>(b)] = error <= target;
+    });
+    const double left_over = static_cast<double>(std::count(smooth.begin(), smooth.end(), 0)) * size * size;
+    if (least + left_over < fewest) {
+      fewest = least + left_over;
+      plan.fringe_block_px = size;
+      plan.fringe_blocks = smooth;
+    }
+  }
+  if (plan.fringe_block_px > 0)
+    plan.reasons.push_back(fmt::format("{} of {} squares of {} pixels have their fringes interpolated from {} rays each",
+                                       std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1), plan.fringe_blocks.size(),
+                                       plan.fringe_block_px, FringeTable<Pack>::kRays));
 }
 
 /// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
@@ -380,8 +444,10 @@ RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, con
 RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   const PlanarOptics<double> o = planar_optics(scene, value);
+  o.column->freeze();  // adapted meshes ask for thousands of different nodes, each once
   const auto directions = pilot_directions(scene, value);
-  const bool plate = std::holds_alternative<Plate>(scene.sample);
+  const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
+  const bool cone = half_angle.has_value();
   for (const auto& [tx, ty] : directions) {
     const Ray<double> ray = ray_at(o, tx, ty);
     std::vector<double> u{0.0, 0.5, 1.0};
@@ -429,6 +495,20 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
         plan.warnings.push_back(fmt::format("The diagonal method, asked for by name, errs by {} here.", sci(error)));
     }
   }
+  // Coupling that the phases do not average out: the modes still turn slowly enough for their slow solutions.
+  if (plan.method.empty() && scene.method == "auto" && cone && !o.column->jumps) {
+    double error = 1e300;
+    const int n = choose(kPanels, target, [&](int k) { return worst(transport_method<double>("modal"), uniform_mesh(k, o.column->breaks)); }, error);
+    if (error <= target) {
+      plan.method = "modal";
+      plan.steps = n;
+      plan.numerical_error = error;
+      plan.reasons.push_back(fmt::format(
+          "the modes couple, slowly against their phase: {} panels of 8 Gauss nodes with their coupling hold the intensity to {} on {} pilot "
+          "directions (asked: {})",
+          n, sci(error), directions.size(), sci(scene.intensity_accuracy)));
+    }
+  }
   if (plan.method.empty() && scene.method != "auto" && scene.method != "magnus4") {
     plan.method = scene.method;
     plan.steps = choose(kSteps, target, [&](int k) { return worst(transport_method<double>(scene.method), uniform_mesh(k, o.column->breaks)); },
@@ -444,10 +524,9 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   }
   double largest_phase = 0;
   for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
-  if (plate) {
-    const Plate& p = std::get<Plate>(scene.sample);
+  if (cone) {
     const int side = std::min(scene.view.width, scene.view.height);
-    const double scale = std::tan(value.radians(p.half_angle_deg, 15)) * 2 / side;
+    const double scale = std::tan(value.radians(*half_angle, 15)) * 2 / side;
     const double cx = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1));
     const double cy = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
     const int bins = static_cast<int>(std::ceil(std::hypot(std::max(cx, scene.view.width - cx), std::max(cy, scene.view.height - cy)))) + 1;
@@ -463,10 +542,10 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
       }
     const double fastest = *std::max_element(gradient.begin(), gradient.end());
     plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel", fastest));
-    if (plan.method == "diagonal" && !o.column->absorbing && o.continuity == Continuity::e_and_h &&
-        plan_fringe_means(scene, value, o, plan))
+    if ((plan.method == "diagonal" || plan.method == "modal") && plan_fringe_means(scene, value, o, plan)) {
       plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
-    else {
+      plan_fringe_blocks(scene, value, plan);
+    } else {
       sample_by_phase(plan, cx, cy, bins, [&](double r) {
         const double f = std::min(23.999, r / bins * 24);
         const std::size_t i = static_cast<std::size_t>(f);
@@ -489,7 +568,7 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
     plan.warnings.push_back(fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by up to about {:.2g}.", r, r));
   note_illumination(scene, value, largest_phase, plan);
   const double per_ray = plan.method == "diagonal" ? 250 + 8.0 * plan.steps * 8 : 400.0 * static_cast<double>(plan.mesh.empty() ? plan.steps : static_cast<int>(plan.mesh.size()));
-  const double rays = plate ? static_cast<double>(scene.view.width) * scene.view.height * 4 : 1;
+  const double rays = cone ? static_cast<double>(scene.view.width) * scene.view.height * 4 : 1;
   plan.cost_seconds = 1e-9 * rays * per_ray;
   return plan;
 }

@@ -1,11 +1,18 @@
-// Cells and slabs seen along one direction, plates in a converging cone.
+// Cells and slabs seen along one direction, plates and slabs in a converging cone.
 
 #include "medium/build.h"
+#include "render/fringe_table.h"
 #include "render/planar.h"
 #include "render/pixel_model.h"
 #include "transport/methods.h"
 
 namespace birefit {
+
+std::optional<ParameterRef> cone_half_angle(const Scene& scene) {
+  if (const auto* plate = std::get_if<Plate>(&scene.sample)) return plate->half_angle_deg;
+  if (const auto* slab = std::get_if<Slab>(&scene.sample); slab && slab->half_angle_deg) return slab->half_angle_deg;
+  return std::nullopt;
+}
 
 template <class S>
 PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value) {
@@ -45,24 +52,27 @@ Mat2<S> planar_jones(const PlanarOptics<S>& o, const TransportMethod<S>& method,
 }
 
 template <class S>
-FringePoint<S> planar_fringe(const PlanarOptics<S>& o, const Mesh& mesh, const Polarizers<S>& polarizers, const S& tx,
-                             const S& ty) {
+FringePoint<S> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh& mesh, const Polarizers<S>& polarizers,
+                             const S& tx, const S& ty) {
+  using C = Complex<S>;
   const S c = 1.0 / sqrt(tx * tx + ty * ty + 1.0);
   const Ray<S> ray{o.k0, o.n_host * c * tx, o.n_host * c * ty, o.continuity};
-  const ModalTransfer<S> m = Diagonal<S>::modal(*o.column, ray, mesh);
-  const FaceFactors<S> faces = lossless_faces<S>(*o.column, ray, o.n_host);
-  // The polarizer's field rolled onto the plane of incidence (see planar_jones) and through the entry face.
+  const ModalTransfer<S> m = coupling ? modal_transfer(*o.column, ray, mesh) : Diagonal<S>::modal(*o.column, ray, mesh);
+  const Mat2<S> in = inverse(m.first) * entry_factor(*o.column, ray, o.n_host);
+  const Mat2<S> out = exit_factor(*o.column, ray, o.n_host) * m.last;
+  // The polarizer's field rolled onto the plane of incidence (see planar_jones), the analyser seen from inside.
   const S g = c * c / (c + 1.0) * (polarizers.px * tx + polarizers.py * ty);
-  const S ix = polarizers.px - g * tx, iy = polarizers.py - g * ty;
-  const S ex = faces.entry.a * ix + faces.entry.b * iy, ey = faces.entry.c * ix + faces.entry.d * iy;
-  // The analyser seen from inside the exit face.
+  const S px = polarizers.px - g * tx, py = polarizers.py - g * ty;
   const S back = c / (c + 1.0) * (polarizers.ax * tx + polarizers.ay * ty);
   const S ax = polarizers.ax + back * tx, ay = polarizers.ay + back * ty;
-  const S wx = ax * faces.exit.a + ay * faces.exit.c, wy = ax * faces.exit.b + ay * faces.exit.d;
-  const S f = 1.0 / (m.first.ox * m.first.ey - m.first.ex * m.first.oy);
-  const S amplitude_o = f * (m.first.ey * ex - m.first.ex * ey) * (wx * m.last.ox + wy * m.last.oy);
-  const S amplitude_e = f * (m.first.ox * ey - m.first.oy * ex) * (wx * m.last.ex + wy * m.last.ey);
-  return {amplitude_o * amplitude_o + amplitude_e * amplitude_e, 2.0 * amplitude_o * amplitude_e, m.phase_e - m.phase_o};
+  C o_wave = (px * in.a + py * in.b) * (ax * out.a + ay * out.c);
+  C e_wave = (px * in.c + py * in.d) * (ax * out.b + ay * out.d);
+  if (o.column->absorbing) {
+    o_wave = exp(m.log_o.re) * o_wave;
+    e_wave = exp(m.log_e.re) * e_wave;
+  }
+  const C both = S(2.0) * (conj(o_wave) * e_wave);
+  return {both.re, m.log_e.im - m.log_o.im, norm(o_wave) + norm(e_wave), both.im};
 }
 
 namespace {
@@ -75,10 +85,13 @@ class PlanarModel final : public PixelModel<S> {
       : optics_(planar_optics(scene, value)),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.column->breaks) : plan.mesh),
-        polarizers_(polarizers(scene, value)) {
-    if (const auto* plate = std::get_if<Plate>(&scene.sample)) {
+        polarizers_(polarizers(scene, value)),
+        coupling_(plan.method == "modal"),
+        blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
+        tabulated_blocks_(plan.fringe_blocks) {
+    if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
       conoscopic_ = true;
-      const S half = value.radians(plate->half_angle_deg, 15);
+      const S half = value.radians(*half_angle, 15);
       tan_per_px_ = sin(half) / cos(half) * (2.0 / std::min(scene.view.width, scene.view.height));
       center_x_ = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1));
       center_y_ = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
@@ -92,7 +105,7 @@ class PlanarModel final : public PixelModel<S> {
       ty = S(t * std::sin(a));
     }
     constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
-    if (plan.fringe_means) planar_fringe(optics_, mesh_, polarizers_, tx, ty);
+    if (plan.fringe_means) planar_fringe(optics_, coupling_, mesh_, polarizers_, tx, ty);
     optics_.column->freeze();
   }
   S intensity(const P& column, const P& row) const override {
@@ -101,11 +114,21 @@ class PlanarModel final : public PixelModel<S> {
     return intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
   }
   FringePoint<S> fringe(const P& column, const P& row) const override {
-    return planar_fringe(optics_, mesh_, polarizers_, (S(column) - center_x_) * tan_per_px_,
-                         (center_y_ - S(row)) * tan_per_px_);
+    FringePoint<S> p;
+    if (table_.read(column, row, !in_phase(), p)) return p;
+    return fringe_of_ray(column, row);
+  }
+  bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
+  void tabulate(int threads) override {
+    if (!tabulated_blocks_.empty())
+      table_ = FringeTable<S>(blocks_, tabulated_blocks_, threads, [this](const P& column, const P& row) { return fringe_of_ray(column, row); });
   }
 
  private:
+  FringePoint<S> fringe_of_ray(const P& column, const P& row) const {
+    return planar_fringe(optics_, coupling_, mesh_, polarizers_, (S(column) - center_x_) * tan_per_px_,
+                         (center_y_ - S(row)) * tan_per_px_);
+  }
   S intensity_of(const Mat2<S>& j) const {
     return norm(polarizers_.ax * (polarizers_.px * j.a + polarizers_.py * j.b) +
                 polarizers_.ay * (polarizers_.px * j.c + polarizers_.py * j.d));
@@ -114,7 +137,10 @@ class PlanarModel final : public PixelModel<S> {
   const TransportMethod<S>& method_;
   Mesh mesh_;
   Polarizers<S> polarizers_;
-  bool conoscopic_ = false;
+  bool coupling_, conoscopic_ = false;
+  FringeBlocks blocks_;
+  std::vector<std::uint8_t> tabulated_blocks_;
+  FringeTable<S> table_;
   S tan_per_px_, center_x_, center_y_, constant_;
 };
 
@@ -126,7 +152,7 @@ std::unique_ptr<PixelModel<S>> make_planar_model(const Scene& scene, const Rende
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                      \
   template std::unique_ptr<PixelModel<S>> make_planar_model<S>(const Scene&, const RenderPlan&, const Values<S>&);  \
-  template FringePoint<S> planar_fringe<S>(const PlanarOptics<S>&, const Mesh&, const Polarizers<S>&, const S&, const S&); \
+  template FringePoint<S> planar_fringe<S>(const PlanarOptics<S>&, bool, const Mesh&, const Polarizers<S>&, const S&, const S&); \
   template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&);                                        \
   template Mat2<S> planar_jones<S>(const PlanarOptics<S>&, const TransportMethod<S>&, const Mesh&, const S&, const S&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)

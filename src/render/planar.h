@@ -1,6 +1,8 @@
 #pragma once
 // One direction of light through a plane-parallel sample.
 
+#include <optional>
+
 #include "render/pixel_model.h"
 #include "transport/method.h"
 
@@ -13,6 +15,9 @@ struct PlanarOptics {
   Continuity continuity = Continuity::e_and_h;
 };
 
+/// Half angle in the host of the cone a plate or slab is seen in, one direction a pixel; none: every pixel sees the same.
+std::optional<ParameterRef> cone_half_angle(const Scene& scene);
+
 template <class S>
 PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value);
 
@@ -22,9 +27,9 @@ template <class S>
 Mat2<S> planar_jones(const PlanarOptics<S>& optics, const TransportMethod<S>& method, const Mesh& mesh, const S& tx,
                      const S& ty);
 
-/// The same between polarizers, for the diagonal method in a lossless medium with E and H continuous.
+/// The same between polarizers, for the methods `diagonal` and (with coupling) `modal`.
 template <class S>
-FringePoint<S> planar_fringe(const PlanarOptics<S>& optics, const Mesh& mesh, const Polarizers<S>& polarizers, const S& tx,
-                             const S& ty);
+FringePoint<S> planar_fringe(const PlanarOptics<S>& optics, bool coupling, const Mesh& mesh, const Polarizers<S>& polarizers,
+                             const S& tx, const S& ty);
 
 }  // namespace birefit

@@ -2,11 +2,13 @@
 // Smooth functions of one coordinate, tabulated once and read at every pixel. A sample that is symmetric about the
 // viewing axis needs one ray for every radius, not one for every pixel.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "core/scalar.h"
+#include "render/chebyshev.h"
 #include "render/pixel_model.h"
 
 namespace birefit {
@@ -26,7 +28,7 @@ class RadialTable {
   template <class Evaluate>
   RadialTable(int panels, int functions, const Evaluate& evaluate)
       : panels_(panels), functions_(functions), stride_(static_cast<std::size_t>(panels) * functions * kPoints) {
-    const Rule& rule = points();
+    const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();
     const int n = panels * kPoints;
     std::vector<double> values(stride_ * kPlanes);  // [plane][panel][function][point]
     std::vector<S> out(static_cast<std::size_t>(functions));
@@ -57,99 +59,135 @@ class RadialTable {
       for (std::size_t block = plane * stride_; block < (plane + 1) * stride_; block += kPoints)
         for (std::size_t c = 0; c < kPoints; ++c) {
           double sum = 0;
-          for (std::size_t k = 0; k < kPoints; ++k) sum += rule.to_coefficients[c][k] * values[block + k];
+          for (std::size_t k = 0; k < kPoints; ++k) sum += rule.to_powers[c][k] * values[block + k];
           coefficients_[block + c] = sum;
-          if (plane > 0 && sum != 0) live_[plane - 1] = true;
         }
+    // Rounding leaves 1e-17 of what vanishes (crossed polarizers, parameters that do not matter).
+    for (std::size_t plane = 0; plane < kPlanes; ++plane) {
+      std::vector<double> size(static_cast<std::size_t>(functions), 0.0);
+      for (int panel = 0; panel < panels; ++panel)
+        for (int f = 0; f < functions; ++f)
+          for (std::size_t c = 0; c < kPoints; ++c) {
+            double& largest_yet = size[static_cast<std::size_t>(f)];
+            largest_yet = std::max(largest_yet, std::abs(coefficients_[plane * stride_ + index(panel, f) + c]));
+          }
+      const double all = *std::max_element(size.begin(), size.end());
+      int& live = plane == 0 ? live_ : moving_live_;
+      for (int f = 0; f < functions; ++f)
+        if (size[static_cast<std::size_t>(f)] > 1e-15 * all) live = std::max(live, f + 1);
+      if (plane > 0 && all > 0) moving_[static_cast<std::size_t>(moving_count_++)] = static_cast<int>(plane) - 1;
+    }
   }
 
-  /// sum_k basis[k] f_k(v) over the F functions that were tabulated; v outside [0, 1] is extrapolated from the end
-  /// panels.
+  /// sum_k basis[k] f_k(v) over the F functions that were tabulated, with its derivatives at fixed basis; with `turned`
+  /// also sum_k turned[k] f_k(v), the value alone, in *turned_sum. v outside [0, 1] is extrapolated from the end panels.
+  /// Functions after the last one that is not negligible are left out.
   template <int F>
-  BIREFIT_INLINE S sum(const S& v, const S* basis) const {
+  BIREFIT_INLINE S sum(const S& v, const P* basis, const P* turned = nullptr, P* turned_sum = nullptr) const {
+    if (F > 1 && live_ <= 1) return sum_of_live<1, F>(v, basis, turned, turned_sum);
+    if (F > 3 && live_ <= 3) return sum_of_live<3, F>(v, basis, turned, turned_sum);
+    return sum_of_live<F, F>(v, basis, turned, turned_sum);
+  }
+
+ private:
+  static constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
+  std::size_t index(int panel, int function) const {
+    return (static_cast<std::size_t>(panel) * static_cast<std::size_t>(functions_) + static_cast<std::size_t>(function)) * kPoints;
+  }
+  static bool same(double a, double b) { return a == b; }
+  static bool same(const Pack& a, const Pack& b) { return xsimd::all(a == b); }
+  /// L polynomials at x and their slopes: chains of multiply-adds side by side, and where those are too few to hide
+  /// their latency, even and odd powers apart.
+  template <int L, bool kSlope>
+  BIREFIT_INLINE static void horner(const double* c, const P& x, P* value, P* slope) {
+    if constexpr (L <= 3) {
+      static_assert(kPoints % 2 == 0);
+      const P square = x * x;
+      P odd[L], odd_slope[L];
+      for (int f = 0; f < L; ++f) {
+        value[f] = P(c[f * kPoints + kPoints - 2]);
+        odd[f] = P(c[f * kPoints + kPoints - 1]);
+        if constexpr (kSlope) slope[f] = odd_slope[f] = P(0.0);
+      }
+      for (int k = kPoints - 4; k >= 0; k -= 2)
+        for (int f = 0; f < L; ++f) {
+          if constexpr (kSlope) {
+            slope[f] = slope[f] * square + value[f];
+            odd_slope[f] = odd_slope[f] * square + odd[f];
+          }
+          value[f] = value[f] * square + P(c[f * kPoints + k]);
+          odd[f] = odd[f] * square + P(c[f * kPoints + k + 1]);
+        }
+      for (int f = 0; f < L; ++f) {
+        if constexpr (kSlope) slope[f] = (odd_slope[f] * x + slope[f]) * (x + x) + odd[f];
+        value[f] = odd[f] * x + value[f];
+      }
+    } else {
+      for (int f = 0; f < L; ++f) {
+        value[f] = P(c[f * kPoints + kPoints - 1]);
+        if constexpr (kSlope) slope[f] = P(0.0);
+      }
+      for (int k = kPoints - 2; k >= 0; --k)
+        for (int f = 0; f < L; ++f) {
+          if constexpr (kSlope) slope[f] = slope[f] * x + value[f];
+          value[f] = value[f] * x + P(c[f * kPoints + k]);
+        }
+    }
+  }
+  template <int L>
+  BIREFIT_INLINE static P contract(const P* basis, const P* f) {
+    P total = basis[0] * f[0];
+    for (int k = 1; k < L; ++k) total = total + basis[k] * f[k];
+    return total;
+  }
+  /// Adds the derivative planes that are not zero, contracted with the basis.
+  template <int L>
+  BIREFIT_INLINE void add_planes(const double* c, const P& x, const P* basis, S& total) const {
+    for (int i = 0; i < moving_count_; ++i) {
+      const int j = moving_[static_cast<std::size_t>(i)];
+      P f[L];
+      horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * stride_, x, f, nullptr);
+      total.d[j] = total.d[j] + contract<L>(basis, f);
+    }
+  }
+  template <int L, int F>
+  BIREFIT_INLINE S sum_of_live(const S& v, const P* basis, const P* turned, P* turned_sum) const {
     const P scaled = plain(v) * P(static_cast<double>(panels_));
     using std::floor;
     const P cell = min_of(max_of(floor(scaled), P(0.0)), P(panels_ - 1.0));
     const P x = P(2.0) * (scaled - cell) - P(1.0);
     // Lanes are neighbours in the image and mostly share a panel, whose coefficients then serve all of them; gathering
     // each lane's own costs several times as much.
+    const double one = lane(cell, 0);
+    if (same(cell, P(one))) return sum_on_panel<L, F>(static_cast<int>(one), x, v, basis, turned, turned_sum);
     const int first = static_cast<int>(smallest(cell)), last = static_cast<int>(largest(cell));
-    S total = sum_on_panel<F>(first, x, v, basis);
-    for (int panel = first + 1; panel <= last; ++panel)
-      total = select(cell >= P(static_cast<double>(panel)), sum_on_panel<F>(panel, x, v, basis), total);
+    S total = sum_on_panel<L, F>(first, x, v, basis, turned, turned_sum);
+    for (int panel = first + 1; panel <= last; ++panel) {
+      const auto here = cell >= P(static_cast<double>(panel));
+      P turned_here;
+      total = select(here, sum_on_panel<L, F>(panel, x, v, basis, turned, &turned_here), total);
+      if (turned) *turned_sum = select(here, turned_here, *turned_sum);
+    }
     return total;
   }
-
- private:
-  static constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
-  struct Rule {
-    std::array<double, kPoints> x;
-    std::array<std::array<double, kPoints>, kPoints> to_coefficients;  ///< values at x to powers of x
-  };
-  static const Rule& points() {
-    static const Rule rule = [] {
-      Rule r;
-      for (int k = 0; k < kPoints; ++k) r.x[static_cast<std::size_t>(k)] = std::cos(std::numbers::pi * (k + 0.5) / kPoints);
-      // Column k: the Lagrange polynomial of point k, multiplied out.
-      for (std::size_t k = 0; k < kPoints; ++k) {
-        std::array<double, kPoints + 1> p{1.0};
-        int degree = 0;
-        for (std::size_t m = 0; m < kPoints; ++m) {
-          if (m == k) continue;
-          const double scale = 1 / (r.x[k] - r.x[m]);
-          for (int c = ++degree; c >= 0; --c) {
-            const std::size_t at = static_cast<std::size_t>(c);
-            p[at] = ((c > 0 ? p[at - 1] : 0.0) - r.x[m] * p[at]) * scale;
-          }
-        }
-        for (std::size_t c = 0; c < kPoints; ++c) r.to_coefficients[c][k] = p[c];
-      }
-      return r;
-    }();
-    return rule;
-  }
-  std::size_t index(int panel, int function) const {
-    return (static_cast<std::size_t>(panel) * static_cast<std::size_t>(functions_) + static_cast<std::size_t>(function)) * kPoints;
-  }
-  /// F polynomials at x, their chains of multiply-adds side by side.
-  template <int F, bool kSlope>
-  BIREFIT_INLINE static void horner(const double* c, const P& x, P* value, P* slope) {
-    for (int f = 0; f < F; ++f) {
-      value[f] = P(c[f * kPoints + kPoints - 1]);
-      if constexpr (kSlope) slope[f] = P(0.0);
-    }
-    for (int k = kPoints - 2; k >= 0; --k)
-      for (int f = 0; f < F; ++f) {
-        if constexpr (kSlope) slope[f] = slope[f] * x + value[f];
-        value[f] = value[f] * x + P(c[f * kPoints + k]);
-      }
-  }
-  template <int F>
-  BIREFIT_INLINE S sum_on_panel(int panel, const P& x, const S& v, const S* basis) const {
+  template <int L, int F>
+  BIREFIT_INLINE S sum_on_panel(int panel, const P& x, const S& v, const P* basis, const P* turned, P* turned_sum) const {
     const double* c = coefficients_.data() + index(panel, 0);
-    P value[F], slope[F];
-    horner<F, (kPlanes > 1)>(c, x, value, slope);
-    const auto contract = [&](const P* f) {
-      P total = plain(basis[0]) * f[0];
-      for (int k = 1; k < F; ++k) total = total + plain(basis[k]) * f[k];
-      return total;
-    };
+    P value[L], slope[L];
+    horner<L, (kPlanes > 1)>(c, x, value, slope);
+    if (turned) *turned_sum = contract<L>(turned, value);
     if constexpr (kPlanes == 1) {
-      return contract(value);
+      return contract<L>(basis, value);
     } else {
-      S total(contract(value));
-      const P along = contract(slope) * P(2.0 * panels_);
-      for (std::size_t j = 0; j + 1 < kPlanes; ++j) {
-        P d = along * v.d[j];
-        for (int k = 0; k < F; ++k) d = d + basis[k].d[j] * value[k];
-        total.d[j] = d;
-      }
-      for (std::size_t j = 0; j + 1 < kPlanes; ++j) {
-        if (!live_[j]) continue;
-        P parameter[F];
-        horner<F, false>(c + (j + 1) * stride_, x, parameter, nullptr);
-        total.d[j] = total.d[j] + contract(parameter);
-      }
+      S total(contract<L>(basis, value));
+      const P along = contract<L>(basis, slope) * P(2.0 * panels_);
+      for (std::size_t j = 0; j + 1 < kPlanes; ++j) total.d[j] = along * v.d[j];
+      if (F > 1 && moving_live_ <= 1)
+        add_planes<1>(c, x, basis, total);
+      else if (F > 3 && moving_live_ <= 3)
+        add_planes<(F > 3 ? 3 : F)>(c, x, basis, total);
+      else
+        add_planes<F>(c, x, basis, total);
       return total;
     }
   }
@@ -157,7 +195,10 @@ class RadialTable {
   int panels_ = 0, functions_ = 0;
   std::size_t stride_ = 0;                 ///< coefficients a plane
   std::vector<double> coefficients_;       ///< [plane][panel][function][power], plane 0 the value
-  std::array<bool, kPlanes> live_{};       ///< derivative j is not zero everywhere
+  int live_ = 0;                           ///< functions up to the last whose values are not negligible
+  int moving_live_ = 0;                    ///< the same for the derivatives
+  std::array<int, kPlanes> moving_{};      ///< the derivatives that are not zero everywhere
+  int moving_count_ = 0;
 };
 
 }  // namespace birefit

@@ -81,159 +81,184 @@ BIREFIT_INLINE void store(const S& value, const std::array<double*, N>& out, int
     for (int j = 1; j < planes; ++j) put(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)]);
 }
 
-/// samples_at() for the whole picture and a rim of one pixel around it. Rings of equal samples are painted row by row
-/// from the inside out; a root a ring and row instead of one a pixel.
-void fill_samples(const RenderPlan& plan, Grid<std::uint8_t>& samples) {
-  const int w = samples.width();
-  const std::uint8_t inner = plan.samples.empty() ? 1 : static_cast<std::uint8_t>(plan.samples[0]);
-  for (int r = 0; r < samples.height(); ++r) {
-    std::uint8_t* out = samples.row(r);
-    std::fill(out, out + w, inner);
-    const double dy = r - 1.0 - plan.sampling_center_y_px, middle = plan.sampling_center_x_px + 1;
-    for (std::size_t i = 1; i < plan.samples.size(); ++i) {
-      if (plan.samples[i] == plan.samples[i - 1]) continue;
-      const double radius = static_cast<double>(i) * plan.sampling_bin_px, square = radius * radius - dy * dy;
-      const double half = square > 0 ? std::sqrt(square) : 0;
-      const int left = static_cast<int>(std::clamp(std::floor(middle - half) + 1, 0.0, static_cast<double>(w)));
-      const int right = static_cast<int>(std::clamp(std::ceil(middle + half), 0.0, static_cast<double>(w)));
-      const std::uint8_t n = static_cast<std::uint8_t>(plan.samples[i]);
-      std::fill(out, out + std::min(left, right), n);
-      std::fill(out + right, out + w, n);
-    }
-  }
-}
-
-/// Which points of a row are needed: one-sample pixels and their eight neighbours. `row` on a picture with a rim.
-struct NeededPoints {
-  bool all = false;
-  std::vector<std::uint8_t> flags;  ///< with one place to the left and right
-  void find(const Grid<std::uint8_t>& samples, int row) {
-    const int w = samples.width();
-    const std::uint8_t* here = samples.row(row);
-    all = std::accumulate(here, here + w, 0) == w;
-    if (all) return;
-    flags.assign(static_cast<std::size_t>(w) + 2, 0);
-    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, samples.height() - 1); ++r)
-      for (int c = 0; c < w; ++c)
-        if (samples(c, r) == 1) std::fill_n(flags.data() + c, 3, std::uint8_t{1});
-  }
-  bool any(int first, int count) const {
-    if (all) return true;
-    const auto from = flags.begin() + first + 1;
-    return std::find(from, from + count, 1) != from + count;
-  }
-};
-
-/// Point values on the image and a rim of one pixel: rows(field * planes + plane, row), rows of at least width + 2 +
-/// kLanes readable places. One field, the intensity, or with plan.fringe_means the three of a FringePoint.
-class PointPlanes {
+/// samples_at() of one row of the picture with a rim of one pixel around it (row 0 is the rim). Rings of equal samples
+/// are painted from the inside out; a root a ring and row instead of one a pixel.
+class SampleRings {
  public:
-  PointPlanes(int width, int height, int planes) : wide_(width + 2), plane_(static_cast<std::size_t>(width + 2) * static_cast<std::size_t>(height + 2)) {
-    // Fresh memory costs as much as the image itself: it stays with the thread.
-    thread_local std::vector<double> memory;
-    memory.resize(std::max(memory.size(), plane_ * static_cast<std::size_t>(planes) + kLanes));
-    data_ = memory.data();
+  explicit SampleRings(const RenderPlan& plan) : center_x_(plan.sampling_center_x_px), center_y_(plan.sampling_center_y_px) {
+    rings_.push_back({0, plan.samples.empty() ? std::uint8_t{1} : static_cast<std::uint8_t>(plan.samples[0])});
+    for (std::size_t i = 1; i < plan.samples.size(); ++i)
+      if (plan.samples[i] != plan.samples[i - 1])
+        rings_.push_back({static_cast<double>(i) * plan.sampling_bin_px, static_cast<std::uint8_t>(plan.samples[i])});
   }
-  double* row(int plane, int r) const {
-    return data_ + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(r) * static_cast<std::size_t>(wide_);
+  void fill(int row, std::uint8_t* out, int width) const {
+    std::fill(out, out + width, rings_[0].samples);
+    const double dy = row - 1.0 - center_y_, middle = center_x_ + 1, w = width;
+    for (std::size_t i = 1; i < rings_.size(); ++i) {
+      const double square = rings_[i].radius * rings_[i].radius - dy * dy, half = square > 0 ? std::sqrt(square) : 0;
+      const int left = static_cast<int>(std::clamp(std::floor(middle - half) + 1, 0.0, w));
+      const int right = static_cast<int>(std::clamp(std::ceil(middle + half), 0.0, w));
+      std::fill(out, out + std::min(left, right), rings_[i].samples);
+      std::fill(out + right, out + width, rings_[i].samples);
+    }
   }
 
  private:
-  int wide_;
-  std::size_t plane_;
-  double* data_;
+  struct Ring {
+    double radius;
+    std::uint8_t samples;
+  };
+  double center_x_, center_y_;
+  std::vector<Ring> rings_;
+};
+
+/// Which points of a row are needed: one-sample pixels and their eight neighbours. `row` on a picture with a rim.
+class NeededPoints {
+ public:
+  /// up, here, down: samples of three rows, w places each.
+  void find(const std::uint8_t* up, const std::uint8_t* here, const std::uint8_t* down, int w) {
+    all_ = std::all_of(here, here + w, [](std::uint8_t n) { return n == 1; });
+    if (all_) return;
+    const std::size_t size = static_cast<std::size_t>(w);
+    near_.assign(size + 2, 0);
+    flags_.resize(size);
+    std::uint8_t *near = near_.data(), *flags = flags_.data();
+    for (std::size_t c = 0; c < size; ++c) near[c + 1] = static_cast<std::uint8_t>((up[c] == 1) | (here[c] == 1) | (down[c] == 1));
+    for (std::size_t c = 0; c < size; ++c) flags[c] = static_cast<std::uint8_t>(near[c] | near[c + 1] | near[c + 2]);
+  }
+  bool any(int first, int count) const {
+    if (all_) return true;
+    const auto from = flags_.begin() + first;
+    return std::find(from, from + count, 1) != from + count;
+  }
+
+ private:
+  bool all_ = false;
+  std::vector<std::uint8_t> near_, flags_;
+};
+
+/// What a thread works on: a band of rows with one more on either side. Point values are at row(field * planes + plane,
+/// r), r = 0 the row above the band, each row with at least width + 2 + kLanes readable places; one field, the intensity,
+/// or with plan.fringe_means the four of a FringePoint.
+class Band {
+ public:
+  /// Many rows, so that few are computed twice; few, so that a band stays in the second cache.
+  static constexpr int kRows = 40;
+  void resize(int width, int planes) {
+    wide_ = static_cast<std::size_t>(width) + 2;
+    plane_ = wide_ * (kRows + 2);
+    points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes) + kLanes));
+    samples_.resize(wide_ * (kRows + 4));
+  }
+  double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(r) * wide_; }
+  /// Samples of row r, from -1 (two above the band) on, of the picture with its rim.
+  std::uint8_t* samples(int r) { return samples_.data() + static_cast<std::size_t>(r + 1) * wide_; }
+
+ private:
+  std::size_t wide_ = 0, plane_ = 0;
+  std::vector<double> points_;
+  std::vector<std::uint8_t> samples_;
 };
 
 template <class S>
-S load(const PointPlanes& points, int first_plane, int row, int column) {
-  S v(load_lanes<PlainOf<S>>(points.row(first_plane, row) + column));
+S load(Band& band, int first_plane, int row, int column) {
+  S v(load_lanes<PlainOf<S>>(band.row(first_plane, row) + column));
   if constexpr (ScalarTraits<S>::derivatives > 0)
     for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
-      v.d[static_cast<std::size_t>(j)] = load_lanes<PlainOf<S>>(points.row(first_plane + 1 + j, row) + column);
+      v.d[static_cast<std::size_t>(j)] = load_lanes<PlainOf<S>>(band.row(first_plane + 1 + j, row) + column);
   return v;
 }
 
-/// planes: value and as many derivatives as asked (at most those of S).
+/// The intensity and its derivatives by `active`, at most as many as S carries, into `images`; they are made where
+/// missing or of another size.
 template <class S>
-std::vector<Image> render_planes(const Scene& scene, const RenderPlan& plan, const Theta& theta,
-                                 const std::vector<int>& active, int threads) {
+void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active,
+                   int threads, const std::vector<Image*>& images) {
   const Values<S> value(theta, active);
-  const std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
+  std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
   const int w = scene.view.width, h = scene.view.height, wide = w + 2, planes = static_cast<int>(active.size()) + 1;
   constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives;
   using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
-  thread_local Grid<std::uint8_t> samples_of_thread;
-  Grid<std::uint8_t>& samples = samples_of_thread;  // the workers' own thread_locals are others
-  if (samples.width() != wide || samples.height() != h + 2) samples = Grid<std::uint8_t>(wide, h + 2);
-  fill_samples(plan, samples);
-  const PointPlanes points(w, h, plan.fringe_means ? 3 * kPlanes : kPlanes);
-  parallel_for(h + 2, threads, [&](int r) {
+  model->tabulate(threads);
+  const bool in_phase = model->in_phase();
+  const SampleRings rings(plan);
+  parallel_for(planes, threads, [&](int p) {
+    Image& image = *images[static_cast<std::size_t>(p)];
+    if (image.width() != w || image.height() != h) image = Image(w, h);
+  });
+  parallel_for((h + Band::kRows - 1) / Band::kRows, threads, [&](int b) {
+    thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
     thread_local NeededPoints needed;
-    needed.find(samples, r);
-    for (int c0 = 0; c0 < wide; c0 += kStep) {
-      const int count = std::min(kStep, wide - c0);
-      if (!needed.any(c0, count)) continue;
-      const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), row(r - 1.0);
-      const auto put = [&](const S& v, int field) {
-        Targets out;
-        for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = points.row(field * kPlanes + p, r) + c0;
-        store(v, out, kPlanes, 0, count);
+    const int top = b * Band::kRows, rows = std::min(Band::kRows, h - top);
+    band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes);
+    for (int r = -1; r <= rows + 2; ++r) rings.fill(std::clamp(top + r, 0, h + 1), band.samples(r), wide);
+    for (int r = 0; r < rows + 2; ++r) {
+      needed.find(band.samples(r - 1), band.samples(r), band.samples(r + 1), wide);
+      for (int c0 = 0; c0 < wide; c0 += kStep) {
+        const int count = std::min(kStep, wide - c0);
+        if (!needed.any(c0, count)) continue;
+        const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), row(top + r - 1.0);
+        const auto put = [&](const S& v, int field) {
+          Targets out;
+          for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
+          store(v, out, kPlanes, 0, count);
+        };
+        if (plan.fringe_means) {
+          const FringePoint<S> v = model->fringe(column, row);
+          put(v.amplitude, 0), put(v.phase, 1), put(v.mean, 2);
+          if (!in_phase) put(v.quadrature, 3);
+        } else {
+          put(model->intensity(column, row), 0);
+        }
+      }
+    }
+    for (int r = 0; r < rows; ++r) {
+      const auto targets = [&](int column) {
+        Targets out{};
+        for (std::size_t p = 0; p < images.size(); ++p) out[p] = images[p]->row(top + r) + column;
+        return out;
       };
       if (plan.fringe_means) {
-        const FringePoint<S> v = model->fringe(column, row);
-        put(v.mean, 0), put(v.amplitude, 1), put(v.phase, 2);
+        for (int c0 = 0; c0 < w; c0 += kStep) {
+          FringePoint<S> p[3][3];
+          for (int j = 0; j < 3; ++j)
+            for (int i = 0; i < 3; ++i)
+              p[j][i] = {load<S>(band, 0, r + j, c0 + i), load<S>(band, kPlanes, r + j, c0 + i),
+                         load<S>(band, 2 * kPlanes, r + j, c0 + i),
+                         in_phase ? S(0.0) : load<S>(band, 3 * kPlanes, r + j, c0 + i)};
+          store(in_phase ? fringe_mean<false>(p) : fringe_mean<true>(p), targets(c0), planes, 0, std::min(kStep, w - c0));
+        }
       } else {
-        put(model->intensity(column, row), 0);
+        for (int p = 0; p < planes; ++p) {
+          const double *up = band.row(p, r) + 1, *here = band.row(p, r + 1) + 1, *down = band.row(p, r + 2) + 1;
+          double* out = images[static_cast<std::size_t>(p)]->row(top + r);
+          // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
+          for (int c = 0; c < w; ++c)
+            out[c] = here[c] + (here[c - 1] + here[c + 1] + up[c] + down[c] - 4 * here[c]) * (1.0 / 24);
+        }
       }
+      // Pixels of several samples, packed into lanes by their number.
+      const std::uint8_t* n = band.samples(r + 1) + 1;
+      if (std::all_of(n, n + w, [](std::uint8_t k) { return k == 1; })) continue;
+      std::array<std::array<int, kLanes>, 9> waiting;
+      std::array<int, 9> count{};
+      const auto flush = [&](std::size_t most) {
+        double columns[kLanes];
+        for (int k = 0; k < kStep; ++k) columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
+        const S v = mean_over_pixel(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(top + r)), static_cast<int>(most));
+        for (int k = 0; k < count[most]; ++k) store(v, targets(waiting[most][static_cast<std::size_t>(k)]), planes, k, 1);
+        count[most] = 0;
+      };
+      for (int c = 0; c < w; ++c) {
+        if (n[c] == 1) continue;
+        const std::size_t most = n[c];
+        waiting[most][static_cast<std::size_t>(count[most]++)] = c;
+        if (count[most] == kStep) flush(most);
+      }
+      for (std::size_t most = 2; most < 9; ++most)
+        if (count[most] > 0) flush(most);
     }
   });
-  std::vector<Image> images(static_cast<std::size_t>(planes));
-  parallel_for(planes, threads, [&](int p) { images[static_cast<std::size_t>(p)] = Image(w, h); });
-  parallel_for(h, threads, [&](int r) {
-    const auto targets = [&](int column) {
-      Targets out{};
-      for (std::size_t p = 0; p < images.size(); ++p) out[p] = images[p].row(r) + column;
-      return out;
-    };
-    if (plan.fringe_means) {
-      for (int c0 = 0; c0 < w; c0 += kStep) {
-        FringePoint<S> p[3][3];
-        for (int j = 0; j < 3; ++j)
-          for (int i = 0; i < 3; ++i)
-            p[j][i] = {load<S>(points, 0, r + j, c0 + i), load<S>(points, kPlanes, r + j, c0 + i),
-                       load<S>(points, 2 * kPlanes, r + j, c0 + i)};
-        store(fringe_mean(p), targets(c0), planes, 0, std::min(kStep, w - c0));
-      }
-    } else {
-      for (int p = 0; p < planes; ++p) {
-        const double *up = points.row(p, r) + 1, *here = points.row(p, r + 1) + 1, *down = points.row(p, r + 2) + 1;
-        double* out = images[static_cast<std::size_t>(p)].row(r);
-        // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
-        for (int c = 0; c < w; ++c)
-          out[c] = here[c] + (here[c - 1] + here[c + 1] + up[c] + down[c] - 4 * here[c]) * (1.0 / 24);
-      }
-    }
-    // Pixels of several samples, packed into lanes by their number.
-    const std::uint8_t* n = samples.row(r + 1) + 1;
-    std::array<std::array<int, kLanes>, 9> waiting;
-    std::array<int, 9> count{};
-    const auto flush = [&](std::size_t most) {
-      double columns[kLanes];
-      for (int k = 0; k < kStep; ++k) columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
-      const S v = mean_over_pixel(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(r)), static_cast<int>(most));
-      for (int k = 0; k < count[most]; ++k) store(v, targets(waiting[most][static_cast<std::size_t>(k)]), planes, k, 1);
-      count[most] = 0;
-    };
-    for (int c = 0; c < w; ++c) {
-      if (n[c] == 1) continue;
-      const std::size_t most = n[c];
-      waiting[most][static_cast<std::size_t>(count[most]++)] = c;
-      if (count[most] == kStep) flush(most);
-    }
-    for (std::size_t most = 2; most < 9; ++most)
-      if (count[most] > 0) flush(most);
-  });
-  return images;
 }
 
 template <class S>
@@ -261,7 +286,7 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
         FringePoint<S> p[3][3];
         for (int j = 0; j < 3; ++j)
           for (int i = 0; i < 3; ++i) p[j][i] = model->fringe(column + PlainOf<S>(i - 1.0), row + PlainOf<S>(j - 1.0));
-        v = fringe_mean(p);
+        v = model->in_phase() ? fringe_mean<false>(p) : fringe_mean<true>(p);
       } else {
         v = mean_over_pixel(*model, column, row, std::max(most, 2));  // the point value alone is no pixel mean
       }
@@ -295,23 +320,31 @@ void in_chunks(const std::vector<int>& active, const Body& body) {
 
 }  // namespace
 
+void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
+            Rendering& into) {
+  into.derivatives.resize(active.size());
+  if (active.empty()) {
+    render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
+    return;
+  }
+  in_chunks(active, [&]<class S>(const std::vector<int>& chunk, int first) {
+    std::vector<Image*> images{&into.intensity};
+    for (std::size_t j = 0; j < chunk.size(); ++j) images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
+    render_planes<S>(scene, plan, theta, chunk, threads, images);
+  });
+}
+
 Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active,
                  int threads) {
   Rendering r;
-  if (active.empty()) {
-    r.intensity = std::move(render_planes<Pack>(scene, plan, theta, {}, threads)[0]);
-    return r;
-  }
-  in_chunks(active, [&]<class S>(const std::vector<int>& chunk, int) {
-    std::vector<Image> planes = render_planes<S>(scene, plan, theta, chunk, threads);
-    r.intensity = std::move(planes[0]);
-    for (std::size_t j = 1; j < planes.size(); ++j) r.derivatives.push_back(std::move(planes[j]));
-  });
+  render(scene, plan, theta, active, threads, r);
   return r;
 }
 
 Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
-  return std::move(render_planes<double>(scene, plan, theta, {}, 1)[0]);
+  Image image;
+  render_planes<double>(scene, plan, theta, {}, 1, {&image});
+  return image;
 }
 
 PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
@@ -352,7 +385,8 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
     row.pp = element(p, p);
     rows.push_back(row);
   };
-  if (std::holds_alternative<Slab>(scene.sample)) {
+  const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
+  if (std::holds_alternative<Slab>(scene.sample) && !half_angle) {
     const PlanarOptics<double> optics = planar_optics(scene, value);
     const TransportMethod<double>& method = transport_method<double>(plan.method);
     for (const Direction& d : scene.microscope.directions) {
@@ -398,12 +432,11 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
                     "use `render`");
   const PlanarOptics<double> optics = planar_optics(scene, value);
   const TransportMethod<double>& method = transport_method<double>(plan.method);
-  const auto* plate = std::get_if<Plate>(&scene.sample);
-  if (!plate) {
+  if (!half_angle) {
     add(planar_jones(optics, method, mesh, 0.0, 0.0), 0, {});
     return rows;
   }
-  const double scale = std::tan(value.radians(plate->half_angle_deg, 15)) * 2 / std::min(w, h);
+  const double scale = std::tan(value.radians(*half_angle, 15)) * 2 / std::min(w, h);
   for (int r = 0; r < h; ++r)
     for (int c = 0; c < w; ++c) {
       const double tx = (c - value.get(scene.view.center_x_px, 0.5 * (w - 1))) * scale;

@@ -80,6 +80,33 @@ Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, dou
   return answer;
 }
 
+Answer modal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance) {
+  if (column.jumps) return refused("the medium jumps", 0);
+  const CountingColumn<double> counted(column);
+  const auto at = [&](double u) {
+    OpticalPoint<double> p;
+    column.sample({&u, 1}, &p);
+    return p;
+  };
+  if (modes_turn_over(at, ray, 0, 1, 512)) return refused("the axis passes the wavevector, where the modes change places", 513);
+  Mat2<double> before;
+  for (int n = 1; n <= 1024; n *= 2) {
+    const Mesh mesh = uniform_mesh(n, column.breaks);
+    constexpr int kPasses = Modal<double>::kPasses;
+    const Mat2<double> now = together(modal_transfer(counted, ray, mesh, kPasses));
+    if (n > 1 && finite(now) && finite(before)) {
+      const double change = relative_distance(before, now);
+      const Mat2<double> less = together(modal_transfer(column, ray, mesh, kPasses - 1)),
+                         least = together(modal_transfer(column, ray, mesh, kPasses - 2));
+      const double last = relative_distance(less, now), one_before = relative_distance(least, less);
+      const double estimate = 2 * (change + last) + rounding(n);
+      if (estimate <= tolerance && (last < 0.5 * one_before || last < rounding(n))) return {now, estimate, counted.count(), ""};
+    }
+    before = now;
+  }
+  return refused("its slow solutions do not settle in 1024 panels", counted.count());
+}
+
 Answer wei_norman_answer(bool exponential, const Column<double>& column, const Ray<double>& ray, double tolerance) {
   const WeiNorman<double> paper;
   const WeiNormanExp<double> improved;

@@ -26,6 +26,9 @@ Answer by_halving(const TransportMethod<double>& method, const Column<double>& c
                   int most = 16384);
 /// The diagonal method: the change under halving, and twice the amplitude that the coupling it leaves out can reach.
 Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance);
+/// Modal: the change under halving, and what the last pass through the equation for the ratios changed, which must be less
+/// than half of the pass before.
+Answer modal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance);
 /// wei_norman (exponential = false) or wei_norman_exp: layers halved until the method's own report is below `tolerance`.
 Answer wei_norman_answer(bool exponential, const Column<double>& column, const Ray<double>& ray, double tolerance);
 /// ode_operator (scalar = false) or ode_scalar at `tolerance`, against itself at a tenth of it.

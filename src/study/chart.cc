@@ -146,7 +146,7 @@ ChartScene describe(const RayBench& bench) {
   ChartScene scene{bench.spec.name, bench.spec.what, bench.agreement, 0, 0, 0};
   const Ray<double> ray = ray_of<double>(bench.spec, Continuity::e_and_h);
   const ModalTransfer<double> modes = Diagonal<double>::modal(*bench.column, ray, uniform_mesh(64));
-  scene.phase_rad = std::abs(modes.phase_e - modes.phase_o);
+  scene.phase_rad = std::abs(modes.log_e.im - modes.log_o.im);
   const Mesh mesh = uniform_mesh(4096);
   const M everything = Berreman<double>().transmission(*bench.column, ray, mesh, bench.spec.host_index);
   const Magnus4<double> method;
@@ -163,13 +163,36 @@ struct FrameScene {
   ParameterTable table;
   Scene scene;
 };
+/// The medium of a column as the rows of a profile, to be joined by splines.
+SlabProfile profile_of(const Column<double>& column, int rows) {
+  SlabProfile profile;
+  profile.interpolation = SlabProfile::Interpolation::cubic;
+  for (int i = 0; i < rows; ++i) {
+    const double u = static_cast<double>(i) / (rows - 1);
+    OpticalPoint<double> p;
+    column.sample({&u, 1}, &p);
+    const Complex<double> n_o = sqrt(Complex<double>(p.ordinary, p.ordinary_im)), n_e = sqrt(Complex<double>(p.extraordinary, p.extraordinary_im));
+    profile.rows.push_back({u * p.depth_slope_um, p.axis.x, p.axis.y, p.axis.z, n_o.re, n_e.re, n_o.im, n_e.im});
+  }
+  return profile;
+}
 std::vector<FrameScene> frame_scenes() {
-  std::vector<FrameScene> all(3);
-  for (int i = 0; i < 3; ++i) {
+  std::vector<FrameScene> all(4);
+  for (int i = 0; i < 4; ++i) {
     FrameScene& f = all[static_cast<std::size_t>(i)];
     f.scene.view.width = f.scene.view.height = 500;
     f.scene.microscope.polarizer_deg = f.table.add_constant("polarizer_deg", 0);
     f.scene.microscope.analyzer_deg = f.table.add_constant("analyzer_deg", 90);
+    if (i == 3) {
+      f.name = "evaluation_slab";
+      Slab slab;
+      slab.profile = profile_of(*ray_column<double>("evaluation_slab", 0.0), 17);
+      slab.half_angle_deg = f.table.add_constant("half_angle_deg", 15);
+      f.scene.sample = slab;
+      f.scene.surround_index = f.table.add_constant("index", 1.0);
+      f.scene.microscope.wavelength_nm = f.table.add_constant("wavelength_nm", 500);
+      continue;
+    }
     if (i == 2) {
       f.name = "e44_plate";
       Plate plate;
@@ -205,25 +228,56 @@ std::vector<FrameScene> frame_scenes() {
   return all;
 }
 
+/// Some pixels of a frame by magnus4 and 8 x 8 points each: what the slab is judged by, whose every pixel would take minutes.
+struct PixelTruth {
+  std::vector<std::array<int, 2>> pixels;
+  Eigen::VectorXd intensity;
+};
+PixelTruth pixel_truth(Scene scene, const Theta& theta) {
+  scene.method = "magnus4";
+  scene.intensity_accuracy = 1e-7;
+  RenderPlan fine = plan(scene, theta);
+  fine.samples = {8};
+  fine.fringe_means = false;
+  PixelTruth truth;
+  for (int i = 0; i < 200; ++i) {
+    const auto at = [&](double turn, int size) { return static_cast<int>((turn - std::floor(turn)) * size); };
+    truth.pixels.push_back({at(i * 0.7548776662466927, scene.view.width), at(i * 0.5698402909980532, scene.view.height)});
+  }
+  truth.intensity = render_pixels(scene, fine, theta, truth.pixels).intensity;
+  return truth;
+}
+
 void measure_frames(MethodChart& chart, const std::function<void(const std::string&)>& say) {
   for (FrameScene& f : frame_scenes()) {
     if (say) say("frames of " + f.name);
     const Theta theta = f.table.values();
-    f.scene.intensity_accuracy = 1e-10;
-    const Image exact = render(f.scene, plan(f.scene, theta), theta).intensity;
+    const bool by_pixels = f.name == "evaluation_slab";
+    PixelTruth some;
+    Image exact;
+    if (by_pixels) {
+      some = pixel_truth(f.scene, theta);
+    } else {
+      f.scene.intensity_accuracy = 1e-10;
+      exact = render(f.scene, plan(f.scene, theta), theta).intensity;
+    }
     for (const double asked : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
+      if (by_pixels && asked < 1e-4) break;  // kinks of its splines keep the modes from less: minutes by magnus4
       f.scene.intensity_accuracy = asked;
       const RenderPlan chosen = plan(f.scene, theta);
       ChartFrame frame{f.name, chosen.method, asked, 0, 0, 0};
-      const Image image = render(f.scene, chosen, theta).intensity;
-      frame.seconds = seconds_of([&] { render(f.scene, chosen, theta); });
+      Rendering rendering;
+      frame.seconds = seconds_of([&] { render(f.scene, chosen, theta, {}, 0, rendering); });
+      const Image& image = rendering.intensity;
       double sum = 0;
-      for (std::size_t i = 0; i < image.size(); ++i) {
-        const double d = image.values()[i] - exact.values()[i];
+      const std::size_t count = by_pixels ? some.pixels.size() : image.size();
+      for (std::size_t i = 0; i < count; ++i) {
+        const double d = by_pixels ? image(some.pixels[i][0], some.pixels[i][1]) - some.intensity[static_cast<Eigen::Index>(i)]
+                                   : image.values()[i] - exact.values()[i];
         sum += d * d;
         frame.worst_error = std::max(frame.worst_error, std::abs(d));
       }
-      frame.rms_error = std::sqrt(sum / static_cast<double>(image.size()));
+      frame.rms_error = std::sqrt(sum / static_cast<double>(count));
       chart.frames.push_back(frame);
     }
   }
@@ -241,6 +295,7 @@ MethodChart measure_chart(bool quick, const std::function<void(const std::string
     const int most = quick ? 256 : 8192;
     for (int n = 4; n <= most; n *= quick ? 4 : 2) {
       if (n <= 64) chart.points.push_back(bench.measure<Diagonal>(n / 4));
+      if (n <= 512) chart.points.push_back(bench.measure<Modal>(n / 4));
       chart.points.push_back(bench.measure<Magnus4>(n));
       chart.points.push_back(bench.measure<Magnus6>(n));
       chart.points.push_back(bench.measure<LayersMidpoint>(n));

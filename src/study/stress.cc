@@ -115,9 +115,10 @@ std::vector<StressPoint> measure_stress(bool quick, const std::function<void(con
       points.push_back(p);
     };
     for (const TransportMethod<double>* method : transport_methods<double>())
-      if (!method->info().reflections && std::string(method->info().name) != "diagonal")
+      if (const std::string name = method->info().name; !method->info().reflections && name != "diagonal" && name != "modal")
         record(method->info().name, by_halving(*method, *trap.column, trap.ray, kTolerance));
     record("diagonal", diagonal_answer(*trap.column, trap.ray, kTolerance));
+    record("modal", modal_answer(*trap.column, trap.ray, kTolerance));
     record("wei_norman", wei_norman_answer(false, *trap.column, trap.ray, 1e-3));
     record("wei_norman_exp", wei_norman_answer(true, *trap.column, trap.ray, 1e-3));
     record("ode_scalar", ode_answer(true, *trap.column, trap.ray, kTolerance));

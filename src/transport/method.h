@@ -31,6 +31,7 @@ struct MethodInfo {
   bool reflections;       ///< has transmission() only, backward waves and faces included
   const char* summary;    ///< what it is, one line
   const char* source;
+  bool slow_axes = false; ///< only where the axis turns slowly against the phase; more steps do not mend it
 };
 
 template <class S>

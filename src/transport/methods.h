@@ -2,20 +2,9 @@
 // The concrete methods. Only method.cc and the tests of a single method need to see them.
 
 #include "transport/method.h"
+#include "transport/modes.h"
 
 namespace birefit {
-
-/// Fields (E_x, E_y) of the ordinary and the extraordinary mode, scaled to unit flux; real in a lossless medium.
-template <class S>
-struct FluxModes {
-  S ox, oy, ex, ey;
-};
-/// A lossless transfer without coupling: modes at both faces and their phases (rad).
-template <class S>
-struct ModalTransfer {
-  FluxModes<S> first, last;
-  S phase_o, phase_e;
-};
 
 /// One phase integral per mode of the local eigenframe, with the factors that keep its flux (or, e_only, its E):
 /// 8 Gauss-Legendre nodes in every mesh step. What it leaves out is the coupling between the modes: none where the
@@ -23,12 +12,30 @@ struct ModalTransfer {
 template <class S>
 class Diagonal final : public TransportMethod<S> {
  public:
-  /// transfer() in its parts; lossless, E and H continuous.
+  /// transfer() in its parts.
   static ModalTransfer<S> modal(const Column<S>&, const Ray<S>&, const Mesh&);
   const MethodInfo& info() const override;
   Mat2<S> transfer(const Column<S>&, const Ray<S>&, const Mesh&) const override;
   Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
 };
+
+/// The local modes with their coupling: slow solutions of the equation for the ratio of their amplitudes, 8
+/// Gauss-Legendre nodes in every mesh step (modal.cc has the equations). For axes that turn slowly against the phase,
+/// thousands of radians in a few nodes; not where the axis comes near the wavevector or the medium jumps.
+template <class S>
+class Modal final : public TransportMethod<S> {
+ public:
+  static constexpr int kPasses = 5;
+  const MethodInfo& info() const override;
+  Mat2<S> transfer(const Column<S>&, const Ray<S>&, const Mesh&) const override;  ///< throws std::logic_error on jumps
+  /// Has none (slabs and plates only): throws std::logic_error.
+  Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
+};
+/// Modal::transfer() in its parts, `passes` times through the equation for the ratios; 0 = no coupling.
+template <class S>
+ModalTransfer<S> modal_transfer(const Column<S>&, const Ray<S>&, const Mesh&, int passes = Modal<S>::kPasses);
+template <class S>
+Mat2<S> together(const ModalTransfer<S>&);
 
 /// Exponential integrator of order 4: Omega = h/2 (A1 + A2) - sqrt(3)/12 h^2 [A1, A2] at the two Gauss nodes of a step
 /// (A1 first along the ray), exact 2 x 2 exponential. Iserles & Norsett, Phil. Trans. R. Soc. A 357 (1999).

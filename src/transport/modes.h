@@ -48,6 +48,14 @@ Modes<T> unit_modes(const OpticalPoint<T>& p, const T& kx, const T& ky) {
   return m;
 }
 
+/// Transport in the modes: last diag(e^{log_o}, e^{log_e}) first^-1, columns of `first` and `last` the E_t of the two
+/// waves at the faces.
+template <class S>
+struct ModalTransfer {
+  Mat2<S> first, last;
+  Complex<S> log_o, log_e;
+};
+
 /// Where the axis passes the wavevector the ordinary field a x w turns over, and whoever follows the modes by steps that
 /// miss the place ends with the wrong sign of one of them. True when the field turns by more than 60 degrees between two of
 /// `places` + 1 equally spaced u; medium(u) gives the OpticalPoint<double>.
@@ -72,11 +80,15 @@ struct ModalGenerator {
   Complex<T> a, b1, b2, b3;
 };
 
-// Two scalars know a derivative in depth: Slope<double> at a point, Series<double> as a whole.
-inline Mat2<double> value_of(const Mat2<Slope<double>>& m) { return part(m, false); }
-inline Mat2<double> derivative_of(const Mat2<Slope<double>>& m) { return part(m, true); }
-inline OpticalPoint<double> value_of(const OpticalPoint<Slope<double>>& p) { return without_slope(p); }
-inline Complex<double> value_of(const Complex<Slope<double>>& z) { return {z.re.value, z.im.value}; }
+// Two scalars know a derivative in depth: Slope<S> at a point, Series<double> as a whole.
+template <class S>
+Mat2<S> value_of(const Mat2<Slope<S>>& m) { return part(m, false); }
+template <class S>
+Mat2<S> derivative_of(const Mat2<Slope<S>>& m) { return part(m, true); }
+template <class S>
+OpticalPoint<S> value_of(const OpticalPoint<Slope<S>>& p) { return without_slope(p); }
+template <class S>
+Complex<S> value_of(const Complex<Slope<S>>& z) { return {z.re.value, z.im.value}; }
 inline const Mat2<Series<double>>& value_of(const Mat2<Series<double>>& m) { return m; }
 inline Mat2<Series<double>> derivative_of(const Mat2<Series<double>>& m) {
   const auto of = [](const Complex<Series<double>>& z) {
@@ -87,11 +99,11 @@ inline Mat2<Series<double>> derivative_of(const Mat2<Series<double>>& m) {
 inline const OpticalPoint<Series<double>>& value_of(const OpticalPoint<Series<double>>& p) { return p; }
 inline const Complex<Series<double>>& value_of(const Complex<Series<double>>& z) { return z; }
 
-/// Of modes scaled to E.E = 1. D = Slope<double> (result in double) or Series<double>; derivatives of p are by depth,
-/// in um; the series of the result are exact up to kTaylorOrder. E and H continuous adds (Y - Y-)^-1 dY/dz of one_way.h
-/// to the coupling, which the source paper has not.
-template <class D>
-auto modal_generator(const OpticalPoint<D>& p, const Ray<double>& ray) {
+/// Of modes scaled to E.E = 1. D = Slope<S> (result in S) or Series<double>; derivatives of p are by depth in um, or by
+/// any coordinate in which depth grows by `um_per_unit`; the series of the result are exact up to kTaylorOrder. E and H
+/// continuous adds (Y - Y-)^-1 dY/dz of one_way.h to the coupling, which the source paper has not.
+template <class D, class S>
+auto modal_generator(const OpticalPoint<D>& p, const Ray<S>& ray, const S& um_per_unit = S(1.0)) {
   const Modes<D> m = unit_modes(p, D(ray.kx), D(ray.ky));
   const auto fields = value_of(m.fields);
   auto change = derivative_of(m.fields);
@@ -104,7 +116,7 @@ auto modal_generator(const OpticalPoint<D>& p, const Ray<double>& ray) {
     change = change + inverse(value_of(admittance) - backward) * derivative_of(admittance) * fields;
   }
   const Mat2<T> x = inverse(fields) * change;
-  const C ik(T(0.0), T(ray.k0_per_um));
+  const C ik(T(0.0), T(ray.k0_per_um * um_per_unit));
   const C o = ik * value_of(m.q_o) - x.a, e = ik * value_of(m.q_e) - x.d;
   return ModalGenerator<T>{T(0.5) * (o + e), -x.b, -x.c, T(0.5) * (o - e)};
 }

@@ -1,6 +1,7 @@
 #pragma once
 // Gauss-Legendre nodes on a mesh.
 
+#include <array>
 #include <vector>
 
 namespace birefit {
@@ -32,6 +33,45 @@ inline const GaussNodes& gauss8_nodes(const std::vector<double>& mesh) {
     gauss8_nodes(mesh, last.u, last.weight);
   }
   return last;
+}
+
+/// The polynomial through 8 values at the Gauss nodes of [-1, 1], in the order of gauss8_nodes(): its derivative there
+/// and its values at both ends.
+struct GaussPolynomial {
+  std::array<std::array<double, 8>, 8> derivative;
+  std::array<double, 8> at_start, at_end;
+};
+inline const GaussPolynomial& gauss8_polynomial() {
+  static const GaussPolynomial rule = [] {
+    std::vector<double> u, weight;
+    gauss8_nodes({-1.0, 1.0}, u, weight);
+    GaussPolynomial r;
+    // Barycentric: Berrut & Trefethen, SIAM Review 46, 501 (2004).
+    std::array<double, 8> w;
+    for (std::size_t k = 0; k < 8; ++k) {
+      w[k] = 1;
+      for (std::size_t m = 0; m < 8; ++m)
+        if (m != k) w[k] /= u[k] - u[m];
+    }
+    const auto at = [&](double x) {
+      std::array<double, 8> l;
+      double sum = 0;
+      for (std::size_t k = 0; k < 8; ++k) sum += l[k] = w[k] / (x - u[k]);
+      for (double& value : l) value /= sum;
+      return l;
+    };
+    r.at_start = at(-1), r.at_end = at(1);
+    for (std::size_t i = 0; i < 8; ++i) {
+      r.derivative[i][i] = 0;
+      for (std::size_t k = 0; k < 8; ++k)
+        if (k != i) {
+          r.derivative[i][k] = w[k] / w[i] / (u[i] - u[k]);
+          r.derivative[i][i] -= r.derivative[i][k];
+        }
+    }
+    return r;
+  }();
+  return rule;
 }
 
 }  // namespace birefit

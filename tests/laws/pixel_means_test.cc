@@ -16,7 +16,7 @@ namespace {
 
 /// A fringe with curved phase and amplitude, as functions of the place in pixels.
 struct Fringe {
-  double slope_x, slope_y, curvature;
+  double slope_x, slope_y, curvature, size_of_quadrature = 0;
   template <class T>
   T mean(const T& x, const T& y) const {
     return 0.5 + 0.01 * x - 0.02 * y + 0.003 * x * x;
@@ -24,6 +24,10 @@ struct Fringe {
   template <class T>
   T amplitude(const T& x, const T& y) const {
     return 0.4 + 0.02 * x + 0.01 * y + 0.002 * x * y - 0.003 * y * y;
+  }
+  template <class T>
+  T quadrature(const T& x, const T& y) const {
+    return size_of_quadrature * (0.3 - 0.03 * x + 0.02 * y + 0.002 * x * x);
   }
   template <class T>
   T phase(const T& x, const T& y) const {
@@ -37,7 +41,7 @@ double mean_by_quadrature(const Fringe& f) {
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const double x = (i + 0.5) / n - 0.5, y = (j + 0.5) / n - 0.5;
-      sum += f.mean(x, y) + f.amplitude(x, y) * std::cos(f.phase(x, y));
+      sum += f.mean(x, y) + f.amplitude(x, y) * std::cos(f.phase(x, y)) - f.quadrature(x, y) * std::sin(f.phase(x, y));
     }
   return sum / (n * n);
 }
@@ -45,11 +49,15 @@ double mean_by_quadrature(const Fringe& f) {
 // Third order in the curvature: (curvature/8)^2 of the amplitude at most, whatever the slope.
 TEST(PixelMeans, FringesOfAnyFinenessHaveTheirMean) {
   for (const Fringe& f : {Fringe{0, 0, 0}, Fringe{1e-3, 0, 0.05}, Fringe{0.3, -0.2, 0.05}, Fringe{2.5, 1.1, 0.05}, Fringe{-4.7, 5.9, 0.05},
-                          Fringe{2 * std::numbers::pi, 0, 0}}) {
+                          Fringe{2 * std::numbers::pi, 0, 0}, Fringe{2.5, 1.1, 0.05, 1}, Fringe{0.3, -5.9, 0.05, -1}}) {
     FringePoint<double> p[3][3];
     for (int j = 0; j < 3; ++j)
-      for (int i = 0; i < 3; ++i) p[j][i] = {f.mean(i - 1.0, j - 1.0), f.amplitude(i - 1.0, j - 1.0), f.phase(i - 1.0, j - 1.0)};
-    EXPECT_NEAR(fringe_mean(p), mean_by_quadrature(f), 2e-5) << f.slope_x << ' ' << f.slope_y;
+      for (int i = 0; i < 3; ++i)
+        p[j][i] = {f.amplitude(i - 1.0, j - 1.0), f.phase(i - 1.0, j - 1.0), f.mean(i - 1.0, j - 1.0), f.quadrature(i - 1.0, j - 1.0)};
+    EXPECT_NEAR(fringe_mean<true>(p), mean_by_quadrature(f), 2e-5) << f.slope_x << ' ' << f.slope_y;
+    if (f.size_of_quadrature == 0) {
+      EXPECT_EQ(fringe_mean<true>(p), fringe_mean<false>(p));
+    }
   }
 }
 
@@ -60,8 +68,9 @@ TEST(PixelMeans, DerivativesOfAMeanAreThoseOfDifferences) {
     FringePoint<T> p[3][3];
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i)
-        p[j][i] = {T(0.5) + slope * (0.1 * i), 0.4 + 0.03 * slope * double(j), slope * (i - 1.0) + 0.4 * slope * slope * (j - 1.0)};
-    return fringe_mean(p);
+        p[j][i] = {0.4 + 0.03 * slope * double(j), slope * (i - 1.0) + 0.4 * slope * slope * (j - 1.0), T(0.5) + slope * (0.1 * i),
+                   0.1 + 0.02 * slope * double(i)};
+    return fringe_mean<true>(p);
   };
   for (double slope : {0.0, 1e-4, 0.17, 0.346, 1.0, 3.0}) {  // q = 0.03, where a series takes over, is slope 0.346
     D x(slope);
@@ -87,17 +96,18 @@ TEST(RadialTable, ReadsWhatWasTabulatedWithItsDerivatives) {
     // Lanes in different panels; v itself depends on the parameter.
     alignas(64) double places[kLanes];
     for (int k = 0; k < kLanes; ++k) places[k] = std::fmod(v0 + 0.3 * k, 1.0);
-    D v(Pack::load_aligned(places)), basis[3];
+    D v(Pack::load_aligned(places));
     v.d[0] = Pack(0.7);
-    for (D& b : basis) b = D(Pack(1.0));
-    basis[1].d[0] = Pack(-2.0);
-    const D sum = table.sum<3>(v, basis);
+    const Pack basis[3]{Pack(1.0), Pack(1.0), Pack(1.0)}, turned[3]{Pack(0.0), Pack(-2.0), Pack(0.0)};
+    Pack turned_sum;
+    const D sum = table.sum<3>(v, basis, turned, &turned_sum);
     for (int k = 0; k < kLanes; ++k) {
       const double x = places[k];
       EXPECT_NEAR(lane(sum.value, k), std::sin(5 * x) + std::cos(5 * x) + 5 * x * x, 2e-11);
       const double along = 5 * std::cos(5 * x) - 5 * std::sin(5 * x) + 10 * x;
       EXPECT_NEAR(lane(sum.d[0], k),
-                  0.7 * along + x * std::cos(5 * x) - x * std::sin(5 * x) + x * x - 2 * std::cos(5 * x), 2e-9);
+                  0.7 * along + x * std::cos(5 * x) - x * std::sin(5 * x) + x * x, 2e-9);
+      EXPECT_NEAR(lane(turned_sum, k), -2 * std::cos(5 * x), 2e-11);
     }
   }
 }

@@ -69,6 +69,7 @@ template <class Body>
 void for_each_method(const Body& body) {
   for (const TransportMethod<double>* method : transport_methods<double>()) {
     if (method->info().reflections) continue;  // no one-way transfer; its laws are in berreman_test.cc
+    if (method->info().slow_axes) continue;    // modal_test.cc
     for (const Continuity c : kContinuities) {
       SCOPED_TRACE(label(*method, c));
       body(*method, c);

@@ -74,20 +74,23 @@ int main(int argc, char** argv) {
     // The same without the table over the radius: a ray for every point, as a scene without symmetry needs.
     RenderPlan every = p;
     every.radial_panels = 0;
-    std::vector<double> both, one, four, rays, rays_one, rays_four, rays_scalar;
+    Rendering out, out_four;  // images are made once, as in a fit
+    std::vector<double> both, one, four, scalar, rays, rays_one, rays_four, rays_scalar;
     for (int i = 0; i < rounds; ++i) {
-      both.push_back(seconds_of([&] { render(s.scene, p, theta); }));
-      one.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 1); }));
-      four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four); }));
-      rays.push_back(seconds_of([&] { render(s.scene, every, theta); }));
-      rays_one.push_back(seconds_of([&] { render(s.scene, every, theta, {}, 1); }));
-      rays_four.push_back(seconds_of([&] { render(s.scene, every, theta, s.four); }));
+      both.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, out); }));
+      one.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 1, out); }));
+      four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four, 0, out_four); }));
+      rays.push_back(seconds_of([&] { render(s.scene, every, theta, {}, 0, out); }));
+      rays_one.push_back(seconds_of([&] { render(s.scene, every, theta, {}, 1, out); }));
+      rays_four.push_back(seconds_of([&] { render(s.scene, every, theta, s.four, 0, out_four); }));
+      if (i < 3) scalar.push_back(seconds_of([&] { render_scalar(s.scene, p, theta); }));
       if (i < 3) rays_scalar.push_back(seconds_of([&] { render_scalar(s.scene, every, theta); }));
     }
     std::printf("500 x 500 %s droplet (%s, %d steps, accuracy %.0e):\n", twisted ? "twisted" : "radial", p.method.c_str(), p.steps,
                 s.scene.intensity_accuracy);
     std::printf("  image, all threads            %8.2f ms\n", 1e3 * median(both));
     std::printf("  image, one thread             %8.2f ms\n", 1e3 * median(one));
+    std::printf("  image, one thread, no lanes   %8.2f ms   %.2f times the lanes\n", 1e3 * median(scalar), median(scalar) / median(one));
     std::printf("  image and four derivatives    %8.2f ms   %.2f times the image\n", 1e3 * median(four), median(four) / median(both));
     std::printf("  a ray for every point         %8.2f ms   %8.2f ms with four derivatives, %.2f times\n", 1e3 * median(rays),
                 1e3 * median(rays_four), median(rays_four) / median(rays));

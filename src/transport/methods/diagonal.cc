@@ -17,9 +17,10 @@ void normal_components(const OpticalPoint<S>& p, const S& kx, const S& ky, S& q_
   q_o = sqrt(eo - kk);
   q_e = (sqrt(B * B - A * C) - B) / A;
 }
-/// H = w x E (over k0): S_z = (E x H)_z with E_o = a x w_o and E_e = eo a - (a.w_e) w_e, H_e = eo w_e x a.
+/// Tangential fields of both modes as columns, scaled to unit flux; H = w x E (over k0): S_z = (E x H)_z with
+/// E_o = a x w_o and E_e = eo a - (a.w_e) w_e, H_e = eo w_e x a.
 template <class S>
-FluxModes<S> flux_modes(const OpticalPoint<S>& p, const S& kx, const S& ky) {
+Mat2<S> flux_modes(const OpticalPoint<S>& p, const S& kx, const S& ky) {
   S q_o, q_e;
   normal_components(p, kx, ky, q_o, q_e);
   const auto cross = [](const Vec3<S>& a, const Vec3<S>& b) {
@@ -30,7 +31,7 @@ FluxModes<S> flux_modes(const OpticalPoint<S>& p, const S& kx, const S& ky) {
   const S aw = dot(p.axis, we);
   const Vec3<S> ee = p.ordinary * p.axis + (S(0.0) - aw) * we, he = cross(we, ee);
   const S fo = 1.0 / sqrt(eo.x * ho.y - eo.y * ho.x), fe = 1.0 / sqrt(ee.x * he.y - ee.y * he.x);
-  return {fo * eo.x, fo * eo.y, fe * ee.x, fe * ee.y};
+  return {fo * eo.x, fe * ee.x, fo * eo.y, fe * ee.y};
 }
 
 }  // namespace
@@ -44,6 +45,7 @@ const MethodInfo& Diagonal<S>::info() const {
 // but the two phases is left between the faces.
 template <class S>
 ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
+  if (column.absorbing || ray.continuity != Continuity::e_and_h) return modal_transfer(column, ray, mesh, 0);
   const GaussNodes& nodes = gauss8_nodes(mesh);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
@@ -60,56 +62,13 @@ ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, 
   const double ends[2] = {0.0, 1.0};
   OpticalPoint<S> face[2];
   column.sample(ends, face);
-  return {flux_modes(face[0], ray.kx, ray.ky), flux_modes(face[1], ray.kx, ray.ky), ray.k0_per_um * phase_o,
-          ray.k0_per_um * phase_e};
+  return {flux_modes(face[0], ray.kx, ray.ky), flux_modes(face[1], ray.kx, ray.ky),
+          Complex<S>(S(0.0), ray.k0_per_um * phase_o), Complex<S>(S(0.0), ray.k0_per_um * phase_e)};
 }
 
 template <class S>
 Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  if (!column.absorbing && ray.continuity == Continuity::e_and_h) {
-    const ModalTransfer<S> m = modal(column, ray, mesh);
-    const FluxModes<S>&first = m.first, &last = m.last;
-    S so, co, se, ce;
-    sin_cos(m.phase_o, so, co);
-    sin_cos(m.phase_e, se, ce);
-    const S f = 1.0 / (first.ox * first.ey - first.ex * first.oy);
-    // [o e]_last diag(e^{i phase}) [o e]_first^-1
-    const Complex<S> po{co, so}, pe{ce, se};
-    const S ixx = f * first.ey, ixy = -(f * first.ex), iyx = -(f * first.oy), iyy = f * first.ox;
-    return {(last.ox * ixx) * po + (last.ex * iyx) * pe, (last.ox * ixy) * po + (last.ex * iyy) * pe,
-            (last.oy * ixx) * po + (last.ey * iyx) * pe, (last.oy * ixy) * po + (last.ey * iyy) * pe};
-  }
-  const GaussNodes& nodes = gauss8_nodes(mesh);
-  const std::vector<double>&u = nodes.u, &weight = nodes.weight;
-  thread_local std::vector<OpticalPoint<Slope<S>>> points;
-  points.resize(u.size());
-  column.sample_with_slope(u, points.data());
-  const Slope<S> kx(ray.kx), ky(ray.ky);
-  Complex<S> phase_o, phase_e;
-  for (std::size_t i = 0; i < u.size(); ++i) {
-    const Modes<Slope<S>> m = modes(points[i], kx, ky);
-    const Mat2<S> fields = part(m.fields, false);
-    Mat2<S> change = part(m.fields, true);
-    if (ray.continuity == Continuity::e_and_h) {
-      // generator = i k0 N du/dz - X, so X M = i k0 M diag(q) du/dz - generator M
-      const Complex<S> ik(S(0.0), ray.k0_per_um * points[i].depth_slope_um.value);
-      const OpticalPoint<S> q = without_slope(points[i]);
-      const Mat2<S> index = one_way(q, ray.kx, ray.ky).index;
-      const Mat2<S> x = ik * index - generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky, false);
-      change = change + x * fields;
-    }
-    const Mat2<S> modal = inverse(fields) * change;
-    const Complex<S> ik(S(0.0), ray.k0_per_um * points[i].depth_slope_um.value);
-    const auto value = [](const Complex<Slope<S>>& z) { return Complex<S>{z.re.value, z.im.value}; };
-    phase_o = phase_o + S(weight[i]) * (ik * value(m.q_o) - modal.a);
-    phase_e = phase_e + S(weight[i]) * (ik * value(m.q_e) - modal.d);
-  }
-  const double ends[2] = {0.0, 1.0};
-  OpticalPoint<S> face[2];
-  column.sample(ends, face);
-  const Mat2<S> first = modes(face[0], ray.kx, ray.ky).fields, last = modes(face[1], ray.kx, ray.ky).fields;
-  const Mat2<S> middle{exp(phase_o), Complex<S>(), Complex<S>(), exp(phase_e)};
-  return last * middle * inverse(first);
+  return together(modal(column, ray, mesh));
 }
 
 template <class S>

@@ -1,0 +1,145 @@
+// The slow solutions of the coupled modes.
+
+#include <gtest/gtest.h>
+
+#include "medium/families/planar.h"
+#include "profiles.h"
+#include "scene_builder.h"
+#include "study/answer.h"
+#include "study/rays.h"
+#include "transport/methods.h"
+
+namespace birefit {
+namespace {
+using namespace testing;
+using study::relative_distance;
+
+Ray<double> ray_of(const study::RaySpec& spec, Continuity c) { return {2 * std::numbers::pi / spec.wavelength_um, spec.kx, spec.ky, c}; }
+study::RaySpec spec_of(const std::string& name) {
+  for (const study::RaySpec& spec : study::ray_specs())
+    if (spec.name == name) return spec;
+  throw std::logic_error(name);
+}
+
+// 1,500 rad in 64 nodes where Magnus of order 6 needs thousands of steps; 1e-10 is what 1e4 rad of common phase leave of
+// rounding in products of thousands of matrices.
+TEST(Modal, ThickSlabsInAFewNodes) {
+  for (const char* name : {"evaluation_slab", "e44_plate"})
+    for (const Continuity c : {Continuity::e_only, Continuity::e_and_h}) {
+      const auto column = study::ray_column<double>(name, 0.0);
+      const Ray<double> ray = ray_of(spec_of(name), c);
+      const Mat2<double> exact = Magnus6<double>().transfer(*column, ray, uniform_mesh(16384));
+      EXPECT_LT(relative_distance(Modal<double>().transfer(*column, ray, uniform_mesh(8)), exact), 1e-10) << name;
+    }
+}
+
+// Every pass gains a power of 1/(phase over the length on which the medium changes): of 5 um and 8 rad, about 1/3.
+TEST(Modal, EveryPassGainsAPower) {
+  const auto column = study::ray_column<double>("twisted_cell", 0.0);
+  for (const Continuity c : {Continuity::e_only, Continuity::e_and_h}) {
+    const Ray<double> ray = ray_of(spec_of("twisted_cell"), c);
+    const Mat2<double> exact = Magnus6<double>().transfer(*column, ray, uniform_mesh(4096));
+    double before = relative_distance(together(modal_transfer(*column, ray, uniform_mesh(8), 0)), exact);
+    for (int passes = 1; passes <= 4; ++passes) {
+      const double now = relative_distance(together(modal_transfer(*column, ray, uniform_mesh(8), passes)), exact);
+      EXPECT_LT(now, 0.4 * before) << passes;
+      before = now;
+    }
+  }
+}
+
+// A lossless column keeps the flux: <S_z> = Re(E_x H_y* - E_y H_x*)/2 with H = Y E, the same at both ends.
+TEST(Modal, FluxIsKept) {
+  const TiltTwistLaw law{10 * kDeg, 50 * kDeg, 20 * kDeg, 35 * kDeg, 80 * kDeg, 1.52, 1.74, 300};
+  const LawColumn<double, TiltTwistLaw> column(law);
+  const Ray<double> ray{2 * std::numbers::pi / 0.59, 0.35, -0.2, Continuity::e_and_h};
+  const Mat2<double> t = Modal<double>().transfer(column, ray, uniform_mesh(8));
+  const auto flux = [&](double u, const Complex<double>& ex, const Complex<double>& ey) {
+    OpticalPoint<double> p;
+    column.sample({&u, 1}, &p);
+    const Matrix2<double> y = one_way_lossless(p, ray.kx, ray.ky).admittance;
+    const Complex<double> hx = y.a * ex + y.b * ey, hy = y.c * ex + y.d * ey;
+    return (ex * conj(hy) - ey * conj(hx)).re;
+  };
+  for (const double angle : {0.0, 0.4, 1.1, 2.0}) {
+    const Complex<double> ex(std::cos(angle)), ey(std::sin(angle));
+    const double in = flux(0, ex, ey), out = flux(1, t.a * ex + t.b * ey, t.c * ex + t.d * ey);
+    EXPECT_NEAR(out / in, 1, 1e-10) << angle;  // 3,000 rad, rounded
+  }
+}
+
+TEST(Modal, RefusesJumps) {
+  LawColumn<double, TiltTwistLaw> column(TiltTwistLaw{0, 0, 0, 0, 0, 1.5, 1.6, 5});
+  column.jumps = true;
+  EXPECT_THROW(Modal<double>().transfer(column, ray_of(spec_of("twisted_cell"), Continuity::e_only), uniform_mesh(4)), std::logic_error);
+}
+
+// A picture interpolated from a few rays is the picture of all rays: within a thousandth of the accuracy asked, derivatives
+// with it.
+TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
+  for (const bool absorbing_slab : {false, true}) {
+    TableBuilder table;
+    Scene scene;
+    scene.view.width = 90, scene.view.height = 70;
+    scene.microscope.polarizer_deg = table.fixed("polarizer_deg", 10);
+    scene.microscope.analyzer_deg = table.fixed("analyzer_deg", 95);
+    scene.surround_index = table.fixed("index", 1.0);
+    std::vector<int> active{scene.microscope.polarizer_deg.index, scene.surround_index.index};
+    if (absorbing_slab) {
+      Slab slab;
+      slab.profile.interpolation = SlabProfile::Interpolation::cubic;
+      const auto column = study::ray_column<double>("evaluation_slab", 0.0);
+      for (int i = 0; i < 9; ++i) {
+        const double u = i / 8.0;
+        OpticalPoint<double> p;
+        column->sample({&u, 1}, &p);
+        slab.profile.rows.push_back({300 * u, p.axis.x, p.axis.y, p.axis.z, std::sqrt(p.ordinary), std::sqrt(p.extraordinary), 0, 3e-4});
+      }
+      slab.half_angle_deg = table.fixed("half_angle_deg", 3);
+      scene.microscope.wavelength_nm = table.fixed("wavelength_nm", 500);
+      scene.sample = slab;
+      active.push_back(slab.half_angle_deg.index);
+    } else {
+      Plate plate;
+      plate.thickness_um = table.fixed("thickness_um", 200);
+      plate.director.azimuth_deg = table.fixed("azimuth_deg", 25);
+      plate.director.tilt_deg = table.fixed("tilt_deg", 40);
+      plate.half_angle_deg = table.fixed("half_angle_deg", 8);
+      scene.sample = plate;
+      ConstantIndices material;
+      material.ordinary = table.fixed("ordinary", 1.53);
+      material.birefringence = table.fixed("birefringence", 0.2);
+      scene.material = material;
+      scene.microscope.wavelength_nm = table.fixed("wavelength_nm", 640);
+      active.push_back(material.birefringence.index);
+      active.push_back(plate.director.tilt_deg.index);
+    }
+    const Theta theta = table.table.values();
+    const RenderPlan few = plan(scene, theta);
+    EXPECT_EQ(few.method, absorbing_slab ? "modal" : "diagonal");
+    ASSERT_GT(few.fringe_block_px, 0);
+    RenderPlan all = few;
+    all.fringe_block_px = 0;
+    all.fringe_blocks.clear();
+    const Rendering a = render(scene, few, theta, active), b = render(scene, all, theta, active);
+    double worst = 0, brightest = 0;
+    for (std::size_t i = 0; i < a.intensity.size(); ++i) {
+      worst = std::max(worst, std::abs(a.intensity.values()[i] - b.intensity.values()[i]));
+      brightest = std::max(brightest, b.intensity.values()[i]);
+    }
+    EXPECT_LT(worst, 1e-3 * scene.intensity_accuracy);
+    EXPECT_GT(brightest, 0.3);
+    for (std::size_t j = 0; j < active.size(); ++j) {
+      double error = 0, size = 0;
+      for (std::size_t i = 0; i < a.intensity.size(); ++i) {
+        error = std::max(error, std::abs(a.derivatives[j].values()[i] - b.derivatives[j].values()[i]));
+        size = std::max(size, std::abs(b.derivatives[j].values()[i]));
+      }
+      EXPECT_LT(error, 1e-6 * size) << j;
+      EXPECT_GT(size, 0) << j;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace birefit
