@@ -11,7 +11,7 @@ namespace birefit {
 /// (ChartScene::reference_agreement); not a number where a method does not offer the quantity.
 struct ChartPoint {
   std::string scene, method;
-  std::string effort;          ///< "n=64" steps, panels or layers; "tol=1e-6" of an adaptive solver
+  std::string effort;          ///< "n=64" steps, panels or layers (" order=3": series shorter or longer than the usual 7); "tol=1e-6" of an adaptive solver
   double seconds = 0;          ///< one ray in plain doubles
   double seconds_in_lanes = 0; ///< one ray of a full pack of them
   double samples = 0;          ///< of the medium, per ray

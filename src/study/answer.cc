@@ -80,9 +80,9 @@ Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, dou
   return answer;
 }
 
-Answer wei_norman_answer(bool exponential, const Column<double>& column, const Ray<double>& ray, double tolerance) {
-  const WeiNorman<double> paper;
-  const WeiNormanExp<double> improved;
+Answer wei_norman_answer(bool exponential, int order, const Column<double>& column, const Ray<double>& ray, double tolerance) {
+  const WeiNorman<double> paper(order);
+  const WeiNormanExp<double> improved(order);
   const TransportMethod<double>& method = exponential ? static_cast<const TransportMethod<double>&>(improved) : paper;
   const WeiNormanForm form = exponential ? improved.form() : paper.form();
   double samples = 0;
@@ -96,8 +96,9 @@ Answer wei_norman_answer(bool exponential, const Column<double>& column, const R
       const Mat2<double> now = method.transfer(column, ray, mesh);
       const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
       before = now;
-      // The report knows the dropped coupling; what the series leave out shows under halving.
-      const double estimate = 2 * report.estimate + 2 * change + rounding(n);
+      // The report knows the dropped coupling and the ends of the series; the phase of the coupling, which is taken for
+      // quadratic, shows under halving.
+      const double estimate = 2 * (report.estimate + report.truncation + change) + rounding(n);
       if (n > 1 && report.valid && estimate <= tolerance && last_change >= change) return {now, estimate, samples, ""};
       last_change = change;
     } catch (const std::logic_error& error) {

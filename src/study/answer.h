@@ -26,8 +26,9 @@ Answer by_halving(const TransportMethod<double>& method, const Column<double>& c
                   int most = 16384);
 /// The diagonal method: the change under halving, and twice the amplitude that the coupling it leaves out can reach.
 Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance);
-/// wei_norman (exponential = false) or wei_norman_exp: layers halved until the method's own report is below `tolerance`.
-Answer wei_norman_answer(bool exponential, const Column<double>& column, const Ray<double>& ray, double tolerance);
+/// wei_norman (exponential = false) or wei_norman_exp with series of `order`: layers halved until the method's own report
+/// is below `tolerance`.
+Answer wei_norman_answer(bool exponential, int order, const Column<double>& column, const Ray<double>& ray, double tolerance);
 /// ode_operator (scalar = false) or ode_scalar at `tolerance`, against itself at a tenth of it.
 Answer ode_answer(bool scalar, const Column<double>& column, const Ray<double>& ray, double tolerance);
 

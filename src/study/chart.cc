@@ -249,8 +249,11 @@ MethodChart measure_chart(bool quick, const std::function<void(const std::string
     for (int n = 1; n <= (quick ? 16 : 1024); n *= 4) {
       const Mesh mesh = uniform_mesh(n);
       const std::string effort = fmt::format("n={}", n);
-      chart.points.push_back(bench.value_point(WeiNorman<double>(), ray, mesh, "wei_norman", effort));
-      chart.points.push_back(bench.value_point(WeiNormanExp<double>(), ray, mesh, "wei_norman_exp", effort));
+      for (const int order : {kWeiNormanPaper.order, 3, 11}) {
+        const std::string series = order == kWeiNormanPaper.order ? effort : fmt::format("{} order={}", effort, order);
+        chart.points.push_back(bench.value_point(WeiNorman<double>(order), ray, mesh, "wei_norman", series));
+        chart.points.push_back(bench.value_point(WeiNormanExp<double>(order), ray, mesh, "wei_norman_exp", series));
+      }
     }
     for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
       if (quick && tolerance < 1e-6) break;

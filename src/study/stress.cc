@@ -9,6 +9,7 @@
 #include "study/answer.h"
 #include "study/rays.h"
 #include "transport/methods.h"
+#include "transport/methods/wei_norman.h"
 
 namespace birefit {
 namespace {
@@ -118,8 +119,11 @@ std::vector<StressPoint> measure_stress(bool quick, const std::function<void(con
       if (!method->info().reflections && std::string(method->info().name) != "diagonal")
         record(method->info().name, by_halving(*method, *trap.column, trap.ray, kTolerance));
     record("diagonal", diagonal_answer(*trap.column, trap.ray, kTolerance));
-    record("wei_norman", wei_norman_answer(false, *trap.column, trap.ray, 1e-3));
-    record("wei_norman_exp", wei_norman_answer(true, *trap.column, trap.ray, 1e-3));
+    for (const int order : {kWeiNormanPaper.order, 3}) {
+      const std::string ending = order == kWeiNormanPaper.order ? "" : fmt::format(" order {}", order);
+      record("wei_norman" + ending, wei_norman_answer(false, order, *trap.column, trap.ray, 1e-3));
+      record("wei_norman_exp" + ending, wei_norman_answer(true, order, *trap.column, trap.ray, 1e-3));
+    }
     record("ode_scalar", ode_answer(true, *trap.column, trap.ray, kTolerance));
     if (trap.sweep != "thickness_um" || trap.value < 500) record("ode_operator", ode_answer(false, *trap.column, trap.ray, kTolerance));
   }
