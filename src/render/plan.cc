@@ -408,8 +408,12 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   }
   const auto worst = [&](const TransportMethod<double>& method, const Mesh& mesh) {
     double error = 0;
-    for (std::size_t i = 0; i < directions.size(); ++i)
-      error = std::max(error, intensity_distance(truth[i], planar_jones(o, method, mesh, directions[i].first, directions[i].second)));
+    try {
+      for (std::size_t i = 0; i < directions.size(); ++i)
+        error = std::max(error, intensity_distance(truth[i], planar_jones(o, method, mesh, directions[i].first, directions[i].second)));
+    } catch (const std::domain_error&) {  // steps too long for the method
+      return 1e300;
+    }
     return std::isfinite(error) ? error : 1e300;
   };
   const bool slab = std::holds_alternative<Slab>(scene.sample);

@@ -29,11 +29,19 @@ Answer refused(const std::string& why, double samples) {
 
 Answer by_halving(const TransportMethod<double>& method, const Column<double>& column, const Ray<double>& ray, double tolerance, int most) {
   const CountingColumn<double> counted(column);
+  // Steps too long for the method are refused by the method: no answer yet.
+  const auto with_steps = [&](int n) {
+    try {
+      return method.transfer(counted, ray, uniform_mesh(n, column.breaks));
+    } catch (const std::domain_error&) {
+      return Mat2<double>{std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
+    }
+  };
   const double falls = method.info().order > 0 ? std::exp2(0.5 * method.info().order) : 2;
-  Mat2<double> before = method.transfer(counted, ray, uniform_mesh(16, column.breaks));
+  Mat2<double> before = with_steps(16);
   double last_change = std::numeric_limits<double>::infinity();
   for (int n = 32; n <= most; n *= 2) {
-    const Mat2<double> now = method.transfer(counted, ray, uniform_mesh(n, column.breaks));
+    const Mat2<double> now = with_steps(n);
     const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
     const bool converging = last_change >= falls * change || change < rounding(n);
     // Falling by `falls` a halving from here on, what is left is at most change/(falls - 1).
@@ -93,7 +101,11 @@ Answer wei_norman_answer(bool exponential, int order, const Column<double>& colu
     samples += static_cast<double>(mesh.size() - 1);  // one series a layer
     try {
       const WeiNormanReport report = wei_norman_report(column, ray, mesh, form);
-      const Mat2<double> now = method.transfer(column, ray, mesh);
+      Mat2<double> now{std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
+      try {
+        now = method.transfer(column, ray, mesh);
+      } catch (const std::domain_error&) {  // layers too thick: the report says so too
+      }
       const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
       before = now;
       // The report knows the dropped coupling and the ends of the series; the phase of the coupling, which is taken for

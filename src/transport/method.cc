@@ -1,6 +1,7 @@
 #include "transport/method.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "transport/methods.h"
@@ -34,6 +35,11 @@ const std::vector<std::string>& transport_method_names() {
     return list;
   }();
   return names;
+}
+
+void refuse_transfer(const MethodInfo& info) {
+  throw std::domain_error(std::string(info.name) +
+                          ": no passive medium does this: steps too long for the method, total reflection inside, or modes where there are none");
 }
 
 template <class S>
@@ -132,7 +138,16 @@ Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double t
       whole.sample_with_slope(u, out);
     }
   } piece(column);
+  constexpr double kNever = std::numeric_limits<double>::infinity();
   const auto step = [&](double from, double to) { return method.transfer(piece, ray, {from, to}); };
+  const auto change = [&](double from, double middle, double to) {
+    try {
+      const Mat2<double> d = step(middle, to) * step(from, middle) - step(from, to);
+      return std::sqrt(norm(d.a) + norm(d.b) + norm(d.c) + norm(d.d));
+    } catch (const std::domain_error&) {  // far too long a step
+      return kNever;
+    }
+  };
   const Mesh start = uniform_mesh(4, column.breaks);
   Mesh mesh{0.0};
   double total = 0;
@@ -140,9 +155,7 @@ Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double t
   std::vector<double> open(start.rbegin(), start.rend() - 1);
   while (!open.empty()) {
     const double from = mesh.back(), to = open.back(), middle = 0.5 * (from + to);
-    const Mat2<double> coarse = step(from, to), fine = step(middle, to) * step(from, middle);
-    const Mat2<double> difference = fine - coarse;
-    const double error = std::sqrt(norm(difference.a) + norm(difference.b) + norm(difference.c) + norm(difference.d));
+    const double error = change(from, middle, to);
     const bool exhausted = static_cast<int>(mesh.size() + open.size()) >= max_steps || to - from < 1e-9;
     // A step that cannot get better (rounding) is accepted too.
     if (error <= tolerance * (to - from) || error < 4e-15 || exhausted) {

@@ -76,8 +76,9 @@ Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const 
     // [o e]_last diag(e^{i phase}) [o e]_first^-1
     const Complex<S> po{co, so}, pe{ce, se};
     const S ixx = f * first.ey, ixy = -(f * first.ex), iyx = -(f * first.oy), iyy = f * first.ox;
-    return {(last.ox * ixx) * po + (last.ex * iyx) * pe, (last.ox * ixy) * po + (last.ex * iyy) * pe,
-            (last.oy * ixx) * po + (last.ey * iyx) * pe, (last.oy * ixy) * po + (last.ey * iyy) * pe};
+    return checked_transfer<S>(
+        kInfo, {(last.ox * ixx) * po + (last.ex * iyx) * pe, (last.ox * ixy) * po + (last.ex * iyy) * pe,
+                (last.oy * ixx) * po + (last.ey * iyx) * pe, (last.oy * ixy) * po + (last.ey * iyy) * pe});
   }
   const GaussNodes& nodes = gauss8_nodes(mesh);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
@@ -109,7 +110,7 @@ Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const 
   column.sample(ends, face);
   const Mat2<S> first = modes(face[0], ray.kx, ray.ky).fields, last = modes(face[1], ray.kx, ray.ky).fields;
   const Mat2<S> middle{exp(phase_o), Complex<S>(), Complex<S>(), exp(phase_e)};
-  return last * middle * inverse(first);
+  return checked_transfer(kInfo, last * middle * inverse(first));
 }
 
 template <class S>

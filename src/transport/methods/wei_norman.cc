@@ -214,9 +214,10 @@ Mat2<double> layer_transfer(const LayerMedium<double>& m, const Ray<double>& ray
 template <class S>
 Mat2<S> transfer_of(const MethodInfo& info, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
                     const WeiNormanForm& form) {
-  return transfer_by_lanes(
-      info, column, ray, mesh, [&](auto from, auto to) { return sample_layer(column, from, to, form, false); },
-      [&](const auto& medium, int l, const Ray<double>& one) { return layer_transfer(lane_of(medium, l), one, form); });
+  return checked_transfer(
+      info, transfer_by_lanes(
+                info, column, ray, mesh, [&](auto from, auto to) { return sample_layer(column, from, to, form, false); },
+                [&](const auto& medium, int l, const Ray<double>& one) { return layer_transfer(lane_of(medium, l), one, form); }));
 }
 
 }  // namespace
