@@ -43,12 +43,15 @@ struct MethodChart {
 /// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.
 MethodChart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
 
-/// One method asked for 1e-6 (the two wei_norman: 1e-3) at one place of a sweep into a trap.
+/// One method asked for 1e-6 (wei_norman: 1e-3) at one place of a sweep into a trap; in the sweeps of polarizers a planned
+/// picture asked for 1e-4.
 struct StressPoint {
   std::string sweep;
   double value = 0;
   std::string method;
-  double error = 0;     ///< relative, Frobenius; not a number where flagged or the truth itself is not known
+  /// Relative, Frobenius (pictures: worst pixel, infinite where negative); not a number where flagged or where the truth
+  /// itself is not known.
+  double error = 0;
   double estimate = 0;  ///< what the method says of its error; infinite where flagged
   double samples = 0;   ///< of the medium
   std::string flag;     ///< why its answer must not be used; empty = it stands by the estimate

@@ -30,14 +30,18 @@ std::string table(const std::vector<StressPoint>& points) {
   return text;
 }
 
+/// Whole pictures are in the table only.
+bool of_picture(const StressPoint& p) { return p.method.find(" of a ") != std::string::npos; }
+
 /// A square for every place and method: its error where it answers, grey where it says that it cannot.
 std::string script(const std::vector<StressPoint>& points, const std::string& svg) {
   std::vector<std::string> places, names;
   for (const StressPoint& p : points)
-    if (std::find(names.begin(), names.end(), p.method) == names.end()) names.push_back(p.method);
+    if (!of_picture(p) && std::find(names.begin(), names.end(), p.method) == names.end()) names.push_back(p.method);
   std::string answered, flagged, ticks;
   std::string sweep;
   for (const StressPoint& p : points) {
+    if (of_picture(p)) continue;
     const std::string place = fmt::format("{} {:g}", p.sweep, p.value);
     if (places.empty() || places.back() != place) {
       places.push_back(place);

@@ -24,15 +24,19 @@ double rounding(int steps) { return 4e-16 * (16 + steps); }
 Answer refused(const std::string& why, double samples) {
   return {Mat2<double>::identity(), std::numeric_limits<double>::infinity(), samples, why};
 }
+Mat2<double> response(const TransportMethod<double>& method, const Question& q, const Mesh& mesh) {
+  return q.host_index > 0 ? method.transmission(q.column, q.ray, mesh, q.host_index) : method.transfer(q.column, q.ray, mesh);
+}
 
 }  // namespace
 
-Answer by_halving(const TransportMethod<double>& method, const Column<double>& column, const Ray<double>& ray, double tolerance, int most) {
-  const CountingColumn<double> counted(column);
+Answer by_halving(const TransportMethod<double>& method, const Question& question, double tolerance, int most) {
+  const CountingColumn<double> counted(question.column);
+  const Question asked{counted, question.ray, question.host_index};
   // Steps too long for the method are refused by the method: no answer yet.
   const auto with_steps = [&](int n) {
     try {
-      return method.transfer(counted, ray, uniform_mesh(n, column.breaks));
+      return response(method, asked, uniform_mesh(n, counted.breaks));
     } catch (const std::domain_error&) {
       return Mat2<double>{std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
     }
@@ -52,8 +56,10 @@ Answer by_halving(const TransportMethod<double>& method, const Column<double>& c
   return refused("has not converged in " + std::to_string(most) + " steps", counted.count());
 }
 
-Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance) {
-  Answer answer = by_halving(Diagonal<double>(), column, ray, tolerance, 1024);
+Answer diagonal_answer(const Question& question, double tolerance) {
+  const Column<double>& column = question.column;
+  const Ray<double>& ray = question.ray;
+  Answer answer = by_halving(Diagonal<double>(), question, tolerance, 1024);
   if (!answer.flag.empty()) return answer;
   const auto at = [&](double u) {
     OpticalPoint<double> p;
@@ -88,7 +94,8 @@ Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, dou
   return answer;
 }
 
-Answer wei_norman_answer(bool exponential, int order, const Column<double>& column, const Ray<double>& ray, double tolerance) {
+Answer wei_norman_answer(bool exponential, int order, const Question& question, double tolerance) {
+  const Column<double>& column = question.column;
   const WeiNorman<double> paper(order);
   const WeiNormanExp<double> improved(order);
   const TransportMethod<double>& method = exponential ? static_cast<const TransportMethod<double>&>(improved) : paper;
@@ -100,10 +107,10 @@ Answer wei_norman_answer(bool exponential, int order, const Column<double>& colu
     const Mesh mesh = uniform_mesh(n, column.breaks);
     samples += static_cast<double>(mesh.size() - 1);  // one series a layer
     try {
-      const WeiNormanReport report = wei_norman_report(column, ray, mesh, form);
+      const WeiNormanReport report = wei_norman_report(column, question.ray, mesh, form);
       Mat2<double> now{std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
       try {
-        now = method.transfer(column, ray, mesh);
+        now = response(method, question, mesh);
       } catch (const std::domain_error&) {  // layers too thick: the report says so too
       }
       const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
@@ -120,11 +127,12 @@ Answer wei_norman_answer(bool exponential, int order, const Column<double>& colu
   return refused("no number of layers up to 256 is within the tolerance by its own report", samples);
 }
 
-Answer ode_answer(bool scalar, const Column<double>& column, const Ray<double>& ray, double tolerance) {
-  const CountingColumn<double> counted(column);
+Answer ode_answer(bool scalar, const Question& question, double tolerance) {
+  const CountingColumn<double> counted(question.column);
+  const Question asked{counted, question.ray, question.host_index};
   const auto at = [&](double local) {
-    return scalar ? OdeScalar<double>(local).transfer(counted, ray, uniform_mesh(2, column.breaks))
-                  : OdeOperator(local).transfer(counted, ray, uniform_mesh(2, column.breaks));
+    const Mesh mesh = uniform_mesh(2, counted.breaks);
+    return scalar ? response(OdeScalar<double>(local), asked, mesh) : response(OdeOperator(local), asked, mesh);
   };
   try {
     // Local errors add up along the phase: ask for a hundredth, and compare with a tenth of that.

@@ -71,7 +71,9 @@ Mat2<S> step_of_medium(const Column<S>& column, const Ray<S>& ray, const Mesh& m
   if (!column.jumps || node == 0 || node + 1 >= mesh.size() ||
       !std::binary_search(column.breaks.begin(), column.breaks.end(), mesh[node]))
     return Mat2<S>::identity();
-  const double sides[2] = {mesh[node] - 1e-12, mesh[node] + 1e-12};
+  // A hair to either side, and never across the next node: a sub-layer may be thinner than a hair.
+  const double hair = std::min({1e-12, 0.5 * (mesh[node] - mesh[node - 1]), 0.5 * (mesh[node + 1] - mesh[node])});
+  const double sides[2] = {mesh[node] - hair, mesh[node] + hair};
   OpticalPoint<S> p[2];
   column.sample(sides, p);
   return step_factor(one_way(p[0], ray.kx, ray.ky).admittance, one_way(p[0], ray.kx, ray.ky, -1.0).admittance,
