@@ -24,8 +24,8 @@ struct RenderPlan {
   double cost_seconds = 0;          ///< expected for one image without derivatives, one thread
 
   // The numerical choices themselves.
-  int steps = 1;                    ///< equal mesh steps in u (diagonal: 8 Gauss nodes each); 0 = use `mesh`
-  std::vector<double> mesh;         ///< adapted mesh in u
+  int steps = 1;                    ///< equal mesh steps in u (diagonal: Gauss nodes)
+  std::vector<double> mesh;         ///< adapted mesh in u, instead of `steps` where not empty
   int radial_panels = 0;            ///< droplets: panels of the table over the radius; 0 = one ray a point
   /// Pixels with one sample: the mean of mean + amplitude cos(phase) in closed form from one ray a pixel and its
   /// neighbours' (plates), instead of the point value's correction.

@@ -18,7 +18,8 @@ struct ModalTransfer {
 };
 
 /// One phase integral per mode of the local eigenframe, with the factors that keep its flux (or, e_only, its E):
-/// 8 Gauss-Legendre nodes in every mesh step. What it leaves out is the coupling between the modes: none where the
+/// one Gauss-Legendre rule over each piece between breaks, of as many nodes as the mesh has steps there (where the
+/// nodes of the mesh lie does not matter). What it leaves out is the coupling between the modes: none where the
 /// axis stays in one plane through the ray, ~ coupling/(k0 (q_e - q_o)) where it turns slowly.
 template <class S>
 class Diagonal final : public TransportMethod<S> {

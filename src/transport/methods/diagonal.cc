@@ -5,7 +5,7 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"diagonal", 0, true, false, "one phase integral per local mode, 8 Gauss nodes a step, flux factors",
+constexpr MethodInfo kInfo{"diagonal", 0, true, false, "one phase integral per local mode, Gauss nodes as many as steps, flux factors",
                            "Born & Wolf 15; flux factors: docs/methods.md"};
 
 template <class S>
@@ -44,7 +44,7 @@ const MethodInfo& Diagonal<S>::info() const {
 // but the two phases is left between the faces.
 template <class S>
 ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
-  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
   points.resize(u.size());
@@ -80,7 +80,7 @@ Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const 
         kInfo, {(last.ox * ixx) * po + (last.ex * iyx) * pe, (last.ox * ixy) * po + (last.ex * iyy) * pe,
                 (last.oy * ixx) * po + (last.ey * iyx) * pe, (last.oy * ixy) * po + (last.ey * iyy) * pe});
   }
-  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<Slope<S>>> points;
   points.resize(u.size());
@@ -115,7 +115,7 @@ Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const 
 
 template <class S>
 Su2<S> Diagonal<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
   points.resize(u.size());
