@@ -25,8 +25,8 @@ struct RenderPlan {
   double cost_seconds = 0;          ///< expected for one image without derivatives, one thread
 
   // The numerical choices themselves.
-  int steps = 1;                    ///< equal mesh steps in u (diagonal: 8 Gauss nodes each); 0 = use `mesh`
-  std::vector<double> mesh;         ///< adapted mesh in u
+  int steps = 1;                    ///< equal mesh steps in u (diagonal: Gauss nodes)
+  std::vector<double> mesh;         ///< adapted mesh in u, instead of `steps` where not empty
   int radial_panels = 0;            ///< droplets: panels of the table over the radius; 0 = one ray a point
   int centre_panels = 0;            ///< of its innermost part
   /// Pixels with one sample: the mean of a fringe in closed form from one ray a pixel and its

@@ -11,7 +11,7 @@ namespace birefit {
 /// (ChartScene::reference_agreement); not a number where a method does not offer the quantity.
 struct ChartPoint {
   std::string scene, method;
-  std::string effort;          ///< "n=64" steps, panels or layers; "tol=1e-6" of an adaptive solver
+  std::string effort;          ///< "n=64" steps, panels or layers (" order=3": series shorter or longer than the usual 7); "tol=1e-6" of an adaptive solver
   double seconds = 0;          ///< one ray in plain doubles
   double seconds_in_lanes = 0; ///< one ray of a full pack of them
   double samples = 0;          ///< of the medium, per ray
@@ -43,12 +43,15 @@ struct MethodChart {
 /// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.
 MethodChart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
 
-/// One method asked for 1e-6 (the two wei_norman: 1e-3) at one place of a sweep into a trap.
+/// One method asked for 1e-6 (wei_norman: 1e-3) at one place of a sweep into a trap; in the sweeps of polarizers a planned
+/// picture asked for 1e-4.
 struct StressPoint {
   std::string sweep;
   double value = 0;
   std::string method;
-  double error = 0;     ///< relative, Frobenius; not a number where flagged or the truth itself is not known
+  /// Relative, Frobenius (pictures: worst pixel, infinite where negative); not a number where flagged or where the truth
+  /// itself is not known.
+  double error = 0;
   double estimate = 0;  ///< what the method says of its error; infinite where flagged
   double samples = 0;   ///< of the medium
   std::string flag;     ///< why its answer must not be used; empty = it stands by the estimate

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <set>
 
@@ -54,12 +55,17 @@ std::string rays_script(const MethodChart& chart, const std::string& svg) {
   for (const ChartScene& scene : chart.scenes) {
     std::string plot, data;
     for (std::size_t m = 0; m < std::size(kChartedMethods); ++m) {
-      std::string block;
+      // A line for each length of series.
+      std::map<std::string, std::string> lines;
       for (const ChartPoint& p : chart.points) {
         const double seconds = std::isfinite(p.seconds_in_lanes) ? p.seconds_in_lanes : p.seconds;
-        if (p.scene == scene.name && p.method == kChartedMethods[m] && std::isfinite(p.intensity_error) && p.intensity_error < 2)
-          block += fmt::format("{:.6g} {:.6g}\n", std::max(p.intensity_error, 1e-14), 1e6 * seconds);
+        if (p.scene == scene.name && p.method == kChartedMethods[m] && std::isfinite(p.intensity_error) && p.intensity_error < 2) {
+          const std::size_t order = p.effort.find(' ');
+          lines[order == std::string::npos ? "" : p.effort.substr(order)] += fmt::format("{:.6g} {:.6g}\n", std::max(p.intensity_error, 1e-14), 1e6 * seconds);
+        }
       }
+      std::string block;
+      for (const auto& [order, line] : lines) block += (block.empty() ? "" : "\n") + line;
       if (block.empty()) continue;
       data += fmt::format("$d{} << EOD\n{}EOD\n", m, block);
       plot += fmt::format("{}$d{} with linespoints lw 1.6 pt 7 ps 0.45 lc rgb '{}'", plot.empty() ? "" : ", ", m, kColours[m]);

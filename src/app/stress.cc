@@ -1,5 +1,6 @@
 // birefit stress: sweeps into the places where transport methods fail, as a table and a picture.
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -29,34 +30,38 @@ std::string table(const std::vector<StressPoint>& points) {
   return text;
 }
 
+/// Whole pictures are in the table only.
+bool of_picture(const StressPoint& p) { return p.method.find(" of a ") != std::string::npos; }
+
 /// A square for every place and method: its error where it answers, grey where it says that it cannot.
 std::string script(const std::vector<StressPoint>& points, const std::string& svg) {
-  std::vector<std::string> places;
+  std::vector<std::string> places, names;
+  for (const StressPoint& p : points)
+    if (!of_picture(p) && std::find(names.begin(), names.end(), p.method) == names.end()) names.push_back(p.method);
   std::string answered, flagged, ticks;
   std::string sweep;
   for (const StressPoint& p : points) {
+    if (of_picture(p)) continue;
     const std::string place = fmt::format("{} {:g}", p.sweep, p.value);
     if (places.empty() || places.back() != place) {
       places.push_back(place);
       ticks += fmt::format("{}'{}' {}", ticks.empty() ? "" : ", ", p.sweep == sweep ? fmt::format("{:g}", p.value) : place, places.size() - 1);
       sweep = p.sweep;
     }
-    std::size_t m = 0;
-    while (m < std::size(kChartedMethods) && p.method != kChartedMethods[m]) ++m;
-    if (m == std::size(kChartedMethods)) continue;
+    const auto m = std::find(names.begin(), names.end(), p.method) - names.begin();
     if (!p.flag.empty()) flagged += fmt::format("{} {}\n", m, places.size() - 1);
     else if (std::isfinite(p.error)) answered += fmt::format("{} {} {:.3g}\n", m, places.size() - 1, std::log10(std::max(p.error, 1e-14)));
   }
   std::string methods;
-  for (std::size_t m = 0; m < std::size(kChartedMethods); ++m) methods += fmt::format("{}'{}' {}", m ? ", " : "", kChartedMethods[m], m);
+  for (std::size_t m = 0; m < names.size(); ++m) methods += fmt::format("{}'{}' {}", m ? ", " : "", names[m], m);
   return fmt::format(
       "set terminal svg size 900,{} dynamic font 'sans,12' background rgb 'white'\nset output {}\n$a << EOD\n{}EOD\n$f << EOD\n{}EOD\n"
       "set yrange [{}:-0.5]\nset xrange [-0.5:{}]\nset ytics noenhanced ({})\nset x2range [-0.5:{}]\nset x2tics noenhanced rotate by 30 ({})\nunset xtics\nunset key\n"
       "set lmargin 26\nset tmargin 6\nset cbrange [-14:-2]\nset palette defined (-14 '#0072B2', -9 '#56B4E9', -6 '#009E73', -4 '#F0E442', -2 '#D55E00')\n"
       "set cblabel 'log_{{10}} of the error; grey: flagged by the method itself'\n"
       "plot $f using 1:2 with points pt 5 ps 0.9 lc rgb '#cccccc', $a using 1:2:3 with points pt 5 ps 0.9 lc palette\n",
-      120 + 17 * places.size(), svg, answered, flagged, static_cast<double>(places.size()) - 0.5, std::size(kChartedMethods) - 0.5, ticks,
-      std::size(kChartedMethods) - 0.5, methods);
+      120 + 17 * places.size(), svg, answered, flagged, static_cast<double>(places.size()) - 0.5, static_cast<double>(names.size()) - 0.5, ticks,
+      static_cast<double>(names.size()) - 0.5, methods);
 }
 
 int run_stress(const Arguments& arguments) {

@@ -3,14 +3,18 @@
 // at Taylor::variable(u0) returns its own Taylor coefficients about u0, to rounding, with no difference quotient.
 // Recurrences: Knuth, The Art of Computer Programming 2, 4.7; Griewank & Walther, Evaluating Derivatives, 13.2.
 
+#include <algorithm>
+
 #include "core/scalar.h"
 
 namespace birefit {
 
-/// c[0] + c[1] x + .. + c[N] x^N over any base scalar B; terms beyond x^N are dropped.
+/// c[0] + c[1] x + .. + c[order] x^order over any base scalar B, order <= N; terms beyond are dropped. Work grows with
+/// order^2, so a short series costs what it is worth. A constant has order 0 and takes the order of what it meets.
 template <class B, int N>
 struct Taylor {
-  std::array<B, N + 1> c;
+  std::array<B, N + 1> c;  ///< 0 beyond the order
+  int order = 0;
 
   Taylor() : Taylor(B(0.0)) {}
   Taylor(const B& v) {  // NOLINT: constants mix freely with series
@@ -20,17 +24,22 @@ struct Taylor {
   template <class T>
   requires(std::is_arithmetic_v<T> && !std::is_same_v<T, B>) Taylor(T v)
       : Taylor(B(static_cast<double>(v))) {}  // NOLINT
+  static Taylor of_order(int order, const B& v = B(0.0)) {
+    Taylor r(v);
+    r.order = order;
+    return r;
+  }
   /// at + x
-  static Taylor variable(const B& at) {
-    Taylor r(at);
+  static Taylor variable(const B& at, int order = N) {
+    Taylor r = of_order(order, at);
     r.c[1] = B(1.0);
     return r;
   }
   /// The sum at x.
   template <class X>
   X operator()(const X& x) const {
-    X sum(c[N]);
-    for (int k = N - 1; k >= 0; --k) sum = sum * x + X(c[k]);
+    X sum(c[order]);
+    for (int k = order - 1; k >= 0; --k) sum = sum * x + X(c[k]);
     return sum;
   }
 
@@ -39,48 +48,42 @@ struct Taylor {
   Taylor& operator*=(const Taylor& o) { return *this = *this * o; }
 
   friend Taylor operator+(const Taylor& a, const Taylor& b) {
-    Taylor r;
-    for (int k = 0; k <= N; ++k) r.c[k] = a.c[k] + b.c[k];
+    Taylor r = of_order(std::max(a.order, b.order));
+    for (int k = 0; k <= r.order; ++k) r.c[k] = a.c[k] + b.c[k];
     return r;
   }
   friend Taylor operator-(const Taylor& a, const Taylor& b) {
-    Taylor r;
-    for (int k = 0; k <= N; ++k) r.c[k] = a.c[k] - b.c[k];
+    Taylor r = of_order(std::max(a.order, b.order));
+    for (int k = 0; k <= r.order; ++k) r.c[k] = a.c[k] - b.c[k];
     return r;
   }
   friend Taylor operator-(const Taylor& a) {
-    Taylor r;
-    for (int k = 0; k <= N; ++k) r.c[k] = -a.c[k];
+    Taylor r = of_order(a.order);
+    for (int k = 0; k <= r.order; ++k) r.c[k] = -a.c[k];
     return r;
   }
   friend Taylor operator*(const Taylor& a, const Taylor& b) {
-    Taylor r;
-    for (int k = 0; k <= N; ++k)
-      for (int j = 0; j <= k; ++j) r.c[k] = r.c[k] + a.c[j] * b.c[k - j];
+    Taylor r = of_order(std::max(a.order, b.order));
+    for (int k = 0; k <= r.order; ++k) {
+      B sum(0.0);
+      for (int j = std::max(0, k - b.order), last = std::min(k, a.order); j <= last; ++j) sum = sum + a.c[j] * b.c[k - j];
+      r.c[k] = sum;
+    }
     return r;
   }
   friend Taylor operator/(const Taylor& a, const Taylor& b) {
-    Taylor r;
+    Taylor r = of_order(std::max(a.order, b.order));
     const B f = inverse(b.c[0]);
-    for (int k = 0; k <= N; ++k) {
+    for (int k = 0; k <= r.order; ++k) {
       B rest = a.c[k];
-      for (int j = 1; j <= k; ++j) rest = rest - b.c[j] * r.c[k - j];
+      for (int j = 1, last = std::min(k, b.order); j <= last; ++j) rest = rest - b.c[j] * r.c[k - j];
       r.c[k] = rest * f;
     }
     return r;
   }
-  // Constants without the work of a full series.
-  friend Taylor operator+(const Taylor& a, double b) {
-    Taylor r = a;
-    r.c[0] = r.c[0] + B(b);
-    return r;
-  }
-  friend Taylor operator+(double a, const Taylor& b) { return b + a; }
-  friend Taylor operator-(const Taylor& a, double b) { return a + (-b); }
-  friend Taylor operator-(double a, const Taylor& b) { return -b + a; }
   friend Taylor operator*(const Taylor& a, double b) {
-    Taylor r;
-    for (int k = 0; k <= N; ++k) r.c[k] = a.c[k] * B(b);
+    Taylor r = of_order(a.order);
+    for (int k = 0; k <= r.order; ++k) r.c[k] = a.c[k] * B(b);
     return r;
   }
   friend Taylor operator*(double a, const Taylor& b) { return b * a; }
@@ -99,8 +102,8 @@ PlainOf<B> plain(const Taylor<B, N>& x) {
 }
 template <class C, class B, int N>
 Taylor<B, N> select(const C& condition, const Taylor<B, N>& a, const Taylor<B, N>& b) {
-  Taylor<B, N> r;
-  for (int k = 0; k <= N; ++k) r.c[k] = select(condition, a.c[k], b.c[k]);
+  Taylor<B, N> r = Taylor<B, N>::of_order(std::max(a.order, b.order));
+  for (int k = 0; k <= r.order; ++k) r.c[k] = select(condition, a.c[k], b.c[k]);
   return r;
 }
 template <class B, int N>
@@ -112,27 +115,27 @@ Taylor<B, N> max_of(const Taylor<B, N>& a, const Taylor<B, N>& b) {
   return select(plain(a) > plain(b), a, b);
 }
 
-/// d/dx; the coefficient of x^N is lost (0).
+/// d/dx; the coefficient of x^order is lost (0).
 template <class B, int N>
 Taylor<B, N> derivative(const Taylor<B, N>& x) {
-  Taylor<B, N> r;
-  for (int k = 0; k < N; ++k) r.c[k] = x.c[k + 1] * B(k + 1.0);
+  Taylor<B, N> r = Taylor<B, N>::of_order(x.order);
+  for (int k = 0; k < r.order; ++k) r.c[k] = x.c[k + 1] * B(k + 1.0);
   return r;
 }
-/// Integral from 0 to x.
+/// Integral from 0 to x, of the same order: a bare constant must be given its order first.
 template <class B, int N>
 Taylor<B, N> integral(const Taylor<B, N>& x) {
-  Taylor<B, N> r;
-  for (int k = 0; k < N; ++k) r.c[k + 1] = x.c[k] * B(1.0 / (k + 1));
+  Taylor<B, N> r = Taylor<B, N>::of_order(x.order);
+  for (int k = 0; k < r.order; ++k) r.c[k + 1] = x.c[k] * B(1.0 / (k + 1));
   return r;
 }
 
 // Each recurrence below compares coefficients in the differential equation of its function.
 template <class B, int N>
 Taylor<B, N> sqrt(const Taylor<B, N>& x) {  // r r = x
-  Taylor<B, N> r(sqrt(x.c[0]));
+  Taylor<B, N> r = Taylor<B, N>::of_order(x.order, sqrt(x.c[0]));
   const B half = B(0.5) * inverse(r.c[0]);
-  for (int k = 1; k <= N; ++k) {
+  for (int k = 1; k <= x.order; ++k) {
     B rest = x.c[k];
     for (int j = 1; j < k; ++j) rest = rest - r.c[j] * r.c[k - j];
     r.c[k] = rest * half;
@@ -153,8 +156,8 @@ Taylor<B, N> inverse_root(const Taylor<B, N>& x) {
 }
 template <class B, int N>
 Taylor<B, N> exp(const Taylor<B, N>& x) {  // r' = x' r
-  Taylor<B, N> r(exp(x.c[0]));
-  for (int k = 1; k <= N; ++k) {
+  Taylor<B, N> r = Taylor<B, N>::of_order(x.order, exp(x.c[0]));
+  for (int k = 1; k <= x.order; ++k) {
     B sum(0.0);
     for (int j = 1; j <= k; ++j) sum = sum + B(double(j) / k) * x.c[j] * r.c[k - j];
     r.c[k] = sum;
@@ -176,8 +179,9 @@ template <class B, int N>
 void sin_cos(const Taylor<B, N>& x, Taylor<B, N>& s, Taylor<B, N>& c) {  // s' = x' c, c' = -x' s
   B s0, c0;
   sin_cos(x.c[0], s0, c0);
-  Taylor<B, N> sine(s0), cosine(c0);  // x may be s or c
-  for (int k = 1; k <= N; ++k)
+  const int order = x.order;
+  Taylor<B, N> sine = Taylor<B, N>::of_order(order, s0), cosine = Taylor<B, N>::of_order(order, c0);  // x may be s or c
+  for (int k = 1; k <= x.order; ++k)
     for (int j = 1; j <= k; ++j) {
       const B step = B(double(j) / k) * x.c[j];
       sine.c[k] = sine.c[k] + step * cosine.c[k - j];

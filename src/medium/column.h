@@ -46,9 +46,9 @@ class Column {
   virtual void sample(std::span<const double> u, OpticalPoint<S>* out) const = 0;
   /// The same with d/du of every field in .d[0].
   virtual void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const = 0;
-  /// The Taylor series of every field about u, in powers of u. Only columns made of a law know it, and only for scalars
-  /// with kHasSeries; others throw std::logic_error.
-  virtual void sample_taylor(double, OpticalPoint<Series<S>>*) const {
+  /// The Taylor series of every field about u, in powers of u up to `order` <= kTaylorOrder + 1. Only columns made of a law
+  /// know it, and only for scalars with kHasSeries; others throw std::logic_error.
+  virtual void sample_taylor(double, int, OpticalPoint<Series<S>>*) const {
     throw std::logic_error("this column has no Taylor series");
   }
 
@@ -76,11 +76,15 @@ class LawColumn final : public Column<S> {
       ::new (static_cast<void*>(out + i)) OpticalPoint<Slope<S>>(law_.template at<Slope<S>>(x));
     }
   }
-  void sample_taylor(double u, OpticalPoint<Series<S>>* out) const override {
-    if constexpr (kHasSeries<S>)
-      *out = law_.template at<Series<S>>(Series<S>::variable(S(u)));
-    else
-      Column<S>::sample_taylor(u, out);
+  void sample_taylor(double u, int order, OpticalPoint<Series<S>>* out) const override {
+    if constexpr (kHasSeries<S>) {
+      *out = law_.template at<Series<S>>(Series<S>::variable(S(u), order));
+      for (Series<S>* x : {&out->axis.x, &out->axis.y, &out->axis.z, &out->ordinary, &out->extraordinary, &out->ordinary_im,
+                           &out->extraordinary_im, &out->depth_slope_um})
+        x->order = order;  // constants too: they may be integrated
+    } else {
+      Column<S>::sample_taylor(u, order, out);
+    }
   }
   Law& law() { return law_; }
 
@@ -106,7 +110,7 @@ class CachedColumn final : public Column<S> {
   void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
     serve(u, out, slopes_, [&](auto* p) { column_->sample_with_slope(u, p); });
   }
-  void sample_taylor(double u, OpticalPoint<Series<S>>* out) const override { column_->sample_taylor(u, out); }
+  void sample_taylor(double u, int order, OpticalPoint<Series<S>>* out) const override { column_->sample_taylor(u, order, out); }
 
  private:
   template <class P>

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -11,6 +12,7 @@
 #include "medium/build.h"
 #include "render/droplet.h"
 #include "render/fringe_table.h"
+#include "render/pilots.h"
 #include "render/planar.h"
 #include "render/sampling.h"
 #include "transport/methods.h"
@@ -19,22 +21,6 @@ namespace birefit {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-// ---- what pilots compare ----------------------------------------------------------------------------------------------
-
-/// Largest error of any polarizer-analyser intensity that two retarders can differ by: 2 |difference|.
-double intensity_distance(const Su2<double>& a, const Su2<double>& b) {
-  return 2 * std::sqrt(square(a.w - b.w) + square(a.x - b.x) + square(a.y - b.y) + square(a.z - b.z));
-}
-/// The same for Jones matrices, whose common phase does not matter.
-double intensity_distance(const Mat2<double>& a, const Mat2<double>& b) {
-  // Align the common phase by the inner product.
-  const Complex<double> inner = conj(a.a) * b.a + conj(a.b) * b.b + conj(a.c) * b.c + conj(a.d) * b.d;
-  const double modulus = std::sqrt(norm(inner));
-  const Complex<double> turn = modulus > 0 ? Complex<double>(inner.re / modulus, -inner.im / modulus) : Complex<double>(1.0);
-  const Mat2<double> d = turn * b - a;
-  return 2 * std::sqrt(norm(d.a) + norm(d.b) + norm(d.c) + norm(d.d)) / std::sqrt(2.0);
-}
 
 std::string sci(double x) { return fmt::format("{:.1e}", x); }
 
@@ -46,9 +32,12 @@ int choose(const std::vector<int>& candidates, double target, const std::functio
   }
   return candidates.back();
 }
-const std::vector<int> kPanels{1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128};
-// Even, so that the middle of a droplet's chord is a node.
-const std::vector<int> kSteps{4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28, 32, 40, 48, 64, 80, 96, 128, 192, 256, 384, 512, 1024, 2048, 4096, 8192};
+const std::vector<int> kSteps{1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28, 32, 40, 48, 64, 80, 96, 128, 192, 256, 384, 512, 1024, 2048, 4096, 8192};
+
+/// "12 steps", or Gauss nodes.
+std::string effort_text(const std::string& method, int steps) {
+  return fmt::format("{} {}", steps, method == "diagonal" ? "Gauss nodes" : "steps");
+}
 
 void check_method(const Scene& scene) {
   if (scene.method == "auto") return;
@@ -59,6 +48,9 @@ void check_method(const Scene& scene) {
   if ((scene.method == "berreman") != (scene.ceiling == Ceiling::reflections))
     throw UserError(Where{}, fmt::format("transport method '{}' and this physics.ceiling exclude each other", scene.method),
                     "berreman computes all reflections and belongs to ceiling: reflections; leave transport.method at auto");
+  if (scene.method == "modal" && std::holds_alternative<Droplet>(scene.sample))
+    throw UserError(Where{}, "transport method 'modal' is for cells, slabs and plates: in a droplet the axis passes every ray's wavevector",
+                    "leave transport.method at auto");
 }
 
 // ---- what no method here models ------------------------------------------------------------------------------------------
@@ -180,47 +172,24 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
   const bool twisted = static_cast<bool>(droplet.director.twist_deg);
-  const std::vector<double> pilots{0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97};
-  std::vector<DropletRay<double>> rays;
-  for (double f : pilots) rays.push_back(trace(o, rim, f * rim.rho_max() * o.radius_um));
-
-  const auto worst = [&](const std::string& method, const Mesh& mesh) {
-    const Magnus4<double> reference;
-    double error = 0;
-    for (const DropletRay<double>& r : rays) {
-      const Mesh fine = uniform_mesh(twisted ? 1024 : 512);
-      const Su2<double> exact = droplet_retarder<double>(o, r, reference, fine, twisted);
-      error = std::max(error, intensity_distance(exact, droplet_retarder(o, r, transport_method<double>(method), mesh, twisted)));
-    }
-    return error;
-  };
-  plan.method = scene.method != "auto" ? scene.method : twisted ? "magnus4" : "diagonal";
-  if (plan.method == "diagonal" && twisted)
+  if (scene.method == "diagonal" && twisted)
     throw UserError(Where{}, "transport.method: diagonal cannot do a twisted director, its modes are coupled",
                     "use auto or magnus4");
-  const auto& candidates = plan.method == "diagonal" ? kPanels : kSteps;
-  // intensity_distance is an upper bound: no further margin.
-  plan.steps = choose(candidates, scene.intensity_accuracy,
-                      [&](int n) { return worst(plan.method, uniform_mesh(n)); }, plan.numerical_error);
-  if (scene.method == "auto" && twisted) {
-    // Order 6 samples the medium three times a step, order 4 twice.
-    double error = 0;
-    const int steps = choose(candidates, scene.intensity_accuracy, [&](int n) { return worst("magnus6", uniform_mesh(n)); }, error);
-    if (3 * steps < 2 * plan.steps && error <= scene.intensity_accuracy) {
-      plan.method = "magnus6";
-      plan.steps = steps;
-      plan.numerical_error = error;
-    }
-  }
+  const Pilots pilots(scene, value);
+  // The measure is an upper bound: no further margin. Twisted, the chord's map has a kink in the middle.
+  const Effort effort = cheapest_effort(pilots, scene.intensity_accuracy, scene.method == "auto" ? "" : scene.method, twisted, "modal");
+  plan.method = effort.method->info().name;
+  plan.steps = effort.steps;
+  plan.numerical_error = effort.error;
   if (scene.method != "auto")
     plan.reasons.push_back(fmt::format("method {} was asked for by name", plan.method));
   else if (twisted)
     plan.reasons.push_back("the twisted director leaves the plane of the ray: modes couple, so the full 2 x 2 transport is needed");
   else
     plan.reasons.push_back("the radial director stays in the meridional plane of every ray: transport is diagonal, one phase integral suffices");
-  plan.reasons.push_back(fmt::format("{} {} hold the intensity to {} on {} pilot rays (asked: {})", plan.steps,
-                                     plan.method == "diagonal" ? "panels of 8 Gauss nodes" : "steps", sci(plan.numerical_error),
-                                     rays.size(), sci(scene.intensity_accuracy)));
+  plan.reasons.push_back(fmt::format("{}: {}, {} samples of the medium a ray, hold the intensity to {} on {} pilot rays (asked: {}); no method needs fewer",
+                                     plan.method, effort_text(plan.method, plan.steps), effort.samples, sci(plan.numerical_error),
+                                     pilots.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
   plan_radial_table(scene, value, plan);
@@ -256,33 +225,11 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
         "birefringence comes out 1 to 7 % low; the error bars do not contain this.",
         size));
   note_illumination(scene, value, largest_phase, plan);
-  plan.cost_seconds = 1e-9 * scene.view.width * scene.view.height * (30 + (plan.method == "diagonal" ? 8 * 12 : 45) * plan.steps);
+  plan.cost_seconds = 1e-9 * scene.view.width * scene.view.height * (30 + (plan.method == "diagonal" ? 12 : 45) * plan.steps);
   return plan;
 }
 
 // ---- cells, plates, slabs ------------------------------------------------------------------------------------------------
-
-std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value) {
-  std::vector<std::pair<double, double>> t;
-  if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
-    const double edge = std::tan(value.radians(*half_angle, 15));
-    // Pixels beyond the inscribed circle, up to the corners of the image.
-    const double corner = std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);
-    t.push_back({0.0, 0.0});
-    for (int i = 0; i < 6; ++i)
-      for (double f : {0.5, corner})
-        t.push_back({f * edge * std::cos(i * kPi / 3 + 0.2), f * edge * std::sin(i * kPi / 3 + 0.2)});
-  } else if (!scene.microscope.directions.empty()) {
-    for (const Direction& d : scene.microscope.directions) {
-      const double f = std::tan(d.theta_deg * kPi / 180), a = d.azimuth_deg * kPi / 180;
-      t.push_back({f * std::cos(a), f * std::sin(a)});
-    }
-    if (t.size() > 12) t.resize(12);
-  } else {
-    t.push_back({0.0, 0.0});
-  }
-  return t;
-}
 
 Ray<double> ray_at(const PlanarOptics<double>& o, double tx, double ty) {
   const double c = 1 / std::sqrt(1 + tx * tx + ty * ty);
@@ -441,14 +388,45 @@ RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, con
   return plan;
 }
 
+bool has_fringes(const Effort& effort) {
+  const std::string name = effort.method->info().name;
+  return name == "diagonal" || name == "modal";
+}
+
+/// Whether the slow solutions of the modes hold in the whole picture, not only on the pilots: where the axis comes near the
+/// wavevector the modes turn too fast for them. What their last pass changes tells.
+bool slow_everywhere(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o, const Effort& effort) {
+  const double tangent = std::tan(value.radians(*cone_half_angle(scene), 15));
+  const double side = std::min(scene.view.width, scene.view.height), wide = scene.view.width / side, high = scene.view.height / side;
+  const Mesh mesh = uniform_mesh(effort.steps, o.column->breaks);
+  constexpr int kAcross = 24, kPasses = Modal<double>::kPasses;
+  const double cx = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1)), cy = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
+  const double right = 2 * (0.5 * (scene.view.width - 1) - cx) / side, up = 2 * (cy - 0.5 * (scene.view.height - 1)) / side;
+  const auto medium = [&](double u) {
+    OpticalPoint<double> p;
+    o.column->sample({&u, 1}, &p);
+    return p;
+  };
+  for (int i = 0; i <= kAcross; ++i)
+    for (int j = 0; j <= kAcross; ++j) {
+      const double tx = tangent * (right + wide * (2.0 * i / kAcross - 1)), ty = tangent * (up + high * (2.0 * j / kAcross - 1));
+      const Ray<double> ray = ray_at(o, tx, ty);
+      if (modes_turn_over(medium, ray, 0, 1, 32)) return false;
+      const Mat2<double> all = together(modal_transfer(*o.column, ray, mesh, kPasses)),
+                         fewer = together(modal_transfer(*o.column, ray, mesh, kPasses - 1));
+      if (!(intensity_distance(all, fewer) <= scene.intensity_accuracy)) return false;
+    }
+  return true;
+}
+
 RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   const PlanarOptics<double> o = planar_optics(scene, value);
-  o.column->freeze();  // adapted meshes ask for thousands of different nodes, each once
+  o.column->freeze();  // no node set comes twice: remembering them would only cost the search
   const auto directions = pilot_directions(scene, value);
   const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
   const bool cone = half_angle.has_value();
-  for (const auto& [tx, ty] : directions) {
+  for (const auto& [tx, ty] : pilot_directions(scene, value, std::numeric_limits<std::size_t>::max())) {
     const Ray<double> ray = ray_at(o, tx, ty);
     std::vector<double> u{0.0, 0.5, 1.0};
     OpticalPoint<double> p[3];
@@ -459,68 +437,47 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
                         "lower the angle of incidence or the surround's index");
   }
   if (scene.ceiling == Ceiling::reflections) return plan_reflections(scene, value, o, directions);
-  // Converged truth on the pilots.
-  const double target = scene.intensity_accuracy / 2;
-  const Magnus4<double> magnus;
-  std::vector<Mat2<double>> truth;
-  Mesh finest;
-  double local_errors = 0;
-  for (const auto& [tx, ty] : directions) {
-    double estimate = 0;
-    const Mesh mesh = adapted_mesh(*o.column, ray_at(o, tx, ty), std::max(target / 20, 1e-13), &estimate);
-    local_errors = std::max(local_errors, estimate);
-    truth.push_back(planar_jones<double>(o, magnus, mesh, tx, ty));
-    if (mesh.size() > finest.size()) finest = mesh;
-  }
-  const auto worst = [&](const TransportMethod<double>& method, const Mesh& mesh) {
-    double error = 0;
-    for (std::size_t i = 0; i < directions.size(); ++i)
-      error = std::max(error, intensity_distance(truth[i], planar_jones(o, method, mesh, directions[i].first, directions[i].second)));
-    return std::isfinite(error) ? error : 1e300;
-  };
+  const double target = scene.intensity_accuracy;
   const bool slab = std::holds_alternative<Slab>(scene.sample);
-  if (scene.method == "auto" || scene.method == "diagonal") {
-    double error = 1e300;
-    int n = 0;
-    if (o.column->planar || scene.method == "diagonal")
-      n = choose(kPanels, target, [&](int k) { return worst(transport_method<double>("diagonal"), uniform_mesh(k, o.column->breaks)); }, error);
-    if (error <= target || scene.method == "diagonal") {
-      plan.method = "diagonal";
-      plan.steps = n;
-      plan.numerical_error = error;
-      plan.reasons.push_back(fmt::format(
-          "mode coupling is below the accuracy: {} panels of 8 Gauss nodes hold the intensity to {} on {} pilot directions (asked: {})",
-          n, sci(error), directions.size(), sci(scene.intensity_accuracy)));
-      if (error > target)
-        plan.warnings.push_back(fmt::format("The diagonal method, asked for by name, errs by {} here.", sci(error)));
+  const Pilots pilots(scene, value);
+  const bool choose_freely = scene.method == "auto";
+  Effort effort = cheapest_effort(pilots, target, choose_freely ? "" : scene.method, false, choose_freely && !cone ? "modal" : "");
+  if (cone && choose_freely && !has_fringes(effort)) {
+    // Pixel means come in closed form from transport in the modes: worth half as many samples again.
+    for (const char* name : {"diagonal", "modal"}) {
+      const Effort modes = cheapest_effort(pilots, target, name, false);
+      if (modes.error <= target && 2 * modes.samples <= 3 * effort.samples) {
+        effort = modes;
+        break;
+      }
     }
   }
-  // Coupling that the phases do not average out: the modes still turn slowly enough for their slow solutions.
-  if (plan.method.empty() && scene.method == "auto" && cone && !o.column->jumps) {
-    double error = 1e300;
-    const int n = choose(kPanels, target, [&](int k) { return worst(transport_method<double>("modal"), uniform_mesh(k, o.column->breaks)); }, error);
-    if (error <= target) {
-      plan.method = "modal";
-      plan.steps = n;
-      plan.numerical_error = error;
-      plan.reasons.push_back(fmt::format(
-          "the modes couple, slowly against their phase: {} panels of 8 Gauss nodes with their coupling hold the intensity to {} on {} pilot "
-          "directions (asked: {})",
-          n, sci(error), directions.size(), sci(scene.intensity_accuracy)));
+  if (cone && choose_freely && effort.method->info().slow_axes && !slow_everywhere(scene, value, o, effort))
+    effort = cheapest_effort(pilots, target, "", false, "modal");
+  plan.method = effort.method->info().name;
+  plan.steps = effort.steps;
+  plan.numerical_error = effort.error;
+  const std::string what = fmt::format("{}: {}, {} samples of the medium a ray, hold the intensity to {} on {} pilot rays (asked: {})", plan.method,
+                                       effort_text(plan.method, plan.steps), effort.samples, sci(effort.error), pilots.size(), sci(scene.intensity_accuracy));
+  if (effort.error > target && scene.method == "auto") {
+    // Steps where they are needed, by their own estimate.
+    double local_errors = 0;
+    for (const auto& [tx, ty] : directions) {
+      double estimate = 0;
+      const Mesh mesh = adapted_mesh(*o.column, ray_at(o, tx, ty), std::max(target / 20, 1e-13), &estimate);
+      local_errors = std::max(local_errors, estimate);
+      if (mesh.size() > plan.mesh.size()) plan.mesh = mesh;
     }
-  }
-  if (plan.method.empty() && scene.method != "auto" && scene.method != "magnus4") {
-    plan.method = scene.method;
-    plan.steps = choose(kSteps, target, [&](int k) { return worst(transport_method<double>(scene.method), uniform_mesh(k, o.column->breaks)); },
-                        plan.numerical_error);
-    plan.reasons.push_back(fmt::format("{} was asked for by name: {} steps err by {}", plan.method, plan.steps, sci(plan.numerical_error)));
-  }
-  if (plan.method.empty()) {
     plan.method = "magnus4";
-    plan.mesh = finest;
     plan.numerical_error = 2 * local_errors;  // of the matrix; an intensity changes by twice that at most
-    plan.reasons.push_back(fmt::format("the axis turns out of the ray's plane: full 2 x 2 transport with {} adapted Magnus-4 steps",
-                                       finest.size() - 1));
+    plan.reasons.push_back(fmt::format("no equal steps hold the accuracy: full 2 x 2 transport with {} adapted Magnus-4 steps", plan.mesh.size() - 1));
+  } else if (effort.error > target) {
+    plan.reasons.push_back(fmt::format("{} was asked for by name: {} err by {}", plan.method, effort_text(plan.method, plan.steps), sci(plan.numerical_error)));
+    plan.warnings.push_back(fmt::format("The {} method, asked for by name, errs by {} here.", plan.method, sci(plan.numerical_error)));
+  } else {
+    plan.reasons.push_back(plan.method == "diagonal" ? "mode coupling is below the accuracy: " + what
+                           : o.column->planar        ? what + "; no method needs fewer"
+                                                     : (plan.method == "modal" ? "the modes couple, slowly against their phase: " : "the axis turns out of the ray's plane: full 2 x 2 transport, ") + what + "; no method needs fewer");
   }
   double largest_phase = 0;
   for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
@@ -567,7 +524,7 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   if (r > 0.01)
     plan.warnings.push_back(fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by up to about {:.2g}.", r, r));
   note_illumination(scene, value, largest_phase, plan);
-  const double per_ray = plan.method == "diagonal" ? 250 + 8.0 * plan.steps * 8 : 400.0 * static_cast<double>(plan.mesh.empty() ? plan.steps : static_cast<int>(plan.mesh.size()));
+  const double per_ray = plan.method == "diagonal" ? 250 + 8.0 * plan.steps : 400.0 * static_cast<double>(plan.mesh.empty() ? plan.steps : static_cast<int>(plan.mesh.size()));
   const double rays = cone ? static_cast<double>(scene.view.width) * scene.view.height * 4 : 1;
   plan.cost_seconds = 1e-9 * rays * per_ray;
   return plan;

@@ -24,16 +24,28 @@ double rounding(int steps) { return 4e-16 * (16 + steps); }
 Answer refused(const std::string& why, double samples) {
   return {Mat2<double>::identity(), std::numeric_limits<double>::infinity(), samples, why};
 }
+Mat2<double> response(const TransportMethod<double>& method, const Question& q, const Mesh& mesh) {
+  return q.host_index > 0 ? method.transmission(q.column, q.ray, mesh, q.host_index) : method.transfer(q.column, q.ray, mesh);
+}
 
 }  // namespace
 
-Answer by_halving(const TransportMethod<double>& method, const Column<double>& column, const Ray<double>& ray, double tolerance, int most) {
-  const CountingColumn<double> counted(column);
+Answer by_halving(const TransportMethod<double>& method, const Question& question, double tolerance, int most) {
+  const CountingColumn<double> counted(question.column);
+  const Question asked{counted, question.ray, question.host_index};
+  // Steps too long for the method are refused by the method: no answer yet.
+  const auto with_steps = [&](int n) {
+    try {
+      return response(method, asked, uniform_mesh(n, counted.breaks));
+    } catch (const std::domain_error&) {
+      return Mat2<double>{std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
+    }
+  };
   const double falls = method.info().order > 0 ? std::exp2(0.5 * method.info().order) : 2;
-  Mat2<double> before = method.transfer(counted, ray, uniform_mesh(16, column.breaks));
+  Mat2<double> before = with_steps(16);
   double last_change = std::numeric_limits<double>::infinity();
   for (int n = 32; n <= most; n *= 2) {
-    const Mat2<double> now = method.transfer(counted, ray, uniform_mesh(n, column.breaks));
+    const Mat2<double> now = with_steps(n);
     const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
     const bool converging = last_change >= falls * change || change < rounding(n);
     // Falling by `falls` a halving from here on, what is left is at most change/(falls - 1).
@@ -44,8 +56,10 @@ Answer by_halving(const TransportMethod<double>& method, const Column<double>& c
   return refused("has not converged in " + std::to_string(most) + " steps", counted.count());
 }
 
-Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance) {
-  Answer answer = by_halving(Diagonal<double>(), column, ray, tolerance, 1024);
+Answer diagonal_answer(const Question& question, double tolerance) {
+  const Column<double>& column = question.column;
+  const Ray<double>& ray = question.ray;
+  Answer answer = by_halving(Diagonal<double>(), question, tolerance, 1024);
   if (!answer.flag.empty()) return answer;
   const auto at = [&](double u) {
     OpticalPoint<double> p;
@@ -80,7 +94,9 @@ Answer diagonal_answer(const Column<double>& column, const Ray<double>& ray, dou
   return answer;
 }
 
-Answer modal_answer(const Column<double>& column, const Ray<double>& ray, double tolerance) {
+Answer modal_answer(const Question& question, double tolerance) {
+  const Column<double>& column = question.column;
+  const Ray<double>& ray = question.ray;
   if (column.jumps) return refused("the medium jumps", 0);
   const CountingColumn<double> counted(column);
   const auto at = [&](double u) {
@@ -93,11 +109,17 @@ Answer modal_answer(const Column<double>& column, const Ray<double>& ray, double
   for (int n = 1; n <= 1024; n *= 2) {
     const Mesh mesh = uniform_mesh(n, column.breaks);
     constexpr int kPasses = Modal<double>::kPasses;
-    const Mat2<double> now = together(modal_transfer(counted, ray, mesh, kPasses));
+    const auto with_passes = [&](const Column<double>& medium, int passes) {
+      try {
+        return response(Modal<double>(passes), {medium, ray, question.host_index}, mesh);
+      } catch (const std::domain_error&) {
+        return Mat2<double>{std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
+      }
+    };
+    const Mat2<double> now = with_passes(counted, kPasses);
     if (n > 1 && finite(now) && finite(before)) {
       const double change = relative_distance(before, now);
-      const Mat2<double> less = together(modal_transfer(column, ray, mesh, kPasses - 1)),
-                         least = together(modal_transfer(column, ray, mesh, kPasses - 2));
+      const Mat2<double> less = with_passes(column, kPasses - 1), least = with_passes(column, kPasses - 2);
       const double last = relative_distance(less, now), one_before = relative_distance(least, less);
       const double estimate = 2 * (change + last) + rounding(n);
       if (estimate <= tolerance && (last < 0.5 * one_before || last < rounding(n))) return {now, estimate, counted.count(), ""};
@@ -107,9 +129,10 @@ Answer modal_answer(const Column<double>& column, const Ray<double>& ray, double
   return refused("its slow solutions do not settle in 1024 panels", counted.count());
 }
 
-Answer wei_norman_answer(bool exponential, const Column<double>& column, const Ray<double>& ray, double tolerance) {
-  const WeiNorman<double> paper;
-  const WeiNormanExp<double> improved;
+Answer wei_norman_answer(bool exponential, int order, const Question& question, double tolerance) {
+  const Column<double>& column = question.column;
+  const WeiNorman<double> paper(order);
+  const WeiNormanExp<double> improved(order);
   const TransportMethod<double>& method = exponential ? static_cast<const TransportMethod<double>&>(improved) : paper;
   const WeiNormanForm form = exponential ? improved.form() : paper.form();
   double samples = 0;
@@ -119,12 +142,17 @@ Answer wei_norman_answer(bool exponential, const Column<double>& column, const R
     const Mesh mesh = uniform_mesh(n, column.breaks);
     samples += static_cast<double>(mesh.size() - 1);  // one series a layer
     try {
-      const WeiNormanReport report = wei_norman_report(column, ray, mesh, form);
-      const Mat2<double> now = method.transfer(column, ray, mesh);
+      const WeiNormanReport report = wei_norman_report(column, question.ray, mesh, form);
+      Mat2<double> now{std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
+      try {
+        now = response(method, question, mesh);
+      } catch (const std::domain_error&) {  // layers too thick: the report says so too
+      }
       const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
       before = now;
-      // The report knows the dropped coupling; what the series leave out shows under halving.
-      const double estimate = 2 * report.estimate + 2 * change + rounding(n);
+      // The report knows the dropped coupling and the ends of the series; the phase of the coupling, which is taken for
+      // quadratic, shows under halving.
+      const double estimate = 2 * (report.estimate + report.truncation + change) + rounding(n);
       if (n > 1 && report.valid && estimate <= tolerance && last_change >= change) return {now, estimate, samples, ""};
       last_change = change;
     } catch (const std::logic_error& error) {
@@ -134,11 +162,12 @@ Answer wei_norman_answer(bool exponential, const Column<double>& column, const R
   return refused("no number of layers up to 256 is within the tolerance by its own report", samples);
 }
 
-Answer ode_answer(bool scalar, const Column<double>& column, const Ray<double>& ray, double tolerance) {
-  const CountingColumn<double> counted(column);
+Answer ode_answer(bool scalar, const Question& question, double tolerance) {
+  const CountingColumn<double> counted(question.column);
+  const Question asked{counted, question.ray, question.host_index};
   const auto at = [&](double local) {
-    return scalar ? OdeScalar<double>(local).transfer(counted, ray, uniform_mesh(2, column.breaks))
-                  : OdeOperator(local).transfer(counted, ray, uniform_mesh(2, column.breaks));
+    const Mesh mesh = uniform_mesh(2, counted.breaks);
+    return scalar ? response(OdeScalar<double>(local), asked, mesh) : response(OdeOperator(local), asked, mesh);
   };
   try {
     // Local errors add up along the phase: ask for a hundredth, and compare with a tenth of that.

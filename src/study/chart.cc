@@ -85,16 +85,16 @@ struct RayBench {
     shift.d[0] = Pack(1.0);
     slopes = ray_column<Dual1>(s.name, shift);
     constexpr int kSteps = 16384;
-    const Mat2<Dual1> exact = Magnus6<Dual1>().transfer(*slopes, ray_of<Dual1>(spec, Continuity::e_only), uniform_mesh(kSteps));
+    const Mat2<Dual1> exact = Magnus6<Dual1>().transfer(*slopes, ray_of<Dual1>(spec, Continuity::e_only), uniform_mesh(kSteps, column->breaks));
     reference = first_lane(exact, false);
     gradient = first_lane(exact, true);
-    agreement = relative(Magnus4<double>().transfer(*column, ray_of<double>(spec, Continuity::e_only), uniform_mesh(4 * kSteps)), reference);
+    agreement = relative(Magnus4<double>().transfer(*column, ray_of<double>(spec, Continuity::e_only), uniform_mesh(4 * kSteps, column->breaks)), reference);
   }
 
   /// A method of the registry: any scalar.
   template <template <class> class Method>
   ChartPoint measure(int n) const {
-    const Mesh mesh = uniform_mesh(n);
+    const Mesh mesh = uniform_mesh(n, column->breaks);
     const Method<double> plain_method{};
     const Ray<double> ray = ray_of<double>(spec, Continuity::e_only);
     const Ray<Pack> ray_lanes = ray_of<Pack>(spec, Continuity::e_only);
@@ -145,9 +145,9 @@ struct RayBench {
 ChartScene describe(const RayBench& bench) {
   ChartScene scene{bench.spec.name, bench.spec.what, bench.agreement, 0, 0, 0};
   const Ray<double> ray = ray_of<double>(bench.spec, Continuity::e_and_h);
-  const ModalTransfer<double> modes = Diagonal<double>::modal(*bench.column, ray, uniform_mesh(64));
+  const ModalTransfer<double> modes = Diagonal<double>::modal(*bench.column, ray, uniform_mesh(64, bench.column->breaks));
   scene.phase_rad = std::abs(modes.log_e.im - modes.log_o.im);
-  const Mesh mesh = uniform_mesh(4096);
+  const Mesh mesh = uniform_mesh(4096, bench.column->breaks);
   const M everything = Berreman<double>().transmission(*bench.column, ray, mesh, bench.spec.host_index);
   const Magnus4<double> method;
   scene.one_way_error = intensity_error(method.transmission(*bench.column, ray, mesh, bench.spec.host_index), everything);
@@ -294,7 +294,7 @@ MethodChart measure_chart(bool quick, const std::function<void(const std::string
     const Ray<double> ray = ray_of<double>(spec, Continuity::e_only);
     const int most = quick ? 256 : 8192;
     for (int n = 4; n <= most; n *= quick ? 4 : 2) {
-      if (n <= 64) chart.points.push_back(bench.measure<Diagonal>(n / 4));
+      if (n <= 64) chart.points.push_back(bench.measure<Diagonal>(n));
       if (n <= 512) chart.points.push_back(bench.measure<Modal>(n / 4));
       chart.points.push_back(bench.measure<Magnus4>(n));
       chart.points.push_back(bench.measure<Magnus6>(n));
@@ -302,16 +302,19 @@ MethodChart measure_chart(bool quick, const std::function<void(const std::string
       chart.points.push_back(bench.measure<LayersEdge>(n));
     }
     for (int n = 1; n <= (quick ? 16 : 1024); n *= 4) {
-      const Mesh mesh = uniform_mesh(n);
+      const Mesh mesh = uniform_mesh(n, bench.column->breaks);
       const std::string effort = fmt::format("n={}", n);
-      chart.points.push_back(bench.value_point(WeiNorman<double>(), ray, mesh, "wei_norman", effort));
-      chart.points.push_back(bench.value_point(WeiNormanExp<double>(), ray, mesh, "wei_norman_exp", effort));
+      for (const int order : {kWeiNormanPaper.order, 3, 11}) {
+        const std::string series = order == kWeiNormanPaper.order ? effort : fmt::format("{} order={}", effort, order);
+        chart.points.push_back(bench.value_point(WeiNorman<double>(order), ray, mesh, "wei_norman", series));
+        chart.points.push_back(bench.value_point(WeiNormanExp<double>(order), ray, mesh, "wei_norman_exp", series));
+      }
     }
     for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
       if (quick && tolerance < 1e-6) break;
       const std::string effort = fmt::format("tol={:g}", tolerance);
-      chart.points.push_back(bench.value_point(OdeOperator(tolerance), ray, uniform_mesh(2), "ode_operator", effort));
-      chart.points.push_back(bench.value_point(OdeScalar<double>(tolerance), ray, uniform_mesh(2), "ode_scalar", effort));
+      chart.points.push_back(bench.value_point(OdeOperator(tolerance), ray, uniform_mesh(2, bench.column->breaks), "ode_operator", effort));
+      chart.points.push_back(bench.value_point(OdeScalar<double>(tolerance), ray, uniform_mesh(2, bench.column->breaks), "ode_scalar", effort));
     }
   }
   if (!quick) measure_frames(chart, say);

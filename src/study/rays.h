@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "medium/counting_column.h"
 #include "medium/families/planar.h"
 #include "medium/families/radial.h"
 #include "transport/method.h"
@@ -74,6 +75,7 @@ std::unique_ptr<Column<S>> ray_column(const std::string& name, const S& shift) {
     auto column = std::make_unique<LawColumn<S, Law>>(Law{law, shift});
     column->planar = planar;
     column->absorbing = absorbing;
+    if constexpr (std::is_same_v<decltype(law), TwistedRadialLaw<S>>) column->breaks = {0.5};  // the chord map's kink
     return column;
   };
   constexpr double kDeg = std::numbers::pi / 180;
@@ -95,30 +97,5 @@ std::unique_ptr<Column<S>> ray_column(const std::string& name, const S& shift) {
   if (name == "twisted_cell") return make(TwistedLaw<S>{S(0.3), S(90 * kDeg), S(0.0), S(1.522 * 1.522), S(1.739 * 1.739), S(5.0)});
   return make(TwistedLaw<S>{S(0.3), S(3600 * kDeg), S(0.0), S(1.52 * 1.52), S(1.74 * 1.74), S(20.0)});
 }
-
-/// Counts how often the medium is asked.
-template <class S>
-class CountingColumn final : public Column<S> {
- public:
-  explicit CountingColumn(const Column<S>& column) : column_(column) {
-    this->absorbing = column.absorbing;
-    this->planar = column.planar;
-    this->breaks = column.breaks;
-    this->jumps = column.jumps;
-  }
-  void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
-    count_ += static_cast<double>(u.size());
-    column_.sample(u, out);
-  }
-  void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
-    count_ += static_cast<double>(u.size());
-    column_.sample_with_slope(u, out);
-  }
-  double count() const { return count_; }
-
- private:
-  const Column<S>& column_;
-  mutable double count_ = 0;
-};
 
 }  // namespace birefit::study

@@ -22,8 +22,8 @@ Dual<double, N> lane_of(const Dual<B, N>& x, int l) {
 }
 template <class B, int N>
 Taylor<double, N> lane_of(const Taylor<B, N>& x, int l) {
-  Taylor<double, N> r;
-  for (int k = 0; k <= N; ++k) r.c[k] = lane(x.c[k], l);
+  Taylor<double, N> r = Taylor<double, N>::of_order(x.order);
+  for (int k = 0; k <= r.order; ++k) r.c[k] = lane(x.c[k], l);
   return r;
 }
 inline double lane_of(double x, int) { return x; }

@@ -1,6 +1,7 @@
 #include "transport/method.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "transport/methods.h"
@@ -36,6 +37,11 @@ const std::vector<std::string>& transport_method_names() {
   return names;
 }
 
+void refuse_transfer(const MethodInfo& info) {
+  throw std::domain_error(std::string(info.name) +
+                          ": no passive medium does this: steps too long for the method, total reflection inside, or modes where there are none");
+}
+
 template <class S>
 Mat2<S> entry_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index) {
   if (ray.continuity == Continuity::e_only) return Mat2<S>::identity();
@@ -65,7 +71,9 @@ Mat2<S> step_of_medium(const Column<S>& column, const Ray<S>& ray, const Mesh& m
   if (!column.jumps || node == 0 || node + 1 >= mesh.size() ||
       !std::binary_search(column.breaks.begin(), column.breaks.end(), mesh[node]))
     return Mat2<S>::identity();
-  const double sides[2] = {mesh[node] - 1e-12, mesh[node] + 1e-12};
+  // A hair to either side, and never across the next node: a sub-layer may be thinner than a hair.
+  const double hair = std::min({1e-12, 0.5 * (mesh[node] - mesh[node - 1]), 0.5 * (mesh[node + 1] - mesh[node])});
+  const double sides[2] = {mesh[node] - hair, mesh[node] + hair};
   OpticalPoint<S> p[2];
   column.sample(sides, p);
   return step_factor(one_way(p[0], ray.kx, ray.ky).admittance, one_way(p[0], ray.kx, ray.ky, -1.0).admittance,
@@ -132,7 +140,16 @@ Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double t
       whole.sample_with_slope(u, out);
     }
   } piece(column);
+  constexpr double kNever = std::numeric_limits<double>::infinity();
   const auto step = [&](double from, double to) { return method.transfer(piece, ray, {from, to}); };
+  const auto change = [&](double from, double middle, double to) {
+    try {
+      const Mat2<double> d = step(middle, to) * step(from, middle) - step(from, to);
+      return std::sqrt(norm(d.a) + norm(d.b) + norm(d.c) + norm(d.d));
+    } catch (const std::domain_error&) {  // far too long a step
+      return kNever;
+    }
+  };
   const Mesh start = uniform_mesh(4, column.breaks);
   Mesh mesh{0.0};
   double total = 0;
@@ -140,9 +157,7 @@ Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double t
   std::vector<double> open(start.rbegin(), start.rend() - 1);
   while (!open.empty()) {
     const double from = mesh.back(), to = open.back(), middle = 0.5 * (from + to);
-    const Mat2<double> coarse = step(from, to), fine = step(middle, to) * step(from, middle);
-    const Mat2<double> difference = fine - coarse;
-    const double error = std::sqrt(norm(difference.a) + norm(difference.b) + norm(difference.c) + norm(difference.d));
+    const double error = change(from, middle, to);
     const bool exhausted = static_cast<int>(mesh.size() + open.size()) >= max_steps || to - from < 1e-9;
     // A step that cannot get better (rounding) is accepted too.
     if (error <= tolerance * (to - from) || error < 4e-15 || exhausted) {

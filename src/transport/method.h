@@ -40,7 +40,10 @@ class TransportMethod {
   virtual ~TransportMethod() = default;
   virtual const MethodInfo& info() const = 0;
   /// Transfer matrix of E_t from just inside u = 0 to just inside u = 1, steps of the medium at its breaks included,
-  /// entry and exit faces not.
+  /// entry and exit faces not. Plain doubles: throws std::domain_error instead of an answer that is not finite or amplifies
+  /// as no passive medium can (see checked_transfer): steps too long for the method (a series in the commutators needs
+  /// less than about pi of what does not commute in a step; a homogeneous medium takes any step), a wave that is
+  /// totally reflected inside, modes where there are none. In lanes, one ray of many, nothing is checked.
   virtual Mat2<S> transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const = 0;
   /// Normal incidence (kx = ky = 0), lossless, no jumps: the retarder on the flux-normalised field (e_and_h) or on E_t
   /// (e_only), common phase left out.
@@ -57,6 +60,15 @@ template <class S>
 const TransportMethod<S>& transport_method(const std::string& name);  ///< throws std::logic_error when unknown
 const std::vector<std::string>& transport_method_names();
 
+/// What every transfer() ends with: t itself, unless it is a plain double and no answer. A lossless medium changes |E_t| by
+/// sqrt(q_in/q_out) at most, about 1e3 at a gap of 1e-12 to total reflection; beyond 1e6 it is the method that grows.
+[[noreturn]] void refuse_transfer(const MethodInfo& info);  ///< std::domain_error
+template <class S>
+const Mat2<S>& checked_transfer([[maybe_unused]] const MethodInfo& info, const Mat2<S>& t) {
+  if constexpr (std::is_same_v<S, double>)
+    if (!(norm(t.a) + norm(t.b) + norm(t.c) + norm(t.d) < 1e12)) refuse_transfer(info);
+  return t;
+}
 /// Outside faces: E_t transmitted into the column at u = 0 and out of it at u = 1, host of real index n.
 template <class S>
 Mat2<S> entry_factor(const Column<S>& column, const Ray<S>& ray, const S& host_index);

@@ -7,7 +7,8 @@
 namespace birefit {
 
 /// One phase integral per mode of the local eigenframe, with the factors that keep its flux (or, e_only, its E):
-/// 8 Gauss-Legendre nodes in every mesh step. What it leaves out is the coupling between the modes: none where the
+/// one Gauss-Legendre rule over each piece between breaks, of as many nodes as the mesh has steps there (where the
+/// nodes of the mesh lie does not matter). What it leaves out is the coupling between the modes: none where the
 /// axis stays in one plane through the ray, ~ coupling/(k0 (q_e - q_o)) where it turns slowly.
 template <class S>
 class Diagonal final : public TransportMethod<S> {
@@ -26,12 +27,17 @@ template <class S>
 class Modal final : public TransportMethod<S> {
  public:
   static constexpr int kPasses = 5;
+  explicit Modal(int passes = kPasses) : passes_(passes) {}
   const MethodInfo& info() const override;
   Mat2<S> transfer(const Column<S>&, const Ray<S>&, const Mesh&) const override;  ///< throws std::logic_error on jumps
   /// Has none (slabs and plates only): throws std::logic_error.
   Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
+
+ private:
+  int passes_;
 };
-/// Modal::transfer() in its parts, `passes` times through the equation for the ratios; 0 = no coupling.
+/// Modal::transfer() in its parts, `passes` times through the equation for the ratios; 0 = no coupling, one Gauss node a
+/// step as in Diagonal.
 template <class S>
 ModalTransfer<S> modal_transfer(const Column<S>&, const Ray<S>&, const Mesh&, int passes = Modal<S>::kPasses);
 template <class S>

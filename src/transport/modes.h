@@ -100,8 +100,8 @@ inline const OpticalPoint<Series<double>>& value_of(const OpticalPoint<Series<do
 inline const Complex<Series<double>>& value_of(const Complex<Series<double>>& z) { return z; }
 
 /// Of modes scaled to E.E = 1. D = Slope<S> (result in S) or Series<double>; derivatives of p are by depth in um, or by
-/// any coordinate in which depth grows by `um_per_unit`; the series of the result are exact up to kTaylorOrder. E and H
-/// continuous adds (Y - Y-)^-1 dY/dz of one_way.h to the coupling, which the source paper has not.
+/// any coordinate in which depth grows by `um_per_unit`; the series of the result are exact up to one order less than
+/// p's. E and H continuous adds (Y - Y-)^-1 dY/dz of one_way.h to the coupling, which the source paper has not.
 template <class D, class S>
 auto modal_generator(const OpticalPoint<D>& p, const Ray<S>& ray, const S& um_per_unit = S(1.0)) {
   const Modes<D> m = unit_modes(p, D(ray.kx), D(ray.ky));
@@ -132,11 +132,11 @@ inline OpticalPoint<Slope<double>> by_depth(OpticalPoint<Slope<double>> p) {
 /// p as series in depth instead of u: du/dz = 1/slope(u) solved for u(z), one coefficient a pass, and put in.
 inline OpticalPoint<Series<double>> by_depth(OpticalPoint<Series<double>> p) {
   const Series<double> u_per_um = inverse(p.depth_slope_um);
-  Series<double> u;
+  Series<double> u = Series<double>::of_order(u_per_um.order);
   const bool constant =
       std::all_of(p.depth_slope_um.c.begin() + 1, p.depth_slope_um.c.end(), [](double c) { return c == 0; });
-  const std::size_t passes = constant ? 1 : u.c.size() - 1;
-  for (std::size_t k = 0; k < passes; ++k) u = integral(u_per_um(u));
+  const int passes = constant ? 1 : u.order;
+  for (int k = 0; k < passes; ++k) u = integral(u_per_um(u));
   for (Series<double>* x : {&p.axis.x, &p.axis.y, &p.axis.z, &p.ordinary, &p.extraordinary, &p.ordinary_im,
                             &p.extraordinary_im, &p.depth_slope_um})
     *x = (*x)(u);

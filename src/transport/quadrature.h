@@ -1,7 +1,10 @@
 #pragma once
-// Gauss-Legendre nodes on a mesh.
+// Gauss-Legendre nodes.
 
 #include <array>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <vector>
 
 namespace birefit {
@@ -22,15 +25,56 @@ inline void gauss8_nodes(const std::vector<double>& mesh, std::vector<double>& u
   }
 }
 
-/// The nodes of the mesh used last by this thread: every ray of an image asks for the same.
+/// n Gauss-Legendre nodes on (-1, 1), upwards, and their weights: Newton's method on the recurrence of P_n from Tricomi's
+/// estimate of its zeros.
+inline void legendre_nodes(int n, std::vector<double>& x, std::vector<double>& weight) {
+  x.resize(static_cast<std::size_t>(n));
+  weight.resize(x.size());
+  for (int i = 0; i < n; ++i) {
+    double z = -std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5)), slope = 1;
+    for (int pass = 0; pass < 8; ++pass) {
+      double last = 1, now = z;  // P_0, P_1
+      for (int k = 2; k <= n; ++k) {
+        const double next = ((2 * k - 1) * z * now - (k - 1) * last) / k;
+        last = now;
+        now = next;
+      }
+      slope = n * (z * now - last) / (z * z - 1);
+      const double step = now / slope;
+      z -= step;
+      if (std::fabs(step) < 1e-15) break;
+    }
+    x[static_cast<std::size_t>(i)] = z;
+    weight[static_cast<std::size_t>(i)] = 2 / ((1 - z * z) * slope * slope);
+  }
+}
+
+/// One Gauss-Legendre rule over each piece between breaks, of as many nodes as the mesh has steps there: spectral where
+/// the medium is smooth. Weights sum to 1. Beyond 64 nodes a piece is parted: one long rule would gain nothing and take
+/// time as its square. The nodes used last by this thread are kept: every ray of an image asks for the same.
 struct GaussNodes {
-  std::vector<double> mesh, u, weight;
+  std::vector<double> mesh, breaks, u, weight;
 };
-inline const GaussNodes& gauss8_nodes(const std::vector<double>& mesh) {
+inline const GaussNodes& gauss_nodes(const std::vector<double>& mesh, const std::vector<double>& breaks) {
   thread_local GaussNodes last;
-  if (last.mesh != mesh) {
-    last.mesh = mesh;
-    gauss8_nodes(mesh, last.u, last.weight);
+  if (last.mesh == mesh && last.breaks == breaks) return last;
+  last = {mesh, breaks, {}, {}};
+  constexpr std::size_t kLongestRule = 64;
+  std::vector<double> x, w;
+  for (std::size_t i = 0, from = 0; i + 1 < mesh.size(); ++i) {
+    if (i + 2 < mesh.size() && !std::binary_search(breaks.begin(), breaks.end(), mesh[i + 1])) continue;
+    const std::size_t all = i + 1 - from, parts = (all + kLongestRule - 1) / kLongestRule;
+    const double width = (mesh[i + 1] - mesh[from]) / static_cast<double>(parts);
+    for (std::size_t part = 0; part < parts; ++part) {
+      const std::size_t nodes = all * (part + 1) / parts - all * part / parts;
+      if (x.size() != nodes) legendre_nodes(static_cast<int>(nodes), x, w);
+      const double middle = mesh[from] + width * (static_cast<double>(part) + 0.5);
+      for (std::size_t k = 0; k < nodes; ++k) {
+        last.u.push_back(middle + 0.5 * width * x[k]);
+        last.weight.push_back(0.5 * width * w[k]);
+      }
+    }
+    from = i + 1;
   }
   return last;
 }

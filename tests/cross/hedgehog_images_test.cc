@@ -25,7 +25,7 @@ double relative_rms(const std::string& file, bool flux) {
         const double half = std::sqrt(radius * radius - b * b);
         LawColumn<double, RadialLaw<double>> column(RadialLaw<double>{Chord<double>(b, half, radius), n_o * n_o, n_e * n_e});
         column.planar = true;
-        const Su2<double> u = Diagonal<double>().retarder(column, {k0, 0, 0, Continuity::e_and_h}, uniform_mesh(4));
+        const Su2<double> u = Diagonal<double>().retarder(column, {k0, 0, 0, Continuity::e_and_h}, uniform_mesh(32));
         const double sin2 = b * b / (radius * radius);  // angle of axis and ray where the ray enters
         const double n_eff = 1 / std::sqrt((1 - sin2) / (n_o * n_o) + sin2 / (n_e * n_e));
         const double t = flux ? 4 * n_o * n_eff / std::pow(n_o + n_eff, 2) : 1;

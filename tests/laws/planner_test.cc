@@ -4,10 +4,13 @@
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <random>
 
+#include "birefit/io.h"
 #include "birefit/render.h"
+#include "render/pilots.h"
 #include "scene_builder.h"
 
 namespace birefit {
@@ -109,6 +112,68 @@ void expect_kept(unsigned long first, unsigned long last) {
 
 TEST(Planner, PicturesAreWithinTheAccuracyAsked) { expect_kept(1, 40); }
 TEST(LongPlanner, PicturesAreWithinTheAccuracyAsked) { expect_kept(41, 340); }
+
+/// Samples of the medium a ray, as planned, over those of the cheapest registered method and effort that holds the accuracy on
+/// the same pilot rays. Efforts as on the chart, twice as many each time, from one on; 0 where there is no choice.
+double planned_over_cheapest(const Scene& scene, const Theta& theta, const RenderPlan& planned) {
+  if (std::holds_alternative<Crystal>(scene.sample) || scene.ceiling == Ceiling::reflections) return 0;
+  const Values<double> value(theta, {});
+  const Pilots pilots(scene, value);
+  int cheapest = 1 << 30;
+  for (const TransportMethod<double>* method : transport_methods<double>()) {
+    if (method->info().reflections) continue;
+    if (method->info().slow_axes) continue;  // must hold in the whole picture; the pilots alone do not say so
+    for (int n = 1; n <= 8192; n *= 2) {
+      const Mesh mesh = pilots.mesh(n);
+      const int samples = pilots.samples(*method, mesh);
+      if (samples >= cheapest) break;
+      if (pilots.error(*method, mesh, scene.intensity_accuracy) <= scene.intensity_accuracy) cheapest = samples;
+    }
+  }
+  const Mesh mesh = planned.mesh.empty() ? pilots.mesh(planned.steps) : planned.mesh;
+  return static_cast<double>(pilots.samples(transport_method<double>(planned.method), mesh)) / cheapest;
+}
+
+void expect_economical(unsigned long first, unsigned long last) {
+  std::map<std::string, std::pair<int, double>> seen;
+  for (unsigned long seed = first; seed <= last; ++seed) {
+    RandomScene r = random_scene(seed);
+    const Theta theta = r.table.table.values();
+    r.scene.intensity_accuracy = std::pow(10, -2 - static_cast<double>(seed % 3));
+    const RenderPlan planned = plan(r.scene, theta);
+    const double ratio = planned_over_cheapest(r.scene, theta, planned);
+    auto& [count, worst] = seen[r.kind];
+    ++count;
+    worst = std::max(worst, ratio);
+    EXPECT_LE(ratio, 1.5) << r.kind << ", seed " << seed << ", asked " << r.scene.intensity_accuracy << ": " << planned.method << " " << planned.steps;
+  }
+  for (const auto& [kind, s] : seen) std::printf("  %-16s %3d scenes, at worst %.2f times the samples of the cheapest\n", kind.c_str(), s.first, s.second);
+}
+
+// Not 1: it asks the next finer effort to hold too, and prefers the diagonal method for plates, whose pixel means then
+// come in closed form.
+TEST(Planner, SamplesAreAtMostHalfMoreThanTheCheapestMethodTakes) { expect_economical(1, 40); }
+TEST(LongPlanner, SamplesAreAtMostHalfMoreThanTheCheapestMethodTakes) { expect_economical(41, 340); }
+
+TEST(Planner, ShippedScenesTakeAtMostHalfMoreSamplesThanTheCheapestMethod) {
+  int judged = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(BIREFIT_SOURCE_DIR "/fit_configs")) {
+    if (entry.path().extension() != ".yaml") continue;
+    Config config;
+    try {
+      config = load_config(entry.path(), ConfigUse::render);
+    } catch (const UserError&) {  // its images are not in the repository
+      continue;
+    }
+    const Theta theta = config.job.parameters.values();
+    const RenderPlan planned = plan(config.scene, theta);
+    const double ratio = planned_over_cheapest(config.scene, theta, planned);
+    judged += ratio > 0;
+    EXPECT_LE(ratio, 1.5) << entry.path().filename() << ": " << planned.method << " " << planned.steps;
+    std::printf("  %-26s %s, %.2f\n", entry.path().filename().c_str(), planned.method.c_str(), ratio);
+  }
+  EXPECT_GE(judged, 4);
+}
 
 // Negative birefringence in a host denser than n_e: p is totally reflected where s still passes (seed 102 above).
 TEST(Planner, TotalReflectionOfOnePolarisationIsNoHole) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <complex>
+#include <map>
 #include <random>
 
 #include <Eigen/Dense>
@@ -88,6 +89,56 @@ M without_common_phase(const M& m) {
 double phase_free_distance(const M& a, const M& b) {
   const M x = without_common_phase(a), y = without_common_phase(b);
   return std::min(distance(x, y), distance(x, Complex<double>(-1.0) * y));
+}
+
+// Called directly, with steps of up to 1e5 rad: an answer that a passive medium can give, or a refusal.
+TEST(TransportLaws, AnswersAreFiniteOrRefused) {
+  std::map<std::string, int> refused, answered;
+  for_each_method([&](const auto& method, Continuity c) {
+    for (double thickness_um : {1.0, 100.0, 1e4, 1e5})
+      for (const int steps : {1, 4, 16, 64}) {
+        TiltTwistLaw law = kCoupled;
+        law.thickness_um = thickness_um;
+        const LawColumn<double, TiltTwistLaw> column(law);
+        try {
+          EXPECT_LT(size(method.transfer(column, oblique_ray(c), uniform_mesh(steps))), 1e6) << thickness_um << " um, " << steps << " steps";
+          ++answered[method.info().name];
+        } catch (const std::domain_error& error) {
+          EXPECT_NE(std::string(error.what()).find(method.info().name), std::string::npos);
+          ++refused[method.info().name];
+        }
+      }
+    // Total reflection of both waves: real arithmetic has no answer, complex arithmetic an evanescent one.
+    const LawColumn<double, TiltTwistLaw> column(kCoupled);
+    try {
+      EXPECT_LT(size(method.transfer(column, {10, 1.8, 0, c}, uniform_mesh(16))), 1e6);
+    } catch (const std::domain_error&) {
+    }
+  });
+  // Commutators of a step grow with powers of its phase; layers and a phase integral do not have them.
+  EXPECT_GT(refused["magnus6"], 0);
+  EXPECT_GT(answered["magnus6"], 0);
+  EXPECT_EQ(refused["layers_midpoint"], 0);
+}
+TEST(TransportLaws, AHomogeneousMediumTakesAnyStep) {
+  for_each_method([](const auto& method, Continuity c) {
+    const LawColumn<double, TiltTwistLaw> column(TiltTwistLaw{0.3, 0, 0, 0.7, 0, 1.52, 1.74, 1e4});
+    // 1.7e5 rad of phase, known to 4e-11.
+    EXPECT_LT(distance(method.transfer(column, oblique_ray(c), uniform_mesh(1)), method.transfer(column, oblique_ray(c), uniform_mesh(64))), 1e-9);
+  });
+}
+// The mesh that adapts starts from steps that its method refuses.
+TEST(TransportLaws, AdaptedMeshesFindTheirWayFromStepsFarTooLong) {
+  TiltTwistLaw law = kCoupled;
+  law.thickness_um = 3000;
+  const LawColumn<double, TiltTwistLaw> column(law);
+  for (const Continuity c : kContinuities) {
+    double estimate = 0;
+    const Mesh mesh = adapted_mesh(column, oblique_ray(c), 1e-4, &estimate);
+    EXPECT_LT(estimate, 1e-4);
+    const M exact = Magnus6<double>().transfer(column, oblique_ray(c), uniform_mesh(32768));
+    EXPECT_LT(distance(Magnus4<double>().transfer(column, oblique_ray(c), mesh), exact), 1e-4);
+  }
 }
 
 TEST(TransportLaws, NothingHappensWithoutBirefringence) {

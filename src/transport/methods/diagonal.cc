@@ -5,7 +5,7 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"diagonal", 0, true, false, "one phase integral per local mode, 8 Gauss nodes a step, flux factors",
+constexpr MethodInfo kInfo{"diagonal", 0, true, false, "one phase integral per local mode, Gauss nodes as many as steps, flux factors",
                            "Born & Wolf 15; flux factors: docs/methods.md"};
 
 template <class S>
@@ -46,7 +46,7 @@ const MethodInfo& Diagonal<S>::info() const {
 template <class S>
 ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
   if (column.absorbing || ray.continuity != Continuity::e_and_h) return modal_transfer(column, ray, mesh, 0);
-  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
   points.resize(u.size());
@@ -68,12 +68,12 @@ ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, 
 
 template <class S>
 Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  return together(modal(column, ray, mesh));
+  return checked_transfer(kInfo, together(modal(column, ray, mesh)));
 }
 
 template <class S>
 Su2<S> Diagonal<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  const GaussNodes& nodes = gauss8_nodes(mesh);
+  const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
   points.resize(u.size());

@@ -45,7 +45,7 @@ Mat2<S> Layers<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Me
     total = exp(Complex<S>(S(0.0), ray.k0_per_um * thickness) * forward.index) * total;
     before = after;
   }
-  return total;
+  return checked_transfer(info_, total);
 }
 
 template <class S>

@@ -56,7 +56,7 @@ Mat2<S> Magnus4<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     total = exp(omega) * total;
     if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
   }
-  return total;
+  return checked_transfer(kInfo, total);
 }
 
 template <class S>

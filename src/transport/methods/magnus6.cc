@@ -71,7 +71,7 @@ Mat2<S> Magnus6<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     total = exp(w) * total;
     if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
   }
-  return total;
+  return checked_transfer(kInfo, total);
 }
 
 template <class S>

@@ -26,14 +26,42 @@ const MethodInfo& Modal<S>::info() const {
   return kInfo;
 }
 
+/// The phases alone.
 template <class S>
-ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, int passes) {
-  using C = Complex<S>;
-  const GaussNodes& nodes = gauss8_nodes(mesh);
-  const GaussPolynomial& polynomial = gauss8_polynomial();
+ModalTransfer<S> uncoupled(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
+  const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   thread_local std::vector<OpticalPoint<Slope<S>>> points;
   points.resize(nodes.u.size());
   column.sample_with_slope(nodes.u, points.data());
+  ModalTransfer<S> result;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ModalGenerator<S> g = modal_generator(points[i], ray, points[i].depth_slope_um.value);
+    const S w(nodes.weight[i]);
+    result.log_o = result.log_o + w * (g.a + g.b3);
+    result.log_e = result.log_e + w * (g.a - g.b3);
+  }
+  const double faces[2] = {0.0, 1.0};
+  OpticalPoint<S> face[2];
+  column.sample(faces, face);
+  result.first = unit_modes(face[0], ray.kx, ray.ky).fields;
+  result.last = unit_modes(face[1], ray.kx, ray.ky).fields;
+  return result;
+}
+
+template <class S>
+ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, int passes) {
+  using C = Complex<S>;
+  if (passes == 0) return uncoupled(column, ray, mesh);
+  thread_local Mesh last_mesh;
+  thread_local std::vector<double> u, weight;
+  if (last_mesh != mesh) {
+    last_mesh = mesh;
+    gauss8_nodes(mesh, u, weight);
+  }
+  const GaussPolynomial& polynomial = gauss8_polynomial();
+  thread_local std::vector<OpticalPoint<Slope<S>>> points;
+  points.resize(u.size());
+  column.sample_with_slope(u, points.data());
   ModalTransfer<S> result;
   C r_start, s_start, r_end, s_end;
   const std::size_t steps = mesh.size() - 1;
@@ -43,7 +71,7 @@ ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, cons
     for (std::size_t i = 0; i < kNodes; ++i) {
       const OpticalPoint<Slope<S>>& p = points[step * kNodes + i];
       g[i] = modal_generator(p, ray, p.depth_slope_um.value);
-      if (passes > 0) over[i] = C(S(0.5)) / g[i].b3;
+      over[i] = C(S(0.5)) / g[i].b3;
     }
     const double per_u = 2 / (mesh[step + 1] - mesh[step]);
     for (int pass = 0; pass < passes; ++pass) {
@@ -61,7 +89,7 @@ ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, cons
       }
     }
     for (std::size_t i = 0; i < kNodes; ++i) {
-      const S w(nodes.weight[step * kNodes + i]);
+      const S w(weight[step * kNodes + i]);
       result.log_o = result.log_o + w * (g[i].a + g[i].b3 + g[i].b1 * r[i]);
       result.log_e = result.log_e + w * (g[i].a - g[i].b3 + g[i].b2 * s[i]);
     }
@@ -90,7 +118,7 @@ Mat2<S> together(const ModalTransfer<S>& m) {
 template <class S>
 Mat2<S> Modal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
   if (column.jumps) throw std::logic_error("modal: the medium jumps");
-  return together(modal_transfer(column, ray, mesh, kPasses));
+  return checked_transfer(kInfo, together(modal_transfer(column, ray, mesh, passes_)));
 }
 
 template <class S>

@@ -49,7 +49,7 @@ LayerMedium<S> sample_layer(const Column<S>& column, double from, double to, con
   m.from = from;
   m.to = to;
   m.at = form.centred ? 0.5 * (from + to) : from;
-  column.sample_taylor(m.at, &m.series);
+  column.sample_taylor(m.at, form.order + 1, &m.series);  // the coupling needs the derivative of the medium
   // A hair before the exit: at a break the layer ends on its own side.
   const double ends[2] = {from, std::nextafter(to, from)};
   OpticalPoint<S> faces[2];
@@ -78,24 +78,39 @@ C at(const ComplexSeries& s, double z) { return {s.re(z), s.im(z)}; }
 double magnitude(const C& z) { return std::sqrt(norm(z)); }
 ComplexSeries integral(const ComplexSeries& s) { return {birefit::integral(s.re), birefit::integral(s.im)}; }
 
-/// int_0^end of envelope(z) exp(-2 i (c1 z + c2 z^2)) dz, end of either sign; and `sizes`, the sum of its terms without
-/// the phase, with the last one apart.
+/// Terms of a series without their phase: their sum, and the last one. Of a function that is odd or even about the
+/// point of expansion every other term vanishes: half of the last but one, which is as much for a series that falls by
+/// halves, speaks then.
 struct Sizes {
   double sum = 0, last = 0;
+  void add(double size) {
+    sum += size;
+    last = std::max(size, 0.5 * before_);
+    before_ = size;
+  }
+  Sizes& operator+=(const Sizes& o) {
+    sum += o.sum;
+    last += o.last;
+    return *this;
+  }
+
+ private:
+  double before_ = 0;
 };
+/// int_0^end of envelope(z) exp(-2 i (c1 z + c2 z^2)) dz, end of either sign, and the sizes of its terms.
 C coupling_integral(const ComplexSeries& envelope, double c1, double c2, double end, int order, Sizes& sizes) {
   if (end == 0) return C();
   std::array<C, kMaxMoment + 1> moments;
   gauss_moments(order, 2 * c1 * end, 2 * c2 * end * end, moments.data());
   C sum;
+  Sizes terms;
   double power = end;
   for (int m = 0; m <= order; ++m, power *= end) {
     const C term = power * C(envelope.re.c[m], envelope.im.c[m]);
     sum = sum + term * moments[m];
-    const double size = magnitude(term) / (m + 1);
-    sizes.sum += size;
-    if (m == order) sizes.last += size;
+    terms.add(magnitude(term) / (m + 1));
   }
+  sizes += terms;
   return sum;
 }
 /// Couplings too small to be seen are not judged: their series is rounding.
@@ -104,11 +119,7 @@ double tail_of(const Sizes& s) { return s.sum > kInvisible ? s.last / s.sum : 0;
 /// The terms of f or g3 behind the linear one.
 Sizes varying_part(const ComplexSeries& phase, double end, int order) {
   Sizes sizes;
-  for (int k = 2; k <= order + 1; ++k) {
-    const double size = magnitude(C(phase.re.c[k], phase.im.c[k])) * std::pow(end, k);
-    sizes.sum += size;
-    if (k == order + 1) sizes.last = size;
-  }
+  for (int k = 2; k <= order + 1; ++k) sizes.add(magnitude(C(phase.re.c[k], phase.im.c[k])) * std::pow(end, k));
   return sizes;
 }
 
@@ -138,7 +149,8 @@ WeiNormanLayer closed_layer(const LayerMedium<double>& m, const Ray<double>& ray
   layer.length_um = behind - before;
   // f and g3 up to the order of the paper's eqs. 32, 33: integrals of a, b3 to z^n.
   ComplexSeries a = series.a, b3 = series.b3;
-  for (int k = form.order + 1; k <= kTaylorOrder + 1; ++k) a.re.c[k] = a.im.c[k] = b3.re.c[k] = b3.im.c[k] = 0;
+  const int beyond = form.order + 1;
+  a.re.c[beyond] = a.im.c[beyond] = b3.re.c[beyond] = b3.im.c[beyond] = 0;
   const ComplexSeries f = integral(a), g3 = integral(b3);
   C g3_first;  // entry face to the point of expansion
   if (form.phase_series) {
@@ -162,12 +174,17 @@ WeiNormanLayer closed_layer(const LayerMedium<double>& m, const Ray<double>& ray
     return coupling_integral(envelope, sign * c1, sign * c2, behind, form.order, s) -
            coupling_integral(envelope, sign * c1, sign * c2, before, form.order, s);
   };
-  layer.G1 = exp(-2.0 * g3_first) * couple(first, 1, sizes[0]);
-  layer.G2 = exp(2.0 * g3_first) * couple(second, -1, sizes[1]);
+  const C from_face[2] = {exp(-2.0 * g3_first), exp(2.0 * g3_first)};
+  layer.G1 = from_face[0] * couple(first, 1, sizes[0]);
+  layer.G2 = from_face[1] * couple(second, -1, sizes[1]);
   layer.taylor_tail = std::max(tail_of(sizes[0]), tail_of(sizes[1]));
+  layer.truncation = magnitude(from_face[0]) * sizes[0].last + magnitude(from_face[1]) * sizes[1].last;
   if (form.phase_series)
-    for (const ComplexSeries* s : {&f, &g3})
-      layer.taylor_tail = std::max(layer.taylor_tail, tail_of(varying_part(*s, std::max(behind, -before), form.order)));
+    for (const ComplexSeries* s : {&f, &g3}) {
+      const Sizes terms = varying_part(*s, std::max(behind, -before), form.order);
+      layer.taylor_tail = std::max(layer.taylor_tail, tail_of(terms));
+      layer.truncation += terms.last;
+    }
 
   for (std::size_t i = 0; i < at_nodes.size(); ++i) {
     const double b1 = magnitude(at_nodes[i].b1), b2 = magnitude(at_nodes[i].b2), b3_size = magnitude(at_nodes[i].b3);
@@ -197,9 +214,10 @@ Mat2<double> layer_transfer(const LayerMedium<double>& m, const Ray<double>& ray
 template <class S>
 Mat2<S> transfer_of(const MethodInfo& info, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
                     const WeiNormanForm& form) {
-  return transfer_by_lanes(
-      info, column, ray, mesh, [&](auto from, auto to) { return sample_layer(column, from, to, form, false); },
-      [&](const auto& medium, int l, const Ray<double>& one) { return layer_transfer(lane_of(medium, l), one, form); });
+  return checked_transfer(
+      info, transfer_by_lanes(
+                info, column, ray, mesh, [&](auto from, auto to) { return sample_layer(column, from, to, form, false); },
+                [&](const auto& medium, int l, const Ray<double>& one) { return layer_transfer(lane_of(medium, l), one, form); }));
 }
 
 }  // namespace
@@ -239,6 +257,7 @@ WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double
       continue;
     }
     report.estimate += layer.estimate;
+    report.truncation += layer.truncation;
     report.phase_residual_rad = std::max(report.phase_residual_rad, layer.phase_residual_rad);
     report.taylor_tail = std::max(report.taylor_tail, layer.taylor_tail);
     report.peak_coupling = std::max(report.peak_coupling, layer.peak_coupling);

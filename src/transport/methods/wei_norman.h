@@ -18,7 +18,7 @@ namespace birefit {
 
 /// The choices in which the two methods differ.
 struct WeiNormanForm {
-  int order = 7;             ///< of the Taylor series, 1 .. kTaylorOrder
+  int order = 7;             ///< of the Taylor series, 1 .. kTaylorOrder; their cost grows as its square
   bool centred = false;      ///< expanded about the layer's middle, else about its entry face
   bool exponential = false;  ///< S = exp(..), else the ordered product
   bool phase_series = true;  ///< f and g3 by their Taylor series (eqs. 32, 33), else by 2 x 16 Gauss nodes
@@ -33,6 +33,7 @@ struct WeiNormanLayer {
   double c1_per_um = 0, c2_per_um2 = 0;
   double phase_residual_rad = 0;  ///< eq. 37: phase of the coupling that c1 z + c2 z^2 leaves out
   double taylor_tail = 0;         ///< last term over the sum of all: of the envelopes, and of f and g3 where by series
+  double truncation = 0;          ///< what the series leave out of the transfer, if no worse than geometric by halves
   double peak_coupling = 0;       ///< max |b1|, |b2| times the length
   double estimate = 0;            ///< see WeiNormanReport
   Matrix2<Complex<double>> mode_transfer(bool exponential) const;  ///< U
@@ -48,6 +49,9 @@ struct WeiNormanReport {
   /// sum of dz |b1 b2| min(h/2, 1/(2 |b3|)). Measured within 30 % for the paper's form (a factor 3 high for single
   /// layers that are not valid anyway), an upper bound, to the same 30 %, for the other.
   double estimate = 0;
+  /// Relative error of the transfer from ending the series: the sum of their last terms, which bounds the rest where
+  /// each term is at most half of the one before (where not, taylor_tail refuses).
+  double truncation = 0;
   double phase_residual_rad = 0;  ///< the largest of all layers, as are the next two
   double taylor_tail = 0;
   double peak_coupling = 0;

@@ -1,0 +1,183 @@
+#include "render/pilots.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "medium/counting_column.h"
+#include "medium/families/radial.h"
+#include "render/droplet.h"
+#include "render/planar.h"
+
+namespace birefit {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Largest error of any polarizer-analyser intensity that two retarders can differ by: 2 |difference|, and a retarder
+/// and its negative are the same.
+double intensity_distance(const Su2<double>& a, const Su2<double>& b) {
+  const auto size = [&](double sign) {
+    return square(a.w - sign * b.w) + square(a.x - sign * b.x) + square(a.y - sign * b.y) + square(a.z - sign * b.z);
+  };
+  return 2 * std::sqrt(std::min(size(1), size(-1)));
+}
+double size_of(const Mat2<double>& d) { return std::sqrt(norm(d.a) + norm(d.b) + norm(d.c) + norm(d.d)); }
+double checked(double error) { return std::isfinite(error) ? error : 1e300; }
+
+}  // namespace
+
+double intensity_distance(const Mat2<double>& a, const Mat2<double>& b) {
+  const Complex<double> inner = conj(b.a) * a.a + conj(b.b) * a.b + conj(b.c) * a.c + conj(b.d) * a.d;
+  const double modulus = std::sqrt(norm(inner));
+  const Complex<double> turn = modulus > 0 ? Complex<double>(inner.re / modulus, inner.im / modulus) : Complex<double>(1.0);
+  return std::sqrt(2.0) * size_of(turn * b - a);
+}
+
+std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value, std::size_t most) {
+  std::vector<std::pair<double, double>> t;
+  if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
+    const double edge = std::tan(value.radians(*half_angle, 15));
+    // Pixels beyond the inscribed circle, up to the corners of the image.
+    const double corner = std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);
+    t.push_back({0.0, 0.0});
+    for (int i = 0; i < 6; ++i)
+      for (double f : {0.5, corner})
+        t.push_back({f * edge * std::cos(i * kPi / 3 + 0.2), f * edge * std::sin(i * kPi / 3 + 0.2)});
+  } else if (!scene.microscope.directions.empty()) {
+    for (const Direction& d : scene.microscope.directions) {
+      const double f = std::tan(d.theta_deg * kPi / 180), a = d.azimuth_deg * kPi / 180;
+      t.push_back({f * std::cos(a), f * std::sin(a)});
+    }
+    if (t.size() > most) {
+      std::stable_sort(t.begin(), t.end(), [](const auto& a, const auto& b) { return std::hypot(a.first, a.second) < std::hypot(b.first, b.second); });
+      for (std::size_t i = 0; i < most; ++i) t[i] = t[i * (t.size() - 1) / (most - 1)];  // never behind i
+      t.resize(most);
+    }
+  } else {
+    t.push_back({0.0, 0.0});
+  }
+  return t;
+}
+
+Pilots::Pilots(const Scene& scene, const Values<double>& value) {
+  if (std::holds_alternative<Droplet>(scene.sample))
+    add_droplet(scene, value);
+  else
+    add_planar(scene, value);
+}
+
+double Pilots::error(const TransportMethod<double>& method, const Mesh& mesh, double enough) const {
+  double worst = 0;
+  for (const auto& ray : rays_) {
+    worst = std::max(worst, ray(method, mesh));
+    if (worst > enough) break;
+  }
+  return worst;
+}
+
+void Pilots::add_droplet(const Scene& scene, const Values<double>& value) {
+  const DropletOptics<double> o = droplet_optics(scene, value);
+  const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
+  const bool twisted = static_cast<bool>(std::get<Droplet>(scene.sample).director.twist_deg);
+  const Mesh fine = uniform_mesh(twisted ? 1024 : 512);
+  for (double f : {0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97}) {
+    const DropletRay<double> ray = trace(o, rim, f * rim.rho_max() * o.radius_um);
+    const Su2<double> exact = droplet_retarder<double>(o, ray, transport_method<double>("magnus4"), fine, twisted);
+    rays_.push_back([=](const TransportMethod<double>& method, const Mesh& mesh) {
+      return checked(intensity_distance(exact, droplet_retarder(o, ray, method, mesh, twisted)));
+    });
+  }
+  samples_ = [=](const TransportMethod<double>& method, const Mesh& mesh) {
+    const Chord<double> chord(0.5 * o.radius_um, 0.5 * o.radius_um, o.radius_um);
+    LawColumn<double, RadialLaw<double>> column({chord, o.n_o * o.n_o, o.n_e * o.n_e});
+    column.planar = !twisted;
+    const CountingColumn<double> counted(column);
+    method.retarder(counted, {o.k0, 0.0, 0.0, o.continuity}, mesh);
+    return static_cast<int>(counted.count());
+  };
+}
+
+void Pilots::add_planar(const Scene& scene, const Values<double>& value) {
+  // Not one node set comes twice here: remembering them would only cost the search.
+  const auto fresh = [&] {
+    auto optics = std::make_shared<PlanarOptics<double>>(planar_optics(scene, value));
+    optics->column->freeze();
+    return optics;
+  };
+  const std::shared_ptr<const PlanarOptics<double>> o = fresh();
+  breaks_ = o->column->breaks;
+  const bool slab = std::holds_alternative<Slab>(scene.sample) && !cone_half_angle(scene);
+  const auto add = [&](std::shared_ptr<const PlanarOptics<double>> optics, double tx, double ty) {
+    const double c = 1 / std::sqrt(1 + tx * tx + ty * ty);
+    const Ray<double> ray{optics->k0, optics->n_host * c * tx, optics->n_host * c * ty, optics->continuity};
+    const Mesh mesh = adapted_mesh(*optics->column, ray, std::max(scene.intensity_accuracy / 40, 1e-13));
+    const Mat2<double> exact = planar_jones<double>(*optics, transport_method<double>("magnus4"), mesh, tx, ty);
+    rays_.push_back([=](const TransportMethod<double>& method, const Mesh& m) {
+      try {
+        const Mat2<double> jones = planar_jones<double>(*optics, method, m, tx, ty);
+        return checked(slab ? std::sqrt(2.0) * size_of(jones - exact) : intensity_distance(exact, jones));
+      } catch (const std::logic_error&) {  // steps too long for the method, or a medium it cannot do
+        return 1e300;
+      }
+    });
+  };
+  const auto directions = pilot_directions(scene, value);
+  for (const auto& [tx, ty] : directions) add(o, tx, ty);
+  if (!o->column->planar && directions.size() < 4) {
+    // Modes that couple may come out right at one retardance by chance: look a quarter of a fringe further, too.
+    const double ends[3] = {0.0, 0.5, 1.0};
+    OpticalPoint<double> p[3];
+    o->column->sample(ends, p);
+    double phase = 0;
+    for (const auto& q : p) phase = std::max(phase, o->k0 * q.depth_slope_um * std::abs(std::sqrt(q.extraordinary) - std::sqrt(q.ordinary)));
+    const auto shifted = fresh();
+    shifted->k0 = o->k0 * (1 + std::min(0.25, 0.5 * kPi / phase));
+    for (const auto& [tx, ty] : directions) add(shifted, tx, ty);
+  }
+  samples_ = [o](const TransportMethod<double>& method, const Mesh& mesh) {
+    // Any medium will do, at a thickness that no method minds.
+    struct Thin final : Column<double> {
+      void sample(std::span<const double> u, OpticalPoint<double>* out) const override {
+        for (std::size_t i = 0; i < u.size(); ++i) out[i] = {{0.8, 0.0, 0.6}, 2.25, 2.5, 0.0, 0.0, 1e-3};
+      }
+      void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<double>>* out) const override {
+        for (std::size_t i = 0; i < u.size(); ++i) out[i] = {{0.8, 0.0, 0.6}, 2.25, 2.5, 0.0, 0.0, 1e-3};
+      }
+    } thin;
+    thin.absorbing = o->column->absorbing;
+    thin.planar = o->column->planar;
+    const CountingColumn<double> counted(thin);
+    method.transfer(counted, {o->k0, 0.1, 0.0, o->continuity}, mesh);
+    return static_cast<int>(counted.count());
+  };
+}
+
+Effort cheapest_effort(const Pilots& pilots, double target, const std::string& only, bool even_steps, const std::string& but) {
+  std::vector<int> ladder;
+  for (int n = even_steps ? 2 : 1; n <= 8192; n += std::max(even_steps ? 2 : 1, n / 16 * 2)) ladder.push_back(n);
+  std::vector<Effort> efforts;
+  for (const TransportMethod<double>* method : transport_methods<double>()) {
+    if (method->info().reflections || but == method->info().name || (!only.empty() && only != method->info().name)) continue;
+    // Samples grow by the same number with every step.
+    const int at_8 = pilots.samples(*method, uniform_mesh(8)), at_16 = pilots.samples(*method, uniform_mesh(16));
+    for (int n : ladder) {
+      const int steps = static_cast<int>(pilots.mesh(n).size()) - 1;
+      efforts.push_back({method, n, at_8 + (at_16 - at_8) * (steps - 8) / 8, 1e300});
+    }
+  }
+  std::stable_sort(efforts.begin(), efforts.end(), [](const Effort& a, const Effort& b) { return a.samples < b.samples; });
+  Effort best;
+  for (Effort& effort : efforts) {
+    effort.error = pilots.error(*effort.method, pilots.mesh(effort.steps), target);
+    if (effort.error <= target) {
+      const auto finer = std::find_if(ladder.begin(), ladder.end(), [&](int n) { return n > effort.steps; });
+      if (finer == ladder.end() || pilots.error(*effort.method, pilots.mesh(*finer), target) <= target) return effort;
+    }
+    if (effort.error < best.error) best = effort;
+  }
+  // Errors were cut short at the first ray beyond the target.
+  best.error = pilots.error(*best.method, pilots.mesh(best.steps));
+  return best;
+}
+
+}  // namespace birefit
