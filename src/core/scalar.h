@@ -11,8 +11,9 @@
 #include <xsimd/xsimd.hpp>
 
 // Kernels are long chains of these small functions over wide values; a compiler that leaves one call in the chain
-// passes 64-byte lanes through memory, which costs more than the arithmetic.
-#if defined(__GNUC__)
+// passes 64-byte lanes through memory, which costs more than the arithmetic. Not under the sanitizers, whose
+// instructions would make such a chain take minutes to compile.
+#if defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__)
 #define BIREFIT_INLINE [[gnu::always_inline]] inline
 #else
 #define BIREFIT_INLINE inline

@@ -143,7 +143,7 @@ class NeededPoints {
 class Band {
  public:
   /// Many rows, so that few are computed twice; few, so that a band stays in the second cache.
-  static constexpr int kRows = 40;
+  static constexpr int kRows = 25;
   void resize(int width, int planes) {
     wide_ = static_cast<std::size_t>(width) + 2;
     plane_ = wide_ * (kRows + 2);
