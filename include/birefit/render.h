@@ -42,6 +42,9 @@ struct RenderPlan {
   double sampling_center_x_px = 0, sampling_center_y_px = 0;
 };
 
+/// Rays that the kernels carry side by side: doubles in a SIMD register of the machine they were compiled for.
+int rays_side_by_side();
+
 /// Chooses the cheapest method that holds scene.intensity_accuracy within scene.ceiling, at the values of theta.
 /// Throws UserError when a forced method cannot do the scene.
 RenderPlan plan(const Scene& scene, const Theta& theta);

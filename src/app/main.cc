@@ -6,8 +6,11 @@
 #include <iostream>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "app/commands.h"
 #include "birefit/error.h"
+#include "birefit/render.h"
 
 namespace birefit {
 
@@ -19,7 +22,7 @@ namespace {
 
 int run(int argc, char** argv) {
   CLI::App app("Fits birefringence, field and thermal state to polarized micrographs.", "birefit");
-  app.set_version_flag("--version", "birefit " BIREFIT_VERSION);
+  app.set_version_flag("--version", fmt::format("birefit {} ({} rays side by side)", BIREFIT_VERSION, rays_side_by_side()));
   app.require_subcommand(1);
   app.footer("Exit codes: 0 done; 1 the fit has no answer; 2 the input is wrong; 3 an internal error.\n"
              "birefit COMMAND --help tells more; `birefit new droplet > droplet.yaml` makes a config to start from.");

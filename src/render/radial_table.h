@@ -72,10 +72,13 @@ class RadialTable {
             largest_yet = std::max(largest_yet, std::abs(coefficients_[plane * stride_ + index(panel, f) + c]));
           }
       const double all = *std::max_element(size.begin(), size.end());
-      int& live = plane == 0 ? live_ : moving_live_;
+      int live = 0;
       for (int f = 0; f < functions; ++f)
-        if (size[static_cast<std::size_t>(f)] > 1e-15 * all) live = std::max(live, f + 1);
-      if (plane > 0 && all > 0) moving_[static_cast<std::size_t>(moving_count_++)] = static_cast<int>(plane) - 1;
+        if (size[static_cast<std::size_t>(f)] > 1e-15 * all) live = f + 1;
+      if (plane == 0)
+        live_ = live;
+      else if (live > 0)
+        (live <= 1 ? of_one_ : live <= 3 ? of_three_ : of_all_).add(static_cast<int>(plane) - 1);
     }
   }
 
@@ -91,6 +94,11 @@ class RadialTable {
 
  private:
   static constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
+  struct Planes {
+    std::array<int, kPlanes> list{};
+    int count = 0;
+    void add(int j) { list[static_cast<std::size_t>(count++)] = j; }
+  };
   std::size_t index(int panel, int function) const {
     return (static_cast<std::size_t>(panel) * static_cast<std::size_t>(functions_) + static_cast<std::size_t>(function)) * kPoints;
   }
@@ -140,11 +148,11 @@ class RadialTable {
     for (int k = 1; k < L; ++k) total = total + basis[k] * f[k];
     return total;
   }
-  /// Adds the derivative planes that are not zero, contracted with the basis.
+  /// Adds the derivatives of which the first L functions are not negligible, contracted with the basis.
   template <int L>
-  BIREFIT_INLINE void add_planes(const double* c, const P& x, const P* basis, S& total) const {
-    for (int i = 0; i < moving_count_; ++i) {
-      const int j = moving_[static_cast<std::size_t>(i)];
+  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const P& x, const P* basis, S& total) const {
+    for (int i = 0; i < planes.count; ++i) {
+      const int j = planes.list[static_cast<std::size_t>(i)];
       P f[L];
       horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * stride_, x, f, nullptr);
       total.d[j] = total.d[j] + contract<L>(basis, f);
@@ -182,12 +190,9 @@ class RadialTable {
       S total(contract<L>(basis, value));
       const P along = contract<L>(basis, slope) * P(2.0 * panels_);
       for (std::size_t j = 0; j + 1 < kPlanes; ++j) total.d[j] = along * v.d[j];
-      if (F > 1 && moving_live_ <= 1)
-        add_planes<1>(c, x, basis, total);
-      else if (F > 3 && moving_live_ <= 3)
-        add_planes<(F > 3 ? 3 : F)>(c, x, basis, total);
-      else
-        add_planes<F>(c, x, basis, total);
+      add_planes<1>(of_one_, c, x, basis, total);
+      add_planes<(F > 3 ? 3 : F)>(of_three_, c, x, basis, total);
+      add_planes<F>(of_all_, c, x, basis, total);
       return total;
     }
   }
@@ -196,9 +201,7 @@ class RadialTable {
   std::size_t stride_ = 0;                 ///< coefficients a plane
   std::vector<double> coefficients_;       ///< [plane][panel][function][power], plane 0 the value
   int live_ = 0;                           ///< functions up to the last whose values are not negligible
-  int moving_live_ = 0;                    ///< the same for the derivatives
-  std::array<int, kPlanes> moving_{};      ///< the derivatives that are not zero everywhere
-  int moving_count_ = 0;
+  Planes of_one_, of_three_, of_all_;      ///< derivatives of which the first one, three, all functions are not negligible
 };
 
 }  // namespace birefit

@@ -20,6 +20,8 @@ std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const Render
   return make_planar_model(scene, plan, value);
 }
 
+int rays_side_by_side() { return kLanes; }
+
 namespace {
 
 int samples_at(const RenderPlan& plan, double column, double row) {

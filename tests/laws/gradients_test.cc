@@ -176,6 +176,18 @@ std::vector<Case> cases() {
     all.push_back(c);
   }
   {
+    Case c = base("absorbing slab in a cone");
+    Slab slab;
+    slab.profile.interpolation = SlabProfile::Interpolation::cubic;
+    for (int i = 0; i < 6; ++i) {
+      const double u = i / 5.0;
+      slab.profile.rows.push_back({250 * u, std::cos(0.3 + 0.5 * u), std::sin(0.3 + 0.5 * u), 0.4 + 0.2 * u, 1.52, 1.7 + 0.02 * u, 0, 2e-4 * u});
+    }
+    slab.half_angle_deg = c.t.fixed("half_angle_deg", 2);
+    c.scene.sample = slab;
+    all.push_back(c);
+  }
+  {
     Case c = base("crystal");
     Crystal crystal;
     crystal.half_wave_voltage_v = c.t.fixed("half_wave_voltage_v", 1500);
