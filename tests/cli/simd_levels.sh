@@ -9,9 +9,10 @@ if [[ ! -d $(dirname "$birefit")/glibc-hwcaps ]]; then
 fi
 loader=$(ls /lib64/ld-linux-x86-64.so.* | head -n 1)
 
+supported=$("$loader" --help)
 declare -A lanes=([x86-64]=2 [x86-64-v3]=4 [x86-64-v4]=8)
 for level in x86-64 x86-64-v3 x86-64-v4; do
-  if [[ $level != x86-64 ]] && ! "$loader" --help | grep -q "$level (supported"; then
+  if [[ $level != x86-64 ]] && ! grep -q "$level (supported" <<<"$supported"; then
     echo "skip $level: not this machine"
     continue
   fi
