@@ -95,7 +95,7 @@ std::string frames_script(const MethodChart& chart, const std::string& svg) {
     for (const ChartFrame& f : chart.frames)
       if (f.scene == first.scene) script += fmt::format("{:.6g} {:.6g}\n", std::max(f.worst_error, 1e-14), 1e3 * f.seconds);
     script += "EOD\n";
-    plot += fmt::format("{}$f{} with linespoints lw 2 pt 7 ps 0.6 lc rgb '{}' title '{}'", k ? ", " : "", k, kColours[6 + k % 3], first.scene);
+    plot += fmt::format("{}$f{} with linespoints lw 2 pt 7 ps 0.6 lc rgb '{}' title '{}'", k ? ", " : "", k, kColours[6 + k % 4], first.scene);
     ++k;
   }
   return script + "plot " + plot + "\n";

@@ -15,10 +15,10 @@ void make_folder(const std::string& folder);
 /// As CSV: empty when not finite.
 std::string csv_number(double x);
 
-/// Okabe and Ito's colours, told apart by every eye.
-inline constexpr const char* kColours[] = {"#999999", "#000000", "#F0E442", "#E69F00", "#D55E00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73"};
+/// Okabe and Ito's colours and one of Tol's, told apart by every eye.
+inline constexpr const char* kColours[] = {"#999999", "#000000", "#F0E442", "#E69F00", "#D55E00", "#CC79A7", "#0072B2", "#56B4E9", "#882255", "#009E73"};
 /// The methods in the order of kColours.
 inline constexpr const char* kChartedMethods[] = {"layers_edge", "layers_midpoint", "ode_operator", "ode_scalar", "wei_norman",
-                                                  "wei_norman_exp", "magnus4", "magnus6", "diagonal"};
+                                                  "wei_norman_exp", "magnus4", "magnus6", "modal", "diagonal"};
 
 }  // namespace birefit
