@@ -233,19 +233,23 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       center_x_(value(scene.view.center_x_px)),
       center_y_(value(scene.view.center_y_px)),
       edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)),
-      inverse_edge_(inverse(edge_um_)) {
+      inverse_edge_(inverse(edge_um_)),
+      centre_panels_(plan.centre_panels),
+      rest_panels_(plan.radial_panels) {
   sin_cos(sum_rad_, sin_sum_, cos_sum_);
   sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
   open_ = cos_between_ * cos_between_;
   dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
-  if (plan.radial_panels > 0) {
-    const auto part = [&](Part which, int panels) {
-      return RadialTable<S>(panels, number_of_terms(), [&](const P& v, S* out) { terms(which, S(v), out); });
-    };
-    centre_ = part(Part::centre, plan.centre_panels);
-    rest_ = part(Part::rest, plan.radial_panels);
-  }
-  tabulated_ = plan.radial_panels > 0;
+}
+
+template <class S>
+void DropletImage<S>::tabulate(PixelModel<S>::Wanted, int threads) {
+  if (rest_panels_ == 0) return;
+  const auto part = [&](Part which, int panels) {
+    return RadialTable<S>(panels, number_of_terms(), threads, [&](const P& v, S* out) { terms(which, S(v), out); });
+  };
+  centre_ = part(Part::centre, centre_panels_);
+  rest_ = part(Part::rest, rest_panels_);
 }
 
 // Functions of the radius end at the rim as functions of root = sqrt(1 - rho/edge). At the centre a twist leaves
@@ -278,7 +282,7 @@ void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
 /// sum_k basis[k] f_k(rho), rho < edge.
 template <class S>
 S DropletImage<S>::through(const S& rho_um, const P* basis, const P* turned, P* turned_sum) const {
-  if (!tabulated_) {
+  if (rest_panels_ == 0) {
     S f[kMostTerms];
     terms_at(rho_um, f);
     S total(P(0.0));
@@ -292,14 +296,25 @@ S DropletImage<S>::through(const S& rho_um, const P* basis, const P* turned, P* 
     }
     return total;
   }
-  const S fraction = rho_um * inverse_edge_, to_rim = root(1.0 - fraction);
-  const auto central = plain(to_rim) > P(1 - kCentre);
+  // Slopes by hand: one chain rule instead of every derivative through every root.
+  const auto place = [](const S& x, const P& value, const P& slope) {
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      return x.chain(value, slope);
+    else
+      return value;
+  };
+  const S fraction = rho_um * inverse_edge_;
+  const P to_rim = root(P(1.0) - plain(fraction)), slope = P(-0.5) * inverse(to_rim);
+  const auto central = to_rim > P(1 - kCentre);
   S total(P(0.0));
-  if (!all(central)) total = tabulated_sum(Part::rest, to_rim * (1 / (1 - kCentre)), basis, turned, turned_sum);
+  if (!all(central)) {
+    constexpr double kScale = 1 / (1 - kCentre);
+    total = tabulated_sum(Part::rest, place(fraction, to_rim * P(kScale), slope * P(kScale)), basis, turned, turned_sum);
+  }
   if (none(central)) return total;
   P turned_here;
-  const S v = root(root(fraction * inverse(1.0 + to_rim) * (1 / kCentre)));
-  const S centre = tabulated_sum(Part::centre, v, basis, turned, &turned_here);
+  const P w = plain(fraction) * inverse(P(1.0) + to_rim), v = root(root(w * P(1 / kCentre)));
+  const S centre = tabulated_sum(Part::centre, place(fraction, v, P(-0.25) * v * inverse(w) * slope), basis, turned, &turned_here);
   if (turned) *turned_sum = all(central) ? turned_here : select(central, turned_here, *turned_sum);
   return all(central) ? centre : select(central, centre, total);
 }

@@ -86,6 +86,7 @@ class DropletImage final : public PixelModel<S> {
  public:
   using P = PlainOf<S>;
   DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value);
+  void tabulate(PixelModel<S>::Wanted, int threads) override;
   S intensity(const P& column, const P& row) const override;
   /// The image is sum_k basis_k(azimuth) f_k(radius). Tables hold the f_k in two parts, each over v in [0, 1]: the
   /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim.
@@ -94,7 +95,7 @@ class DropletImage final : public PixelModel<S> {
   int number_of_terms() const { return twisted_ ? 5 : 3; }
   /// f_k at v of the part; out has number_of_terms() places.
   void terms(Part part, const S& v, S* out) const;
-  /// sum_k basis[k] f_k(v) as the image reads it; only with plan.radial_panels > 0.
+  /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with plan.radial_panels > 0.
   S tabulated_sum(Part part, const S& v, const P* basis, const P* turned = nullptr, P* turned_sum = nullptr) const {
     const RadialTable<S>& table = part == Part::centre ? centre_ : rest_;
     return twisted_ ? table.template sum<5>(v, basis, turned, turned_sum) : table.template sum<3>(v, basis, turned, turned_sum);
@@ -117,7 +118,7 @@ class DropletImage final : public PixelModel<S> {
   double pixel_um_;
   S center_x_, center_y_, edge_um_, inverse_edge_, open_;
   bool dark_ = false;  ///< no light beside the droplet
-  bool tabulated_ = false;
+  int centre_panels_, rest_panels_;
   RadialTable<S> centre_, rest_;
 };
 

@@ -52,8 +52,9 @@ class PixelModel {
   virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
-  /// Before a whole picture is asked for: tables that pay only then.
-  virtual void tabulate(int /*threads*/) {}
+  enum class Wanted { points, picture };
+  /// Once, before the first point: makes the tables that pay for what is wanted.
+  virtual void tabulate(Wanted, int /*threads*/) {}
 };
 
 /// 2 pi / wavelength in 1/um.

@@ -147,7 +147,8 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
   plan.radial_panels = 2;
   plan.centre_panels = 2;
   while ((plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints < points / 4) {
-    const Image image(scene, plan, lanes);
+    Image image(scene, plan, lanes);
+    image.tabulate(Image::Wanted::picture, 1);
     const double rest = error_of(image, Image::Part::rest, plan.radial_panels);
     const double centre = error_of(image, Image::Part::centre, plan.centre_panels);
     if (rest <= target && centre <= target) {

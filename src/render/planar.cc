@@ -119,8 +119,8 @@ class PlanarModel final : public PixelModel<S> {
     return fringe_of_ray(column, row);
   }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
-  void tabulate(int threads) override {
-    if (!tabulated_blocks_.empty())
+  void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
+    if (wanted == PixelModel<S>::Wanted::picture && !tabulated_blocks_.empty())
       table_ = FringeTable<S>(blocks_, tabulated_blocks_, threads, [this](const P& column, const P& row) { return fringe_of_ray(column, row); });
   }
 

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <vector>
 
+#include "core/lookup.h"
 #include "core/scalar.h"
+#include "core/threads.h"
 #include "render/chebyshev.h"
 #include "render/pixel_model.h"
 
@@ -24,16 +26,21 @@ class RadialTable {
   using P = PlainOf<S>;
 
   RadialTable() = default;
-  /// evaluate(v, out): the functions at v (one a lane), out has `functions` places.
+  /// evaluate(v, out): the functions at v (one a lane), out has `functions` places; called from `threads` threads.
   template <class Evaluate>
-  RadialTable(int panels, int functions, const Evaluate& evaluate)
-      : panels_(panels), functions_(functions), stride_(static_cast<std::size_t>(panels) * functions * kPoints) {
+  RadialTable(int panels, int functions, int threads, const Evaluate& evaluate)
+      : panels_(panels),
+        functions_(functions),
+        row_(static_cast<std::size_t>(panels + Lookup<P>::width)),
+        stride_(row_ * static_cast<std::size_t>(functions) * kPoints) {
     const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();
     const int n = panels * kPoints;
-    std::vector<double> values(stride_ * kPlanes);  // [plane][panel][function][point]
-    std::vector<S> out(static_cast<std::size_t>(functions));
+    const std::size_t points = static_cast<std::size_t>(n);
+    std::vector<double> values(points * static_cast<std::size_t>(functions) * kPlanes);  // [plane][function][panel][point]
     constexpr int kStep = kLanesOf<S>;
-    for (int first = 0; first < n; first += kStep) {
+    parallel_for((n + kStep - 1) / kStep, threads, [&](int step) {
+      const int first = step * kStep;
+      std::vector<S> out(static_cast<std::size_t>(functions));
       alignas(64) double v[kLanes];
       for (int k = 0; k < kStep; ++k) {
         const int i = std::min(first + k, n - 1);
@@ -46,30 +53,26 @@ class RadialTable {
       for (int k = 0; k < std::min(kStep, n - first); ++k) {
         const int i = first + k;
         for (int f = 0; f < functions; ++f) {
-          const std::size_t at = index(i / kPoints, f) + static_cast<std::size_t>(i % kPoints);
+          const std::size_t at = static_cast<std::size_t>(f) * points + static_cast<std::size_t>(i);
           const S& value = out[static_cast<std::size_t>(f)];
           values[at] = lane(plain(value), k);
           if constexpr (kPlanes > 1)
-            for (std::size_t j = 0; j + 1 < kPlanes; ++j) values[(j + 1) * stride_ + at] = lane(value.d[j], k);
+            for (std::size_t j = 0; j + 1 < kPlanes; ++j) values[(j + 1) * points * static_cast<std::size_t>(functions) + at] = lane(value.d[j], k);
         }
       }
-    }
-    coefficients_.assign(values.size(), 0.0);
-    for (std::size_t plane = 0; plane < kPlanes; ++plane)
-      for (std::size_t block = plane * stride_; block < (plane + 1) * stride_; block += kPoints)
-        for (std::size_t c = 0; c < kPoints; ++c) {
-          double sum = 0;
-          for (std::size_t k = 0; k < kPoints; ++k) sum += rule.to_powers[c][k] * values[block + k];
-          coefficients_[block + c] = sum;
-        }
+    });
+    coefficients_.assign(stride_ * kPlanes, 0.0);
     // Rounding leaves 1e-17 of what vanishes (crossed polarizers, parameters that do not matter).
+    const double* from = values.data();
     for (std::size_t plane = 0; plane < kPlanes; ++plane) {
       std::vector<double> size(static_cast<std::size_t>(functions), 0.0);
-      for (int panel = 0; panel < panels; ++panel)
-        for (int f = 0; f < functions; ++f)
+      for (std::size_t f = 0; f < size.size(); ++f)
+        for (std::size_t panel = 0; panel < static_cast<std::size_t>(panels); ++panel, from += kPoints)
           for (std::size_t c = 0; c < kPoints; ++c) {
-            double& largest_yet = size[static_cast<std::size_t>(f)];
-            largest_yet = std::max(largest_yet, std::abs(coefficients_[plane * stride_ + index(panel, f) + c]));
+            double sum = 0;
+            for (std::size_t k = 0; k < kPoints; ++k) sum += rule.to_powers[c][k] * from[k];
+            coefficients_[plane * stride_ + (f * kPoints + c) * row_ + panel] = sum;
+            size[f] = std::max(size[f], std::abs(sum));
           }
       const double all = *std::max_element(size.begin(), size.end());
       int live = 0;
@@ -99,48 +102,19 @@ class RadialTable {
     int count = 0;
     void add(int j) { list[static_cast<std::size_t>(count++)] = j; }
   };
-  std::size_t index(int panel, int function) const {
-    return (static_cast<std::size_t>(panel) * static_cast<std::size_t>(functions_) + static_cast<std::size_t>(function)) * kPoints;
-  }
-  static bool same(double a, double b) { return a == b; }
-  static bool same(const Pack& a, const Pack& b) { return xsimd::all(a == b); }
-  /// L polynomials at x and their slopes: chains of multiply-adds side by side, and where those are too few to hide
-  /// their latency, even and odd powers apart.
+  /// L polynomials at x and their slopes; c: the first coefficient of the first function on the first panel of a window.
   template <int L, bool kSlope>
-  BIREFIT_INLINE static void horner(const double* c, const P& x, P* value, P* slope) {
-    if constexpr (L <= 3) {
-      static_assert(kPoints % 2 == 0);
-      const P square = x * x;
-      P odd[L], odd_slope[L];
-      for (int f = 0; f < L; ++f) {
-        value[f] = P(c[f * kPoints + kPoints - 2]);
-        odd[f] = P(c[f * kPoints + kPoints - 1]);
-        if constexpr (kSlope) slope[f] = odd_slope[f] = P(0.0);
-      }
-      for (int k = kPoints - 4; k >= 0; k -= 2)
-        for (int f = 0; f < L; ++f) {
-          if constexpr (kSlope) {
-            slope[f] = slope[f] * square + value[f];
-            odd_slope[f] = odd_slope[f] * square + odd[f];
-          }
-          value[f] = value[f] * square + P(c[f * kPoints + k]);
-          odd[f] = odd[f] * square + P(c[f * kPoints + k + 1]);
-        }
-      for (int f = 0; f < L; ++f) {
-        if constexpr (kSlope) slope[f] = (odd_slope[f] * x + slope[f]) * (x + x) + odd[f];
-        value[f] = odd[f] * x + value[f];
-      }
-    } else {
-      for (int f = 0; f < L; ++f) {
-        value[f] = P(c[f * kPoints + kPoints - 1]);
-        if constexpr (kSlope) slope[f] = P(0.0);
-      }
-      for (int k = kPoints - 2; k >= 0; --k)
-        for (int f = 0; f < L; ++f) {
-          if constexpr (kSlope) slope[f] = slope[f] * x + value[f];
-          value[f] = value[f] * x + P(c[f * kPoints + k]);
-        }
+  BIREFIT_INLINE void horner(const double* c, const Lookup<P>& at, const P& x, P* value, P* slope) const {
+    for (int f = 0; f < L; ++f) {
+      const double* of = c + static_cast<std::size_t>(f) * kPoints * row_;
+      value[f] = at(of + (kPoints - 1) * row_);
+      if constexpr (kSlope) slope[f] = P(0.0);
     }
+    for (std::size_t k = kPoints - 1; k-- > 0;)
+      for (int f = 0; f < L; ++f) {
+        if constexpr (kSlope) slope[f] = slope[f] * x + value[f];
+        value[f] = value[f] * x + at(c + (static_cast<std::size_t>(f) * kPoints + k) * row_);
+      }
   }
   template <int L>
   BIREFIT_INLINE static P contract(const P* basis, const P* f) {
@@ -150,11 +124,11 @@ class RadialTable {
   }
   /// Adds the derivatives of which the first L functions are not negligible, contracted with the basis.
   template <int L>
-  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const P& x, const P* basis, S& total) const {
+  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const Lookup<P>& at, const P& x, const P* basis, S& total) const {
     for (int i = 0; i < planes.count; ++i) {
       const int j = planes.list[static_cast<std::size_t>(i)];
       P f[L];
-      horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * stride_, x, f, nullptr);
+      horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * stride_, at, x, f, nullptr);
       total.d[j] = total.d[j] + contract<L>(basis, f);
     }
   }
@@ -164,25 +138,25 @@ class RadialTable {
     using std::floor;
     const P cell = min_of(max_of(floor(scaled), P(0.0)), P(panels_ - 1.0));
     const P x = P(2.0) * (scaled - cell) - P(1.0);
-    // Lanes are neighbours in the image and mostly share a panel, whose coefficients then serve all of them; gathering
-    // each lane's own costs several times as much.
-    const double one = lane(cell, 0);
-    if (same(cell, P(one))) return sum_on_panel<L, F>(static_cast<int>(one), x, v, basis, turned, turned_sum);
-    const int first = static_cast<int>(smallest(cell)), last = static_cast<int>(largest(cell));
-    S total = sum_on_panel<L, F>(first, x, v, basis, turned, turned_sum);
-    for (int panel = first + 1; panel <= last; ++panel) {
-      const auto here = cell >= P(static_cast<double>(panel));
+    // Lanes are neighbours in the image and mostly lie within one window of panels.
+    double first = smallest(cell);
+    S total = sum_in_window<L, F>(first, cell, x, v, basis, turned, turned_sum);
+    const double last = largest(cell);
+    while (last - first >= Lookup<P>::width) {
+      first += Lookup<P>::width;
+      const auto here = cell >= P(first);
       P turned_here;
-      total = select(here, sum_on_panel<L, F>(panel, x, v, basis, turned, &turned_here), total);
+      total = select(here, sum_in_window<L, F>(first, cell, x, v, basis, turned, &turned_here), total);
       if (turned) *turned_sum = select(here, turned_here, *turned_sum);
     }
     return total;
   }
   template <int L, int F>
-  BIREFIT_INLINE S sum_on_panel(int panel, const P& x, const S& v, const P* basis, const P* turned, P* turned_sum) const {
-    const double* c = coefficients_.data() + index(panel, 0);
+  BIREFIT_INLINE S sum_in_window(double first, const P& cell, const P& x, const S& v, const P* basis, const P* turned, P* turned_sum) const {
+    const double* c = coefficients_.data() + static_cast<std::size_t>(first);
+    const Lookup<P> at(cell - P(first));
     P value[L], slope[L];
-    horner<L, (kPlanes > 1)>(c, x, value, slope);
+    horner<L, (kPlanes > 1)>(c, at, x, value, slope);
     if (turned) *turned_sum = contract<L>(turned, value);
     if constexpr (kPlanes == 1) {
       return contract<L>(basis, value);
@@ -190,16 +164,16 @@ class RadialTable {
       S total(contract<L>(basis, value));
       const P along = contract<L>(basis, slope) * P(2.0 * panels_);
       for (std::size_t j = 0; j + 1 < kPlanes; ++j) total.d[j] = along * v.d[j];
-      add_planes<1>(of_one_, c, x, basis, total);
-      add_planes<(F > 3 ? 3 : F)>(of_three_, c, x, basis, total);
-      add_planes<F>(of_all_, c, x, basis, total);
+      add_planes<1>(of_one_, c, at, x, basis, total);
+      add_planes<(F > 3 ? 3 : F)>(of_three_, c, at, x, basis, total);
+      add_planes<F>(of_all_, c, at, x, basis, total);
       return total;
     }
   }
 
   int panels_ = 0, functions_ = 0;
-  std::size_t stride_ = 0;                 ///< coefficients a plane
-  std::vector<double> coefficients_;       ///< [plane][panel][function][power], plane 0 the value
+  std::size_t row_ = 0, stride_ = 0;       ///< places a row of panels, which ends with a window of zeros, and a plane
+  std::vector<double> coefficients_;       ///< [plane][function][power][panel], plane 0 the value
   int live_ = 0;                           ///< functions up to the last whose values are not negligible
   Planes of_one_, of_three_, of_all_;      ///< derivatives of which the first one, three, all functions are not negligible
 };

@@ -181,7 +181,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
   const int w = scene.view.width, h = scene.view.height, wide = w + 2, planes = static_cast<int>(active.size()) + 1;
   constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives;
   using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
-  model->tabulate(threads);
+  model->tabulate(PixelModel<S>::Wanted::picture, threads);
   const bool in_phase = model->in_phase();
   const SampleRings rings(plan);
   parallel_for(planes, threads, [&](int p) {
@@ -269,6 +269,7 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
                  PixelRendering& out, int first_column) {
   const Values<S> value(theta, active);
   const std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
+  model->tabulate(PixelModel<S>::Wanted::points, threads);
   const int n = static_cast<int>(pixels.size());
   constexpr int kStep = kLanesOf<S>;
   const int groups = (n + kStep - 1) / kStep;

@@ -87,7 +87,7 @@ TEST(RadialTable, ReadsWhatWasTabulatedWithItsDerivatives) {
   using D = Dual<Pack, 1>;
   D scale(Pack(5.0));
   scale.d[0] = Pack(1.0);
-  const RadialTable<D> table(6, 3, [&](const Pack& v, D* out) {
+  const RadialTable<D> table(6, 3, 2, [&](const Pack& v, D* out) {
     D s, c;
     sin_cos(scale * D(v), s, c);
     out[0] = s, out[1] = c, out[2] = scale * D(v * v);
