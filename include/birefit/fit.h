@@ -45,9 +45,17 @@ struct FitOptions {
   const std::atomic<bool>* interrupted = nullptr;    ///< set by Ctrl-C: end with the best state so far
 };
 
+/// One of several states that a sample may be in and that no parameter leads from one to the other.
+struct SampleBranch {
+  std::string name;            ///< "hedgehog", "ring"
+  std::vector<Sample> samples; ///< of each micrograph in this branch
+  std::vector<int> idle;       ///< parameters that this branch does not have
+};
+
 struct FitJob {
   ParameterTable parameters;
   std::vector<Micrograph> micrographs;
+  std::vector<SampleBranch> branches;  ///< more than one: each is fitted, the best is reported
   std::optional<JointPrior> prior;
   FitOptions options;
   std::vector<std::string> warnings;  ///< gathered while reading the input
@@ -71,6 +79,15 @@ struct RivalMinimum {
   Theta theta;
   double chi_square = 0;
   double odds = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)) against the reported minimum
+};
+
+/// How one branch of the sample did.
+struct BranchResult {
+  std::string name;
+  double chi_square = 0;   ///< all branches by the noise of the best one
+  int parameters = 0;      ///< free ones
+  double odds = 0;         ///< against the reported branch: exp(-difference of (chi-square / max(1, reduced) + parameters ln pixels) / 2)
+  bool reported = false;
 };
 
 /// One eigen-direction of the scaled Fisher matrix (each parameter in units of its start range or value).
@@ -120,6 +137,7 @@ struct FitResult {
   int degrees_of_freedom = 0;
   std::optional<JointPrior::FrameScatter> frame_scatter;  ///< several images in one fit
   std::vector<RivalMinimum> rivals;
+  std::vector<BranchResult> branches;  ///< empty unless the job had several
   std::vector<FisherDirection> directions;
   std::vector<MicrographResult> micrographs;
   std::vector<ScanTrace> scans;
@@ -135,7 +153,8 @@ struct FitResult {
   bool has_answer() const { return converged && !ambiguous && identifiable && !pinned && !interrupted; }
 };
 
-/// Estimates every free parameter. Deterministic: same job, same bits, whatever the number of threads.
+/// Estimates every free parameter; of several branches, those of the one with the best odds, and `ambiguous` when another
+/// has odds above 0.01. Deterministic: same job, same bits, whatever the number of threads.
 /// A job without usable pixels throws UserError; everything about the data's quality is in the result.
 FitResult fit(const FitJob& job);
 

@@ -50,12 +50,26 @@ struct RadialDirector {
   ParameterRef twist_deg;  ///< not given: no twist, diagonal transport
 };
 
+/// Normal anchoring, an electric field along the viewing axis, positive dielectric anisotropy, one elastic constant (Humar et
+/// al., Opt. Express 17, 2009): a point hedgehog that a field turns into a wall across the equator, or, with ring_radius,
+/// an equatorial disclination ring. An image tells one number: e = radius / coherence length, the coherence length being
+/// sqrt(K / (eps0 deps)) / local field. Given as it is, or as field_v_per_um with what makes e of it:
+/// e = (diameter / 2) local_field_factor field_v_per_um / coherence_voltage_v.
+struct AxialDirector {
+  ParameterRef reduced_field;        ///< e, [0, 60]; or, when not given, the following three
+  ParameterRef field_v_per_um;       ///< applied field, rms
+  ParameterRef coherence_voltage_v;  ///< sqrt(K / (eps0 deps)): 0.27 V for 5CB, 0.34 V for E7
+  ParameterRef local_field_factor;   ///< field in the droplet over applied field
+  ParameterRef ring_radius;          ///< of the droplet's radius, [0.2, 0.995]; not given: hedgehog
+  bool compare = false;              ///< a fit tries the hedgehog, too (FitJob::branches)
+};
+
 // ---- samples --------------------------------------------------------------------------------------------------------
 
 /// Spherical droplet in an isotropic host; refraction at the sphere, focus on the mid plane.
 struct Droplet {
   ParameterRef diameter_um;
-  RadialDirector director;
+  std::variant<RadialDirector, AxialDirector> director;
 };
 
 /// Plane-parallel cell, seen along its normal.

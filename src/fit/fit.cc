@@ -83,16 +83,27 @@ class Fit {
   explicit Fit(const FitJob& job)
       : job_(job), unknowns_(Unknowns::of(job)), frames_(static_cast<int>(job.micrographs.size())) {}
 
-  FitResult run() {
+  /// The global part. Returns the best objective on the subsample of pixels; above `hopeless_above` the search ends early.
+  double search(double hopeless_above) {
     const auto begin = std::chrono::steady_clock::now();
     prepare();
+    const double best = look_for_minima(hopeless_above);
+    result_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return best;
+  }
+
+  /// The rest. What another branch has beaten is reported where the search left it.
+  FitResult finish(bool beaten) {
+    const auto begin = std::chrono::steady_clock::now();
+    beaten_ = beaten;
+    stopped_ = stopped_ || beaten;
     find_minima();
     settle_weights();
     settle_plans();
     settle_misfit();
     weigh_rivals();
     report();
-    result_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    result_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return std::move(result_);
   }
 
@@ -103,6 +114,7 @@ class Fit {
   }
 
   void prepare();
+  double look_for_minima(double hopeless_above);
   void find_minima();
   void settle_weights();
   void settle_plans();
@@ -144,6 +156,9 @@ class Fit {
   std::vector<Eigen::VectorXd> rivals_;
   Theta theta_;
   int scan_points_ = 0, evaluations_ = 0;
+  ScanResult found_;
+  double sample_rows_ = 0;  ///< pixels that the scan looked at
+  bool beaten_ = false;
   bool stopped_ = false;
 
   // What settle_misfit() found.
@@ -222,7 +237,7 @@ std::vector<Misfit> Fit::prior_misfit() const {
   return misfit;
 }
 
-void Fit::find_minima() {
+double Fit::look_for_minima(double hopeless_above) {
   std::vector<double> phase(unknowns_.searched.size(), 0.0);
   for (std::size_t j = 0; j < phase.size(); ++j) {
     const int index = unknowns_.searched[j];
@@ -244,12 +259,17 @@ void Fit::find_minima() {
     part.push_back(pixel_set(job_.micrographs[g], sigma_[g], subsample(pixels_[g], share)));
   LeastSquares sample(job_, unknowns_, plans_, std::move(part));
   sample.set_misfit(prior_misfit());
-  ScanResult found = scan(sample, job_, unknowns_, start_, phase);
+  found_ = scan(sample, job_, unknowns_, start_, phase, hopeless_above);
   evaluations_ += sample.evaluations();
-  stopped_ = stopped_ || found.interrupted;
-  result_.scans = std::move(found.traces);
-  scan_points_ = found.points;
-  best_ = found.candidates.front().searched;
+  stopped_ = stopped_ || found_.interrupted;
+  result_.scans = std::move(found_.traces);
+  scan_points_ = found_.points;
+  sample_rows_ = static_cast<double>(sample.pixel_rows());
+  return found_.candidates.front().objective;
+}
+
+void Fit::find_minima() {
+  best_ = found_.candidates.front().searched;
 
   rebuild_problem();
   if (stopped_) {
@@ -260,7 +280,7 @@ void Fit::find_minima() {
   // On all pixels: the best, and whatever a subsample of this size cannot exclude (the difference of two chi-squares
   // scatters by twice its root).
   const double reduced =
-      std::max(1.0, found.candidates.front().objective / std::max<double>(1, static_cast<double>(sample.pixel_rows())));
+      std::max(1.0, found_.candidates.front().objective / std::max(1.0, sample_rows_));
   constexpr double kPlausible = 30;
   struct Minimum {
     Eigen::VectorXd searched;
@@ -269,9 +289,9 @@ void Fit::find_minima() {
     std::string report;
   };
   std::vector<Minimum> minima;
-  for (std::size_t i = 0; i < found.candidates.size(); ++i) {
-    if (i > 0 && found.candidates[i].objective - found.candidates[0].objective > kPlausible * reduced) break;
-    Eigen::VectorXd x = found.candidates[i].searched;
+  for (std::size_t i = 0; i < found_.candidates.size(); ++i) {
+    if (i > 0 && found_.candidates[i].objective - found_.candidates[0].objective > kPlausible * reduced) break;
+    Eigen::VectorXd x = found_.candidates[i].searched;
     const SolveSummary summary = solve(x, i == 0 ? "fit" : "", i == 0 ? 0 : 30);
     minima.push_back({x, problem_->objective(), summary.converged, summary.report});
     if (stopped_) break;
@@ -660,7 +680,7 @@ void Fit::report() {
   const Eigen::MatrixXd factor = problem_->factor();
   const Inverse inverse = invert_normal_equations(factor);
   result_.theta = theta_;
-  result_.interrupted = stopped_ || interrupted();
+  result_.interrupted = (stopped_ && !beaten_) || interrupted();
   if (result_.interrupted) result_.converged = false;
   for (int g = 0; g < frames_; ++g) result_.chi_square += problem_->frame_misfit(g).chi_square;
   const double data_chi_square = result_.chi_square;
@@ -697,8 +717,86 @@ void Fit::report() {
   result_.verdict = verdict(result_, signal);
 }
 
+/// The branch with the best odds, which reports how all of them did.
+FitResult best_branch(const FitJob& job, std::vector<FitResult> results) {
+  // Each fit settled its own noise: the smallest residual's is the one that all are measured by.
+  const auto residual = [](const FitResult& r, const FitResult& by, bool squares_only) {
+    double sum = 0, n = 0;
+    for (std::size_t g = 0; g < r.micrographs.size(); ++g) {
+      const std::vector<double>&v = r.micrographs[g].residual.values(), &sigma = by.micrographs[g].sigma.values();
+      for (std::size_t i = 0; i < v.size(); ++i)
+        if (std::isfinite(v[i]) && std::isfinite(sigma[i]) && sigma[i] > 0) sum += std::pow(v[i] / (squares_only ? 1 : sigma[i]), 2), ++n;
+    }
+    return std::pair(sum, n);
+  };
+  const auto smallest = std::min_element(results.begin(), results.end(), [&](const FitResult& a, const FitResult& b) {
+    return residual(a, a, true).first < residual(b, b, true).first;
+  });
+  const auto [least, pixels] = residual(*smallest, *smallest, false);
+  const double reduced = std::max(1.0, least / std::max(1.0, pixels - static_cast<double>(smallest->parameters.size())));
+  std::vector<double> score;
+  std::vector<BranchResult> branches;
+  for (std::size_t b = 0; b < results.size(); ++b) {
+    BranchResult branch;
+    branch.name = job.branches[b].name;
+    branch.chi_square = residual(results[b], *smallest, false).first;
+    branch.parameters = static_cast<int>(results[b].parameters.size());
+    score.push_back(branch.chi_square / reduced + branch.parameters * std::log(pixels));
+    branches.push_back(branch);
+  }
+  const std::size_t best = static_cast<std::size_t>(std::min_element(score.begin(), score.end()) - score.begin());
+  FitResult result = std::move(results[best]);
+  std::string others;
+  for (std::size_t b = 0; b < branches.size(); ++b) {
+    branches[b].odds = std::exp(-0.5 * (score[b] - score[best]));
+    branches[b].reported = b == best;
+    if (b == best) continue;
+    if (branches[b].odds > 0.01) result.ambiguous = true;
+    others += fmt::format("{}{} {:.2g}", others.empty() ? "" : ", ", branches[b].name, branches[b].odds);
+    result.evaluations += results[b].evaluations;
+    result.seconds += results[b].seconds;
+  }
+  result.verdict = fmt::format("Branch: {} (odds of the others against it: {}{}). ", branches[best].name, others,
+                               result.ambiguous ? "; the image does not decide between them" : "") + result.verdict;
+  result.branches = std::move(branches);
+  return result;
+}
+
 }  // namespace
 
-FitResult fit(const FitJob& job) { return Fit(job).run(); }
+FitResult fit(const FitJob& job) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  if (job.branches.size() < 2) {
+    Fit only(job);
+    only.search(kNever);
+    return only.finish(false);
+  }
+  // A branch whose misfit on the same pixels, by the same noise, is this many times the best one's has lost.
+  constexpr double kBeaten = 10;
+  std::vector<Fit> fits;
+  std::vector<FitJob> jobs;
+  std::vector<double> objectives;
+  jobs.reserve(job.branches.size());  // a Fit refers to its job
+  fits.reserve(job.branches.size());
+  double best = kNever;
+  for (const SampleBranch& branch : job.branches) {
+    FitJob one = job;
+    one.branches.clear();
+    for (std::size_t g = 0; g < one.micrographs.size(); ++g) one.micrographs[g].scene.sample = branch.samples[g];
+    for (const int index : branch.idle) one.parameters[index].free = false;
+    if (job.options.progress)
+      one.options.progress = [&](const std::string& line) { job.options.progress(branch.name + ": " + line); };
+    jobs.push_back(std::move(one));
+    fits.emplace_back(jobs.back());
+    objectives.push_back(fits.back().search(kBeaten * best));
+    best = std::min(best, objectives.back());
+  }
+  std::vector<FitResult> results;
+  for (std::size_t b = 0; b < fits.size(); ++b) {
+    results.push_back(fits[b].finish(objectives[b] > kBeaten * best));
+    if (results.back().interrupted) return std::move(results.back());
+  }
+  return best_branch(job, std::move(results));
+}
 
 }  // namespace birefit

@@ -59,7 +59,7 @@ Eigen::MatrixXd projected_information(const LeastSquares& problem) {
 }
 
 ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                const std::vector<double>& phase_per_unit) {
+                const std::vector<double>& phase_per_unit, double hopeless_above) {
   ScanResult result;
   const FitOptions& options = job.options;
   const auto interrupted = [&] { return options.interrupted && options.interrupted->load(); };
@@ -164,8 +164,14 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
     objective = std::isfinite(problem.objective()) ? problem.objective() : std::numeric_limits<double>::infinity();
     best = std::min(best, objective);
   }
+  const bool beaten = best > hopeless_above;
   for (const auto& [objective, from] : starts) {
-    if (!(objective <= kHopeless * best) || !std::isfinite(objective)) continue;
+    if (!(objective <= (beaten ? 1 : kHopeless) * best) || !std::isfinite(objective)) continue;
+    if (beaten) {
+      problem.evaluate(from, true);
+      result.candidates.push_back({from, problem.objective(), projected_information(problem)});
+      break;
+    }
     Candidate candidate;
     candidate.searched = from;
     polish.max_iterations = 20;

@@ -23,8 +23,9 @@ struct ScanResult {
 };
 
 /// `problem` holds the subsample; `start` is the user's. `phase_per_unit[j]` > 0 marks fringe-forming parameters.
+/// Minima whose objective stays above `hopeless_above` are not polished further: another branch has beaten them.
 ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                const std::vector<double>& phase_per_unit);
+                const std::vector<double>& phase_per_unit, double hopeless_above);
 
 /// |R delta|: how many joint standard errors apart.
 double separation(const Candidate& minimum, const Eigen::VectorXd& other);

@@ -541,6 +541,21 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
   }
 }
 
+/// A droplet in a field is a hedgehog or has a ring: both are fitted.
+void add_branches(FitJob& job) {
+  SampleBranch hedgehog{"hedgehog", {}, {}}, ring{"ring", {}, {}};
+  for (const Micrograph& micrograph : job.micrographs) {
+    ring.samples.push_back(micrograph.scene.sample);
+    Droplet droplet = std::get<Droplet>(micrograph.scene.sample);
+    AxialDirector axial = std::get<AxialDirector>(droplet.director);
+    hedgehog.idle.push_back(axial.ring_radius.index);
+    axial.ring_radius = {};
+    droplet.director = axial;
+    hedgehog.samples.push_back(droplet);
+  }
+  job.branches = {hedgehog, ring};
+}
+
 /// A droplet that the image cannot show is a mistake in a unit or a centre.
 void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& name) {
   const auto* droplet = std::get_if<Droplet>(&scene.sample);
@@ -854,6 +869,8 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
     }
     config.scene = micrographs[0].scene;
     config.job.micrographs = std::move(micrographs);
+    if (const auto* droplet = std::get_if<Droplet>(&config.scene.sample))
+      if (const auto* axial = std::get_if<AxialDirector>(&droplet->director); axial && axial->compare) add_branches(config.job);
     if (reader.problems.empty()) read_prior(reader, root, config.job);
     else if (root.find("prior")) reader.block(root, "prior", {"from", "parameters"}, true);
   }

@@ -140,6 +140,43 @@ UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
   return director;
 }
 
+/// Under a field along the view: the reduced field, or the applied one with the two numbers that reduce it.
+AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
+  AxialDirector axial;
+  const Block block = reader.block(parent, "axial", {"reduced_field", "field_v_per_um", "coherence_voltage_v", "local_field_factor", "ring_radius", "branch"}, true);
+  const YamlNode *reduced = block.find("reduced_field"), *applied = block.find("field_v_per_um");
+  if (reduced && applied)
+    reader.problems.add(applied->where, block.path + " has a reduced field and an applied one", "give one of the two");
+  if (!reduced && !applied)
+    reader.missing(block, "reduced_field", "radius over coherence length, 0 without a field; or field_v_per_um with coherence_voltage_v and local_field_factor");
+  if (reduced) {
+    NumberSpec e = number_within(0, 60);
+    e.physical_lower = 0;
+    axial.reduced_field = reader.number(block, "reduced_field", e);
+    for (const char* other : {"coherence_voltage_v", "local_field_factor"})
+      if (const YamlNode* node = block.find(other))
+        reader.problems.add(node->where, std::string(other) + " has no effect on a reduced field", "leave it out, or give field_v_per_um");
+  } else if (applied) {
+    NumberSpec field = number_within(0, 100);
+    field.unit = "V/um";
+    field.physical_lower = 0;
+    axial.field_v_per_um = reader.number(block, "field_v_per_um", field);
+    NumberSpec voltage = number_within(0, 10);
+    voltage.unit = "V";
+    voltage.lower_open = true;
+    axial.coherence_voltage_v = reader.number(block, "coherence_voltage_v", voltage);
+    axial.local_field_factor = reader.number(block, "local_field_factor", number_within(0.01, 3));
+  }
+  if (block.find("ring_radius")) axial.ring_radius = reader.number(block, "ring_radius", number_within(0.2, 0.995));
+  const std::string branch = reader.choice(block, "branch", {"hedgehog", "ring", "compare"}).value_or(axial.ring_radius ? "ring" : "hedgehog");
+  axial.compare = branch == "compare";
+  if (branch == "hedgehog" && axial.ring_radius)
+    reader.problems.add(block.find("ring_radius")->where, "a hedgehog has no ring_radius", "leave it out, or write branch: compare");
+  if (branch != "hedgehog" && !axial.ring_radius)
+    reader.missing(block, "ring_radius", "the ring's radius over the droplet's, for example {value: 0.9, fit: [0.6, 0.99]}");
+  return axial;
+}
+
 Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   Droplet droplet;
   const Block block = reader.block(parent, "droplet", {"diameter_um", "director"}, true);
@@ -147,14 +184,19 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   diameter.automatic = true;
   droplet.diameter_um = reader.number(block, "diameter_um", diameter);
   const Block director = reader.block(block, "director", {"radial", "bipolar", "axial"}, true);
-  if (one_kind(reader, director, {"radial"}, {"bipolar", "axial"}) == "radial") {
+  const auto kind = one_kind(reader, director, {"radial", "axial"}, {"bipolar"});
+  if (kind == "axial") {
+    droplet.director = read_axial(reader, director);
+    return droplet;
+  }
+  if (kind == "radial") {
     // `radial:` with nothing behind it is as clear as `radial: {}`.
     const YamlNode* node = director.find("radial");
     if (node->kind == YamlNode::Kind::null) return droplet;
   }
   const Block radial = reader.block(director, "radial", {"twist_deg"}, false);
   // No twist is a simpler scene, not a twist of zero: its transport is diagonal.
-  if (radial.find("twist_deg")) droplet.director.twist_deg = reader.number(radial, "twist_deg", angle(), 0);
+  if (radial.find("twist_deg")) droplet.director = RadialDirector{reader.number(radial, "twist_deg", angle(), 0)};
   return droplet;
 }
 

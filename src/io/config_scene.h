@@ -19,7 +19,11 @@ void for_each_ref(Scene& scene, F&& f) {
   };
   if (auto* droplet = std::get_if<Droplet>(&scene.sample)) {
     f(droplet->diameter_um);
-    f(droplet->director.twist_deg);
+    if (auto* radial = std::get_if<RadialDirector>(&droplet->director)) f(radial->twist_deg);
+    if (auto* axial = std::get_if<AxialDirector>(&droplet->director)) {
+      for (ParameterRef* ref : {&axial->reduced_field, &axial->field_v_per_um, &axial->coherence_voltage_v, &axial->local_field_factor, &axial->ring_radius})
+        f(*ref);
+    }
   } else if (auto* cell = std::get_if<Cell>(&scene.sample)) {
     f(cell->thickness_um);
     if (auto* director = std::get_if<UniformDirector>(&cell->director)) uniform(*director);

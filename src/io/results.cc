@@ -164,6 +164,10 @@ std::string fit_json(const Config& config, const FitResult& result) {
     json["rivals"].push_back(
         {{"odds", number(rival.odds)}, {"chi_square", number(rival.chi_square)}, {"parameters", values}});
   }
+  json["branches"] = Json::array();
+  for (const BranchResult& branch : result.branches)
+    json["branches"].push_back({{"name", branch.name}, {"chi_square", number(branch.chi_square)}, {"parameters", branch.parameters},
+                                {"odds", number(branch.odds)}, {"reported", branch.reported}});
   json["identifiable"] = result.identifiable;
   json["directions"] = Json::array();
   for (const FisherDirection& direction : result.directions) {

@@ -144,31 +144,29 @@ DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
   o.n_host = value(scene.surround_index);
   o.ratio = o.n_host / o.n_o;
   o.k0 = wavenumber_per_um(scene, value);
-  o.twist_rad = value.radians(droplet.director.twist_deg);
+  using Director = typename DropletOptics<S>::Director;
+  if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) {
+    if (radial->twist_deg) o.director = Director::twisted, o.twist_rad = value.radians(radial->twist_deg);
+  } else {
+    const AxialDirector& axial = std::get<AxialDirector>(droplet.director);
+    o.director = Director::axial;
+    const S e = axial.reduced_field ? value(axial.reduced_field)
+                                    : o.radius_um * value(axial.local_field_factor) * value(axial.field_v_per_um) / value(axial.coherence_voltage_v);
+    o.axial = std::make_shared<const AxialField<S>>(e, value.get(axial.ring_radius, 0.0), static_cast<bool>(axial.ring_radius));
+  }
   o.continuity = scene.ceiling == Ceiling::e_only ? Continuity::e_only : Continuity::e_and_h;
   return o;
 }
 
 template <class S>
-Su2<S> droplet_retarder(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method,
-                        const Mesh& mesh, bool twisted) {
-  const Chord<S> chord(o.radius_um * r.sin_in, o.radius_um * r.cos_in, o.radius_um);
+Su2<S> droplet_retarder(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method, const Mesh& mesh) {
   const Ray<S> light{o.k0, S(0.0), S(0.0), o.continuity};
-  const S eo = o.n_o * o.n_o, ee = o.n_e * o.n_e;
-  if (!twisted) {
-    LawColumn<S, RadialLaw<S>> column(RadialLaw<S>{chord, eo, ee});
-    column.planar = true;
-    return method.retarder(column, light, mesh);
-  }
-  const LawColumn<S, TwistedRadialLaw<S>> column(
-      TwistedRadialLaw<S>{chord, r.sin_deflection, r.cos_deflection, o.twist_rad, eo, ee});
-  return method.retarder(column, light, mesh);
+  return with_droplet_column(o, r, [&](const auto& column) { return method.retarder(column, light, mesh); });
 }
 
 template <class S>
-Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method,
-                      const Mesh& mesh, bool twisted) {
-  Mat2<S> jones = matrix(droplet_retarder(o, r, method, mesh, twisted));
+Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method, const Mesh& mesh) {
+  Mat2<S> jones = matrix(droplet_retarder(o, r, method, mesh));
   if (o.continuity == Continuity::e_and_h) {
     // Flux transmissions 4 Y1 Y2 / (Y1 + Y2)^2 of the sphere's surface, the same at both ends; the director is normal
     // to the surface, so s is ordinary and p sees q_e = (n_o/n_e) sqrt(n_e^2 - kappa^2), Y = n_o^2 / q_e.
@@ -226,7 +224,6 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       rim_(lane(plain(optics_.ratio), 0), lane(plain(optics_.n_host), 0), scene.microscope.objective_na),
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
-      twisted_(static_cast<bool>(std::get<Droplet>(scene.sample).director.twist_deg)),
       aplanatic_(scene.microscope.aplanatic),
       sum_rad_(value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg)),
       pixel_um_(scene.view.pixel_size_um),
@@ -268,7 +265,7 @@ void DropletImage<S>::terms(Part part, const S& v, S* out) const {
 template <class S>
 void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
   const DropletRay<S> ray = trace(optics_, rim_, rho_um);
-  Mat2<S> jones = droplet_jones(optics_, ray, method_, mesh_, twisted_);
+  Mat2<S> jones = droplet_jones(optics_, ray, method_, mesh_);
   // Ray tube: flux through the mid plane is b db / (rho drho) of the incident, |E|^2 = flux / cos(2 delta).
   S tube = optics_.radius_um * ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
   if (!aplanatic_) {  // only the transverse part of the p field
@@ -276,7 +273,7 @@ void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
     jones.b = ray.cos_twice * jones.b;
     tube = tube * inverse(ray.cos_twice);
   }
-  intensity_terms(jones, tube, cos_between_, sin_between_, !twisted_, out);
+  intensity_terms(jones, tube, cos_between_, sin_between_, !optics_.coupled(), out);
 }
 
 /// sum_k basis[k] f_k(rho), rho < edge.
@@ -368,9 +365,9 @@ std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const Rend
   template DropletOptics<S> droplet_optics<S>(const Scene&, const Values<S>&);                                       \
   template DropletRay<S> trace<S>(const DropletOptics<S>&, const RimTable&, const S&);                               \
   template Su2<S> droplet_retarder<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,      \
-                                      const Mesh&, bool);                                                            \
+                                      const Mesh&);                                                            \
   template Mat2<S> droplet_jones<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,        \
-                                    const Mesh&, bool);
+                                    const Mesh&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

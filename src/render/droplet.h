@@ -2,7 +2,10 @@
 // Geometry and optics of one ray through a droplet, shared by the image, the planner and the tests.
 
 #include <array>
+#include <memory>
 
+#include "medium/families/axial.h"
+#include "medium/families/radial.h"
 #include "render/pixel_model.h"
 #include "render/radial_table.h"
 #include "transport/method.h"
@@ -33,8 +36,12 @@ class RimTable {
 
 template <class S>
 struct DropletOptics {
-  S radius_um, n_o, n_e, n_host, ratio, k0, twist_rad;
+  S radius_um, n_o, n_e, n_host, ratio, k0;
+  enum class Director { radial, twisted, axial } director = Director::radial;
+  S twist_rad = S(0.0);  // not {0.0}: a pack would take that for a list of lanes
+  std::shared_ptr<const AxialField<S>> axial;
   Continuity continuity = Continuity::e_and_h;
+  bool coupled() const { return director == Director::twisted; }  ///< the axis leaves the meridional plane
 };
 
 /// One refracted ray: sines and cosines of the angles outside and inside (against the sphere's normal), of the
@@ -73,12 +80,24 @@ template <class S>
 DropletRay<S> trace(const DropletOptics<S>& optics, const RimTable& rim, const S& rho_um);
 /// Retarder on (p, s) = (radial, azimuthal) of the ray's frame inside, common phase left out.
 template <class S>
-Su2<S> droplet_retarder(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&,
-                        bool twisted);
+Su2<S> droplet_retarder(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&);
 /// The same with the surface's transmissions at both ends.
 template <class S>
-Mat2<S> droplet_jones(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&,
-                      bool twisted);
+Mat2<S> droplet_jones(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&);
+/// Calls f(column) with the medium along the ray.
+template <class S, class F>
+auto with_droplet_column(const DropletOptics<S>& o, const DropletRay<S>& r, const F& f) {
+  using Director = typename DropletOptics<S>::Director;
+  const S eo = o.n_o * o.n_o, ee = o.n_e * o.n_e, impact = o.radius_um * r.sin_in, half = o.radius_um * r.cos_in;
+  if (o.director == Director::axial)
+    return f(AxialColumn<S>(*o.axial, impact, half, o.radius_um, r.sin_deflection, r.cos_deflection, eo, ee));
+  const Chord<S> chord(impact, half, o.radius_um);
+  if (o.director == Director::twisted)
+    return f(LawColumn<S, TwistedRadialLaw<S>>({chord, r.sin_deflection, r.cos_deflection, o.twist_rad, eo, ee}));
+  LawColumn<S, RadialLaw<S>> column({chord, eo, ee});
+  column.planar = true;
+  return f(column);
+}
 
 /// The image of a droplet that is symmetric about the viewing axis.
 template <class S>
@@ -92,13 +111,13 @@ class DropletImage final : public PixelModel<S> {
   /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim.
   enum class Part { centre, rest };
   static constexpr int kMostTerms = 5;
-  int number_of_terms() const { return twisted_ ? 5 : 3; }
+  int number_of_terms() const { return optics_.coupled() ? 5 : 3; }
   /// f_k at v of the part; out has number_of_terms() places.
   void terms(Part part, const S& v, S* out) const;
   /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with plan.radial_panels > 0.
   S tabulated_sum(Part part, const S& v, const P* basis, const P* turned = nullptr, P* turned_sum = nullptr) const {
     const RadialTable<S>& table = part == Part::centre ? centre_ : rest_;
-    return twisted_ ? table.template sum<5>(v, basis, turned, turned_sum) : table.template sum<3>(v, basis, turned, turned_sum);
+    return optics_.coupled() ? table.template sum<5>(v, basis, turned, turned_sum) : table.template sum<3>(v, basis, turned, turned_sum);
   }
 
  private:
@@ -113,7 +132,7 @@ class DropletImage final : public PixelModel<S> {
   RimTable rim_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  bool twisted_, aplanatic_;
+  bool aplanatic_;
   S cos_between_, sin_between_, cos_sum_, sin_sum_, sum_rad_;  ///< of analyser - polarizer, of analyser + polarizer
   double pixel_um_;
   S center_x_, center_y_, edge_um_, inverse_edge_, open_;

@@ -78,22 +78,22 @@ double Pilots::error(const TransportMethod<double>& method, const Mesh& mesh, do
 void Pilots::add_droplet(const Scene& scene, const Values<double>& value) {
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
-  const bool twisted = static_cast<bool>(std::get<Droplet>(scene.sample).director.twist_deg);
-  const Mesh fine = uniform_mesh(twisted ? 1024 : 512);
+  const Mesh fine = uniform_mesh(o.coupled() ? 1024 : 512);
   for (double f : {0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97}) {
     const DropletRay<double> ray = trace(o, rim, f * rim.rho_max() * o.radius_um);
-    const Su2<double> exact = droplet_retarder<double>(o, ray, transport_method<double>("magnus4"), fine, twisted);
+    const Su2<double> exact = droplet_retarder<double>(o, ray, transport_method<double>("magnus4"), fine);
     rays_.push_back([=](const TransportMethod<double>& method, const Mesh& mesh) {
-      return checked(intensity_distance(exact, droplet_retarder(o, ray, method, mesh, twisted)));
+      return checked(intensity_distance(exact, droplet_retarder(o, ray, method, mesh)));
     });
   }
   samples_ = [=](const TransportMethod<double>& method, const Mesh& mesh) {
-    const Chord<double> chord(0.5 * o.radius_um, 0.5 * o.radius_um, o.radius_um);
-    LawColumn<double, RadialLaw<double>> column({chord, o.n_o * o.n_o, o.n_e * o.n_e});
-    column.planar = !twisted;
-    const CountingColumn<double> counted(column);
-    method.retarder(counted, {o.k0, 0.0, 0.0, o.continuity}, mesh);
-    return static_cast<int>(counted.count());
+    const RimTable table(o.ratio, o.n_host, 0);
+    const DropletRay<double> ray = trace(o, table, 0.5 * table.rho_max() * o.radius_um);
+    return with_droplet_column(o, ray, [&](const auto& column) {
+      const CountingColumn<double> counted(column);
+      method.retarder(counted, {o.k0, 0.0, 0.0, o.continuity}, mesh);
+      return static_cast<int>(counted.count());
+    });
   };
 }
 

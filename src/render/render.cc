@@ -407,7 +407,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
   }
   const int w = scene.view.width, h = scene.view.height;
   const Mesh mesh = plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh;
-  if (const auto* droplet = std::get_if<Droplet>(&scene.sample)) {
+  if (std::holds_alternative<Droplet>(scene.sample)) {
     const DropletOptics<double> optics = droplet_optics(scene, value);
     const RimTable rim(optics.ratio, optics.n_host, scene.microscope.objective_na);
     const TransportMethod<double>& method = transport_method<double>(plan.method);
@@ -423,7 +423,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
         }
         // droplet_jones is in (p, s) = (radial, azimuthal): turn it into x, y.
         const DropletRay<double> ray = trace(optics, rim, rho);
-        const Mat2<double> local = droplet_jones(optics, ray, method, mesh, static_cast<bool>(droplet->director.twist_deg));
+        const Mat2<double> local = droplet_jones(optics, ray, method, mesh);
         const double ca = std::cos(azimuth), sa = std::sin(azimuth);
         const Mat2<double> turn{{ca, 0}, {-sa, 0}, {sa, 0}, {ca, 0}}, back{{ca, 0}, {sa, 0}, {-sa, 0}, {ca, 0}};
         add(turn * local * back, 0, row);

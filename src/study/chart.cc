@@ -213,7 +213,7 @@ std::vector<FrameScene> frame_scenes() {
     f.name = i == 0 ? "hedgehog" : "twisted_droplet";
     Droplet droplet;
     droplet.diameter_um = f.table.add_constant("diameter_um", 9);
-    if (i == 1) droplet.director.twist_deg = f.table.add_constant("twist_deg", 60);
+    if (i == 1) droplet.director = RadialDirector{f.table.add_constant("twist_deg", 60)};
     f.scene.sample = droplet;
     ConstantIndices material;
     material.ordinary = f.table.add_constant("ordinary", 1.52);

@@ -179,7 +179,7 @@ PictureTrap picture_trap(const std::string& sample, double polarizer_deg, double
   if (sample == "droplet" || sample == "twisted_droplet") {
     Droplet droplet;
     droplet.diameter_um = fixed("diameter_um", 9);
-    if (sample == "twisted_droplet") droplet.director.twist_deg = fixed("twist_deg", 60);
+    if (sample == "twisted_droplet") droplet.director = RadialDirector{fixed("twist_deg", 60)};
     s.sample = droplet;
     s.view.pixel_size_um = 0.8;
     s.surround_index = fixed("surround", 1.43);

@@ -44,7 +44,7 @@ RandomScene random_scene(unsigned long seed) {
     Droplet droplet;
     const double diameter = std::pow(10, between(0.3, 1.8));
     droplet.diameter_um = b.fixed("diameter_um", diameter);
-    if (kind == 1) droplet.director.twist_deg = b.fixed("twist_deg", between(-120, 120));
+    if (kind == 1) droplet.director = RadialDirector{b.fixed("twist_deg", between(-120, 120))};
     s.sample = droplet;
     s.surround_index = b.fixed("surround", between(1.33, 1.6));
     s.view.pixel_size_um = diameter / size * between(0.8, 1.4);

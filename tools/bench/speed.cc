@@ -38,7 +38,7 @@ DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
   DropletScene s;
   Droplet droplet;
   droplet.diameter_um = s.table.add_constant("diameter_um", 9.3);
-  if (twisted) droplet.director.twist_deg = s.table.add_constant("twist_deg", 60);
+  if (twisted) droplet.director = RadialDirector{s.table.add_constant("twist_deg", 60)};
   s.scene.sample = droplet;
   ConstantIndices material;
   material.ordinary = s.table.add_constant("ordinary", 1.52);

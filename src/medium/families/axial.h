@@ -1,0 +1,177 @@
+#pragma once
+// A homeotropic droplet in a field along the viewing axis, along a refracted straight ray: the equilibrium director
+// (axial_equilibrium.h) in the ray's frame (t, phi, k) of radial.h. The axis stays in the meridional plane.
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "medium/column.h"
+#include "medium/families/axial_angle.h"
+#include "medium/families/axial_equilibrium.h"
+
+namespace birefit {
+
+/// The equilibrium at scalar e and ring (radii; 0: hedgehog), read at any place. Shared by all rays of an image.
+template <class S>
+class AxialField {
+ public:
+  using P = PlainOf<S>;
+  AxialField(const S& e, const S& ring, bool has_ring)
+      : e_(e), ring_(ring), has_ring_(has_ring), equilibrium_(known_axial_equilibrium(lane(plain(e), 0), has_ring ? lane(plain(ring), 0) : 0.0)) {
+    const AxialGrid& grid = equilibrium_->grid;
+    for (int k = 0; k <= grid.elements; ++k) {
+      r_edges_.push_back(axial_radius_edge(grid, k, e, ring, has_ring));
+      polar_edges_.push_back(axial_polar_edge(grid, k, e, ring, has_ring));
+    }
+    stride_ = static_cast<std::size_t>(grid.nodes() * grid.nodes());
+    values_.resize(stride_ * kPlanes);
+    for (int i = 0; i < grid.nodes(); ++i)
+      for (int j = 0; j < grid.nodes(); ++j) {
+        const std::size_t at = static_cast<std::size_t>(i * grid.nodes() + j);
+        values_[at] = equilibrium_->change(i, j);
+        if constexpr (kPlanes > 1)
+          for (std::size_t d = 0; d + 1 < kPlanes; ++d)
+            values_[(d + 1) * stride_ + at] = equilibrium_->by_e(i, j) * lane(e.d[d], 0) + (has_ring ? equilibrium_->by_ring(i, j) * lane(ring.d[d], 0) : 0.0);
+      }
+  }
+  const S& e() const { return e_; }
+
+  /// Angle of the director from the field at (rho, z), rho >= 0, z >= 0, inside the unit sphere.
+  template <class T>
+  T theta(const T& rho, const T& z) const {
+    const T boundary = axial_boundary_angle(rho, z, T(ring_));
+    T rb[kPoints], vb[kPoints];
+    const P row = basis(sqrt(rho * rho + z * z), r_edges_, false, rb), column = basis(angle_of(rho, z), polar_edges_, true, vb);
+    const int nodes = equilibrium_->grid.nodes();
+    alignas(64) double from[kLanes];
+    store(row * P(nodes) + column, from);
+    T sum(boundary);
+    for (int i = 0; i < kPoints; ++i) {
+      T inner = vb[0] * T(gather(from, i * nodes));
+      for (int j = 1; j < kPoints; ++j) inner = inner + vb[j] * T(gather(from, i * nodes + j));
+      sum = sum + rb[i] * inner;
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr int kPoints = 6;
+  static constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
+  static void store(double x, double* out) { out[0] = x; }
+  static void store(const Pack& x, double* out) { x.store_aligned(out); }
+  S gather(const double* from, int offset) const {
+    const auto plane = [&](const double* values) {
+      if constexpr (std::is_same_v<P, double>) {
+        return values[static_cast<int>(from[0]) + offset];
+      } else {
+        alignas(64) double out[kLanes];
+        for (int k = 0; k < kLanes; ++k) out[k] = values[static_cast<int>(from[k]) + offset];
+        return Pack::load_aligned(out);
+      }
+    };
+    S r(plane(values_.data()));
+    if constexpr (kPlanes > 1)
+      for (std::size_t d = 0; d + 1 < kPlanes; ++d) r.d[d] = plane(values_.data() + (d + 1) * stride_);
+    return r;
+  }
+  /// The element's first node (of all along the coordinate) and the values of its six polynomials.
+  template <class T>
+  static P basis(const T& place, const std::vector<S>& edges, bool falling, T* out) {
+    static const LobattoRule& rule = lobatto_rule(kPoints - 1);
+    const P here = plain(place);
+    T from(edges[0]), to(edges[1]);
+    P first(0.0);
+    for (std::size_t k = 1; k + 1 < edges.size(); ++k) {
+      const auto beyond = falling ? here < plain(edges[k]) : here > plain(edges[k]);
+      from = select(beyond, T(edges[k]), from);
+      to = select(beyond, T(edges[k + 1]), to);
+      first = select(beyond, P(static_cast<double>(k * (kPoints - 1))), first);
+    }
+    const T x = 2.0 * (place - from) / (to - from) - 1.0;
+    // Products of (x - x_m) from both ends: no division by what may vanish.
+    T below[kPoints], above[kPoints];
+    below[0] = above[kPoints - 1] = T(1.0);
+    for (std::size_t i = 1; i < kPoints; ++i) {
+      below[i] = below[i - 1] * (x - rule.x[i - 1]);
+      above[kPoints - 1 - i] = above[kPoints - i] * (x - rule.x[kPoints - i]);
+    }
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      double scale = 1;
+      for (std::size_t m = 0; m < kPoints; ++m)
+        if (m != i) scale /= rule.x[i] - rule.x[m];
+      out[i] = scale * (below[i] * above[i]);
+    }
+    return first;
+  }
+
+  S e_, ring_;
+  bool has_ring_;
+  std::shared_ptr<const AxialEquilibrium> equilibrium_;
+  std::vector<S> r_edges_, polar_edges_;
+  std::size_t stride_ = 0;
+  std::vector<double> values_;  ///< [plane][node of r][node of polar angle]
+};
+
+/// u in [0, 1/2] runs from the entry to the equator (z = 0), the rest to the exit; nodes crowd at the equator, where the
+/// wall and the defect are, and at the sphere, each over the coherence length or what the ray's distance makes of it.
+template <class S>
+class AxialColumn final : public Column<S> {
+ public:
+  /// impact_um, half_um: distance and half length of the chord; deflection of the ray inside, > 0 turns towards the axis.
+  AxialColumn(const AxialField<S>& field, const S& impact_um, const S& half_um, const S& radius_um, const S& sin_deflection,
+              const S& cos_deflection, const S& ordinary, const S& extraordinary)
+      : field_(field), b_(impact_um), radius_(radius_um), sd_(sin_deflection), cd_(cos_deflection), eo_(ordinary), ee_(extraordinary) {
+    this->planar = true;
+    this->breaks = {0.5};
+    // Where the ray meets the equator; some near the rim never do.
+    equator_ = S(0.0) - b_ * sd_ * inverse(cd_);
+    const S most = 0.98 * half_um;
+    equator_ = select(plain(equator_) > plain(most), most, equator_);
+    equator_ = select(plain(equator_) < -plain(most), -most, equator_);
+    before_ = equator_ + half_um;
+    after_ = half_um - equator_;
+    fine_ = 1.0 / (1.0 + field.e() * (1.0 / 6));
+    q_ = 4.0 * b_ * inverse(half_um) + 0.01;
+  }
+  void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
+    for (std::size_t i = 0; i < u.size(); ++i) ::new (static_cast<void*>(out + i)) OpticalPoint<S>(at<S>(S(u[i]), u[i]));
+  }
+  void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      Slope<S> x{S(u[i])};
+      x.d[0] = S(1.0);
+      ::new (static_cast<void*>(out + i)) OpticalPoint<Slope<S>>(at<Slope<S>>(x, u[i]));
+    }
+  }
+
+ private:
+  template <class T>
+  OpticalPoint<T> at(const T& u, double where) const {
+    const bool behind = where < 0.5;
+    const T x = behind ? 1.0 - 2.0 * u : 2.0 * u - 1.0, length = behind ? T(before_) : T(after_);
+    // x to [0, 1], slope `fine` at both ends; then w -> q w / (1 + q - w).
+    const T fine(fine_), q(q_);
+    const T x2 = x * x, w = fine * (x - 3.0 * x2 + 2.0 * x2 * x) + x2 * (3.0 - 2.0 * x);
+    const T slope = fine * (1.0 - 6.0 * x + 6.0 * x2) + 6.0 * (x - x2);
+    const T f = 1.0 / (q + 1.0 - w);
+    const T distance = length * q * w * f;
+    const T depth_slope = 2.0 * length * q * (q + 1.0) * f * f * slope;
+    const T s = behind ? T(equator_) - distance : T(equator_) + distance;
+    const T b(b_), sd(sd_), cd(cd_), over(inverse(radius_));
+    const T rho = (cd * b - sd * s) * over, z = (sd * b + cd * s) * over;
+    // Half the droplet is known: theta is odd in rho, and the lower half mirrors the upper, n_z -> -n_z.
+    const auto inward = plain(rho) < PlainOf<T>(0.0), below = plain(z) < PlainOf<T>(0.0);
+    const T size = select(inward, -rho, rho) + 1e-12, height = select(below, -z, z) + 1e-12;
+    T n_rho, n_z;
+    sin_cos(field_.theta(size, height), n_rho, n_z);
+    n_rho = select(inward, -n_rho, n_rho);
+    n_z = select(below, -n_z, n_z);
+    return {{cd * n_rho + sd * n_z, T(0.0), cd * n_z - sd * n_rho}, T(eo_), T(ee_), T(0.0), T(0.0), depth_slope};
+  }
+
+  const AxialField<S>& field_;
+  S b_, radius_, sd_, cd_, eo_, ee_, equator_, before_, after_, fine_, q_;
+};
+
+}  // namespace birefit
