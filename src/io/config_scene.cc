@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "io/config_material.h"
 #include "io/table.h"
 #include "transport/method.h"
 
@@ -358,12 +359,10 @@ void check_within(ConfigReader& reader, ParameterRef ref, double lower, double u
 }
 
 Material read_material(ConfigReader& reader, const Block& sample, const Sample& kind) {
-  const Block block =
-      reader.block(sample, "material", {"ordinary", "birefringence", "name", "temperature_k", "file"}, true);
-  if (const YamlNode* file = block.find("file")) {
-    reader.problems.add(file->where, "material files come later", "give ordinary and birefringence");
-    return ConstantIndices{};
-  }
+  std::vector<std::string> keys = {"ordinary", "birefringence", "name", "temperature_k"};
+  keys.insert(keys.end(), law_material_keys().begin(), law_material_keys().end());
+  const Block block = reader.block(sample, "material", keys, true);
+  if (is_law_material(block)) return read_law_material(reader, block, kind);
   const Plate* plate = std::get_if<Plate>(&kind);
   const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
   if (block.find("name")) {
@@ -393,7 +392,7 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
     reader.problems.add(node->where, "temperature_k has no effect on constant indices", "leave it out");
   if (heat && block.node)
     reader.problems.add(block.where, "sample.plate.heat has no effect on constant indices",
-                        "use material: {name: E44-steinberg2020}, or leave heat out");
+                        "use material: {name: E44-steinberg2020} or add haller, or leave heat out");
   ConstantIndices material;
   material.ordinary = reader.number(block, "ordinary", index_spec());
   material.birefringence = reader.number(block, "birefringence", number_within(-1, 1));
@@ -431,8 +430,10 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
     reader.specs.erase("sample.surround.index");
     return;
   }
-  const Block surround = reader.block(block, "surround", {"index"}, *kind == "droplet");
-  if (surround.node || *kind == "droplet") {
+  const Block surround = reader.block(block, "surround", {"index", "file"}, *kind == "droplet");
+  if (surround.find("file")) {
+    scene.surround_dispersion = read_surround_file(reader, surround);
+  } else if (surround.node || *kind == "droplet") {
     scene.surround_index = reader.number(surround, "index", index_spec());
   } else {
     scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
@@ -536,6 +537,7 @@ Scene read_scene(ConfigReader& reader, const Block& root) {
   // Which kind it is steers what the microscope needs, so the sample comes first.
   read_sample(reader, root, scene);
   read_microscope(reader, root, scene);
+  check_material_ranges(reader, root, scene);
   read_numerics(reader, root, scene);
   return scene;
 }

@@ -8,6 +8,7 @@
 
 #include "birefit/render.h"
 #include "core/scalar.h"
+#include "medium/materials/dispersion.h"
 #include "render/fringe.h"
 
 namespace birefit {
@@ -61,6 +62,17 @@ class PixelModel {
 template <class S>
 S wavenumber_per_um(const Scene& scene, const Values<S>& value) {
   return (2000 * std::numbers::pi) / value(scene.microscope.wavelength_nm);
+}
+
+/// The same wavelength in um, and the index of what is around the sample at it.
+template <class S>
+S wavelength_um(const Scene& scene, const Values<S>& value) {
+  return value(scene.microscope.wavelength_nm) * 1e-3;
+}
+template <class S>
+S host_index(const Scene& scene, const Values<S>& value) {
+  if (scene.surround_dispersion) return index_at<S>(*scene.surround_dispersion, wavelength_um(scene, value), value);
+  return value.get(scene.surround_index, 1.0);
 }
 
 template <class S>

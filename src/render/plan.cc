@@ -10,6 +10,7 @@
 
 #include "birefit/render.h"
 #include "medium/build.h"
+#include "medium/validity.h"
 #include "render/droplet.h"
 #include "render/fringe_table.h"
 #include "render/pilots.h"
@@ -553,10 +554,25 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
   return result;
 }
 
+/// What the literature's birefringence is off by.
+void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
+  const auto* law = std::get_if<LawIndices>(&scene.material);
+  if (!law || law->birefringence_uncertainty <= 0) return;
+  double largest_phase = 0;
+  for (double phase : phases(scene, theta)) largest_phase = std::max(largest_phase, std::abs(phase));
+  const double unsure = largest_phase * law->birefringence_uncertainty;
+  plan.model_error = std::hypot(plan.model_error, 0.5 * std::min(1.0, unsure));  // the steepest slope of sin^2(phase/2)
+  plan.warnings.push_back(fmt::format(
+      "The material's birefringence is known to {:.2g} % only (standard deviation): the largest retardance, {:.3g} rad, to {:.2g} rad. "
+      "Intervals do not contain this unless sample.material.birefringence_factor is fitted with prior_sd: {:.2g}.",
+      100 * law->birefringence_uncertainty, largest_phase, unsure, law->birefringence_uncertainty));
+}
+
 }  // namespace
 
 RenderPlan plan(const Scene& scene, const Theta& theta) {
   check_method(scene);
+  check_validity(scene, theta);
   const Values<double> value(theta, {});
   RenderPlan result;
   if (std::holds_alternative<Droplet>(scene.sample)) {
@@ -573,6 +589,7 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
   } else {
     result = plan_planar(scene, value);
   }
+  note_material(scene, theta, result);
   result.physics = scene.ceiling == Ceiling::e_only        ? "e_only"
                    : scene.ceiling == Ceiling::reflections ? "reflections"
                                                            : "one_way";
