@@ -95,6 +95,8 @@ std::unique_ptr<PixelModel<S>> make_planar_model(const Scene&, const RenderPlan&
 template <class S>
 std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene&, const RenderPlan&, const Values<S>&);
 template <class S>
+std::unique_ptr<PixelModel<S>> make_disc_model(const Scene&, const RenderPlan&, const Values<S>&);
+template <class S>
 std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene&, const RenderPlan&, const Values<S>&);
 
 /// The same image as render(), one thread, one ray at a time in plain doubles: what lanes are measured against.

@@ -250,6 +250,20 @@ std::vector<Case> cases() {
     c.t.table[c.scene.microscope.wavelength_nm].value = 610;
     all.push_back(c);
   }
+  for (bool circular : {false, true}) {
+    Case c = base(circular ? "disc, circular polariscope" : "disc, plane polariscope");
+    StressedDisc disc;
+    disc.diameter_um = c.t.fixed("diameter_um", 40);  // larger than the picture: no edge in it
+    disc.thickness_um = c.t.fixed("thickness_um", 5000);
+    disc.load_n = c.t.fixed("load_n", 0.4);
+    disc.stress_optic_brewster = c.t.fixed("stress_optic_brewster", 30);
+    disc.load_azimuth_deg = c.t.fixed("load_azimuth_deg", 70);
+    disc.residual_normal_mpa = {c.t.fixed("n1", 0.5), c.t.fixed("nx", 0.4), c.t.fixed("ny", -0.3)};
+    disc.residual_shear_mpa = {c.t.fixed("s1", -0.2), c.t.fixed("sx", 0.1), c.t.fixed("sy", 0.3), c.t.fixed("sxx", 0.6)};
+    c.scene.sample = disc;
+    c.scene.microscope.quarter_wave = circular;
+    all.push_back(c);
+  }
   return all;
 }
 
