@@ -4,6 +4,7 @@
 // Frames, signs and units: docs/conventions.md. Sources: docs/methods.md.
 
 #include <array>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -26,7 +27,53 @@ struct E44Steinberg2020 {
   ParameterRef temperature_k;  ///< ignored where the sample has its own temperature profile (heated plate)
 };
 
-using Material = std::variant<ConstantIndices, E44Steinberg2020>;
+/// The index of one ray against wavelength: a formula of refractiveindex.info by its number there, or a table. Wavelengths
+/// in um, vacuum; holds from lower_um to upper_um only (docs/methods.md, "Materials").
+struct Dispersion {
+  enum class Form { sellmeier = 1, sellmeier_2, polynomial, refractiveindex_info, cauchy, gases, herzberger, retro, exotic, table };
+  Form form = Form::cauchy;
+  std::vector<double> coefficients;   ///< C1, C2, ..; exponents among them
+  std::vector<ParameterRef> refs;     ///< empty, or as many: those given stand in for their coefficient
+  std::vector<double> wavelength_um, index;  ///< of a table: growing, at least two
+  double lower_um = 0, upper_um = 0;
+};
+
+/// Both rays against wavelength.
+struct DispersiveIndices {
+  Dispersion ordinary, extraordinary;
+};
+
+/// n_e = A - B T + 2/3 dn0 (1 - T/Tc)^b, n_o = A - B T - 1/3 dn0 (1 - T/Tc)^b (Li, Gauza, Wu 2004). Several sets: their
+/// numbers are interpolated in 1/wavelength^2 between the wavelengths they were fitted at.
+struct FourParameterIndices {
+  struct Set {
+    double wavelength_um = 0;        ///< 0: a single set, for the scene's wavelength
+    ParameterRef mean_index;         ///< A
+    ParameterRef mean_slope_per_k;   ///< B
+    ParameterRef birefringence_0k;   ///< dn0, extrapolated to 0 K
+    ParameterRef exponent;           ///< b
+    ParameterRef clearing_k;         ///< Tc
+  };
+  std::vector<Set> sets;
+};
+
+/// Haller's law on indices known at one temperature: n_e - n_o is multiplied by ((1 - T/Tc)/(1 - T_ref/Tc))^exponent, the
+/// mean (n_e + 2 n_o)/3 falls by mean_slope_per_k (T - T_ref). Both temperatures below the clearing point Tc.
+struct HallerLaw {
+  ParameterRef reference_k, clearing_k, exponent, mean_slope_per_k;
+};
+
+/// A material from the literature or a file: indices by wavelength, perhaps by temperature.
+struct LawIndices {
+  std::variant<ConstantIndices, DispersiveIndices, FourParameterIndices> indices;
+  std::optional<HallerLaw> haller;    ///< of the first two
+  ParameterRef temperature_k;         ///< where a temperature law needs one; ignored by a sample with its own profile
+  ParameterRef birefringence_factor;  ///< n_e - n_o times this; not given: 1
+  double lower_k = 0, upper_k = 0;    ///< where the temperature law holds; 0, 0: anywhere below the clearing point
+  double birefringence_uncertainty = 0;  ///< standard deviation of n_e - n_o over itself, 0 = not stated: enters the model error
+};
+
+using Material = std::variant<ConstantIndices, E44Steinberg2020, LawIndices>;
 
 // ---- director fields ------------------------------------------------------------------------------------------------
 
@@ -122,7 +169,22 @@ struct Slab {
   ParameterRef half_angle_deg;  ///< of a converging cone in the outside medium, (0, 80]; none: the microscope's directions
 };
 
-using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab>;
+/// Disc pressed together across a diameter, plane stress (docs/methods.md, "Photoelastic disc"). Retardance = stress_optic x
+/// thickness x difference of the principal stresses. Lengths are those of View::pixel_size_um.
+struct StressedDisc {
+  ParameterRef diameter_um;
+  ParameterRef thickness_um;
+  ParameterRef load_n;                 ///< >= 0; the pattern's sign is not observable
+  ParameterRef stress_optic_brewster;  ///< 1e-12/Pa
+  ParameterRef load_azimuth_deg;       ///< of the line of the two forces, from +x; not given: 90
+  double contact_radius_um = 0;  ///< around the two load points nothing is fitted; 0 = a tenth of the radius
+  double rim_um = 0;             ///< the same along the edge; 0 = a fiftieth of the radius
+  /// Residual stress sxx - syy and 2 sxy in MPa, in the frame of the load (y along it): coefficients of 1, X, Y, X^2, XY,
+  /// Y^2, X^3, .. with X, Y in units of the radius; empty = none.
+  std::vector<ParameterRef> residual_normal_mpa, residual_shear_mpa;
+};
+
+using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab, StressedDisc>;
 
 // ---- microscope -----------------------------------------------------------------------------------------------------
 
@@ -141,6 +203,7 @@ struct Microscope {
   double objective_na = 0;   ///< 0 = not stated. Droplet rays leaving steeper than this are lost.
   bool aplanatic = false;    ///< imaging: focal_plane (default) or aplanatic, docs/conventions.md
   std::vector<Direction> directions;  ///< slab scenes
+  bool quarter_wave = false;  ///< circular polariscope: quarter-wave plates at 45 degrees from the polarizer, crossed; discs
 };
 
 /// How pixels lie on the sample.
@@ -163,6 +226,7 @@ struct Scene {
   Sample sample;
   Material material;
   ParameterRef surround_index;
+  std::optional<Dispersion> surround_dispersion;  ///< instead of surround_index
   Microscope microscope;
   View view;
   Ceiling ceiling = Ceiling::one_way;

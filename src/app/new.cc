@@ -107,19 +107,42 @@ microscope:
     - {theta_deg: 20, azimuth_deg: 30}
 )";
 
+const char* const kDisc = R"(# A photoelastic disc pressed together across its diameter, in a polariscope.
+micrograph:
+  image: disc.tif              # camera files are rarely linear: transfer: srgb
+  pixel_size_um: 85            # on the disc
+  center_px: [80, 79]          # or fitted: [{value: 80, fit: [77, 83]}, {value: 79, fit: [76, 82]}]
+  gain: {fit: auto}
+  offset: {fit: auto}
+sample:
+  disc:
+    diameter_um: 12000
+    stress_optic_brewster: 50  # 1e-12/Pa. One image tells stress_optic * load / wavelength / radius only:
+    load_n: {value: 280, fit: [100, 600]}   # fit this, or the coefficient with a known load, not both
+    load_azimuth_deg: 90       # of the line of the two forces, from +x
+    contact_radius_um: 600     # around the forces nothing is fitted
+    # thickness_um: 6000       # matters for residual stress only:
+    # residual: {normal_mpa: [{value: 0, fit: [-1, 1]}], shear_mpa: [{value: 0, fit: [-1, 1]}]}
+microscope:
+  light: {wavelength_nm: 546}
+  polarizer_deg: 0
+  analyzer_deg: 90
+  quarter_wave: true           # circular polariscope: no isoclinics; false: plane polariscope
+)";
+
 }  // namespace
 
 Command add_new_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("new", "print a commented config to start from");
   auto kind = std::make_shared<std::string>();
-  command->add_option("KIND", *kind, "droplet, cell, plate, crystal or slab")->required();
+  command->add_option("KIND", *kind, "droplet, cell, plate, crystal, slab or disc")->required();
   return {command, [kind] {
             const std::map<std::string, const char*> templates = {
-                {"droplet", kDroplet}, {"cell", kCell}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}};
-            if (*kind == "shell") throw UserError({}, "new shell: shells come later", "known: droplet, cell, plate, crystal, slab");
+                {"droplet", kDroplet}, {"cell", kCell}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}};
+            if (*kind == "shell") throw UserError({}, "new shell: shells come later", "known: droplet, cell, plate, crystal, slab, disc");
             const auto found = templates.find(*kind);
             if (found == templates.end())
-              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, cell, plate, crystal, slab");
+              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, cell, plate, crystal, slab, disc");
             std::cout << found->second;
             return kExitDone;
           }};

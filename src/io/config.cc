@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "birefit/io.h"
+#include "io/config_disc.h"
 #include "io/config_pixels.h"
 #include "io/config_reader.h"
 #include "io/config_scene.h"
@@ -120,7 +121,8 @@ ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::st
 void read_center(ConfigReader& reader, const Block& block, const Scene& scene, MicrographSettings& settings) {
   const bool droplet = std::holds_alternative<Droplet>(scene.sample);
   const Slab* slab = std::get_if<Slab>(&scene.sample);
-  const bool cone = std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
+  const bool disc = std::holds_alternative<StressedDisc>(scene.sample);
+  const bool cone = disc || std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
   const YamlNode* node = block.find("center_px");
   const std::string path = "micrograph.center_px";
   if (node && node->is_sequence() && node->items.size() == 2) {
@@ -181,7 +183,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   pixel_size.unit = "um";
   pixel_size.lower = 0;
   pixel_size.lower_open = true;
-  pixel_size.upper = 20;
+  pixel_size.upper = std::holds_alternative<StressedDisc>(scene.sample) ? 1000 : 20;
   settings.pixel_size_um = reader.plain(block, "pixel_size_um", pixel_size);
 
   if (const YamlNode* transfer = block.find("transfer")) {
@@ -775,7 +777,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       if (!used.count(i)) reader.table[i].free = false;
   }
 
-  const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample);
+  const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample) || std::holds_alternative<StressedDisc>(shared.scene.sample);
   const auto demand_pixel_size = [&](const Scene& scene) {
     if (needs_pixel_size && !(scene.view.pixel_size_um > 0) && reader.problems.empty())
       reader.problems.add(settings.where.line > 0 ? settings.where : Where{reader.file},
@@ -861,6 +863,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       if (!sound || !reader.problems.empty()) continue;
       resolve_automatic(reader, micrograph.scene, &micrograph.values, &micrograph.mask, micrograph.name);
       check_overlap(reader, micrograph.scene, micrograph.name);
+      mask_stressed_disc(reader, micrograph);
     }
     if (calibration && calibration->has_crossed && settings.offset_automatic) {
       Parameter& offset = reader.table[settings.offset];
@@ -874,7 +877,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
     if (reader.problems.empty()) read_prior(reader, root, config.job);
     else if (root.find("prior")) reader.block(root, "prior", {"from", "parameters"}, true);
   }
-  if (needs_pixel_size && config.scene.microscope.objective_na == 0)
+  if (std::holds_alternative<Droplet>(config.scene.sample) && config.scene.microscope.objective_na == 0)
     reader.warnings.push_back("microscope.objective_na is not given: every ray that leaves the droplet is taken to reach "
                               "the image.");
 

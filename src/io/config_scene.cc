@@ -5,13 +5,15 @@
 #include <cmath>
 #include <utility>
 
+#include "io/config_disc.h"
+#include "io/config_material.h"
 #include "io/table.h"
 #include "transport/method.h"
 
 namespace birefit {
 namespace {
 
-const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate", "crystal", "slab"};
+const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate", "crystal", "slab", "disc"};
 
 NumberSpec open_length(double upper_um) {
   NumberSpec spec;
@@ -400,12 +402,10 @@ void check_within(ConfigReader& reader, ParameterRef ref, double lower, double u
 }
 
 Material read_material(ConfigReader& reader, const Block& sample, const Sample& kind) {
-  const Block block =
-      reader.block(sample, "material", {"ordinary", "birefringence", "name", "temperature_k", "file"}, true);
-  if (const YamlNode* file = block.find("file")) {
-    reader.problems.add(file->where, "material files come later", "give ordinary and birefringence");
-    return ConstantIndices{};
-  }
+  std::vector<std::string> keys = {"ordinary", "birefringence", "name", "temperature_k"};
+  keys.insert(keys.end(), law_material_keys().begin(), law_material_keys().end());
+  const Block block = reader.block(sample, "material", keys, true);
+  if (is_law_material(block)) return read_law_material(reader, block, kind);
   const Plate* plate = std::get_if<Plate>(&kind);
   const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
   if (block.find("name")) {
@@ -435,7 +435,7 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
     reader.problems.add(node->where, "temperature_k has no effect on constant indices", "leave it out");
   if (heat && block.node)
     reader.problems.add(block.where, "sample.plate.heat has no effect on constant indices",
-                        "use material: {name: E44-steinberg2020}, or leave heat out");
+                        "use material: {name: E44-steinberg2020} or add haller, or leave heat out");
   ConstantIndices material;
   material.ordinary = reader.number(block, "ordinary", index_spec());
   material.birefringence = reader.number(block, "birefringence", number_within(-1, 1));
@@ -449,7 +449,7 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   std::vector<std::string> keys = kSampleKinds;
   keys.insert(keys.end(), {"material", "surround"});
   const Block block = reader.block(root, "sample", keys, true);
-  const std::vector<std::string> available = {"droplet", "cell", "plate", "crystal", "slab"};
+  const std::vector<std::string> available = {"droplet", "cell", "plate", "crystal", "slab", "disc"};
   const auto kind = one_kind(reader, block, available, {"shell"}, {"material", "surround"});
   if (!kind) return;
   if (*kind == "droplet") scene.sample = read_droplet(reader, block);
@@ -457,24 +457,29 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   if (*kind == "plate") scene.sample = read_plate(reader, block);
   if (*kind == "crystal") scene.sample = read_crystal(reader, block);
   if (*kind == "slab") scene.sample = read_slab(reader, block);
+  if (*kind == "disc") scene.sample = read_stressed_disc(reader, block);
 
-  const bool own_indices = *kind == "crystal" || *kind == "slab";
+  const bool own_indices = *kind == "crystal" || *kind == "slab" || *kind == "disc";
   if (own_indices) {
     if (const YamlNode* node = block.find("material"))
       reader.problems.add(node->where, "unknown key material: a " + *kind + " needs none",
-                          *kind == "slab" ? "its indices are in the profile" : "its half-wave voltage says it all");
+                          *kind == "slab" ? "its indices are in the profile"
+                          : *kind == "disc" ? "its stress-optic coefficient says it all"
+                                            : "its half-wave voltage says it all");
   } else {
     scene.material = read_material(reader, block, scene.sample);
   }
-  if (*kind == "crystal") {
+  if (*kind == "crystal" || *kind == "disc") {
     if (const YamlNode* node = block.find("surround"))
-      reader.problems.add(node->where, "unknown key surround: a crystal needs none");
+      reader.problems.add(node->where, "unknown key surround: a " + *kind + " needs none");
     scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
     reader.specs.erase("sample.surround.index");
     return;
   }
-  const Block surround = reader.block(block, "surround", {"index"}, *kind == "droplet");
-  if (surround.node || *kind == "droplet") {
+  const Block surround = reader.block(block, "surround", {"index", "file"}, *kind == "droplet");
+  if (surround.find("file")) {
+    scene.surround_dispersion = read_surround_file(reader, surround);
+  } else if (surround.node || *kind == "droplet") {
     scene.surround_index = reader.number(surround, "index", index_spec());
   } else {
     scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
@@ -498,7 +503,7 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   Microscope& microscope = scene.microscope;
   const Block block = reader.block(root, "microscope",
                                    {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg",
-                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions"},
+                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions", "quarter_wave"},
                                    true);
   const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
   NumberSpec wavelength;
@@ -523,6 +528,9 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
                         "0, the mid plane, is");
   microscope.aplanatic = reader.choice(block, "imaging", {"focal_plane", "aplanatic"}).value_or("") == "aplanatic";
 
+  microscope.quarter_wave = reader.choice(block, "quarter_wave", {"true", "false"}).value_or("false") == "true";
+  if (microscope.quarter_wave && !std::holds_alternative<StressedDisc>(scene.sample))
+    reader.problems.add(block.find("quarter_wave")->where, "quarter_wave is for discs", "leave it out");
   if (const YamlNode* directions = block.find("directions")) {
     if (!slab)
       reader.problems.add(directions->where, slab_sample ? "a slab with a view in a cone has a direction for every pixel"
@@ -578,6 +586,7 @@ Scene read_scene(ConfigReader& reader, const Block& root) {
   // Which kind it is steers what the microscope needs, so the sample comes first.
   read_sample(reader, root, scene);
   read_microscope(reader, root, scene);
+  check_material_ranges(reader, root, scene);
   read_numerics(reader, root, scene);
   return scene;
 }

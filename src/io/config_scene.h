@@ -50,12 +50,33 @@ void for_each_ref(Scene& scene, F&& f) {
     f(crystal->electrode_high_px);
   } else if (auto* slab = std::get_if<Slab>(&scene.sample)) {
     f(slab->half_angle_deg);
+  } else if (auto* disc = std::get_if<StressedDisc>(&scene.sample)) {
+    for (ParameterRef* ref : {&disc->diameter_um, &disc->thickness_um, &disc->load_n, &disc->stress_optic_brewster, &disc->load_azimuth_deg})
+      f(*ref);
+    for (ParameterRef& coefficient : disc->residual_normal_mpa) f(coefficient);
+    for (ParameterRef& coefficient : disc->residual_shear_mpa) f(coefficient);
   }
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material)) {
     f(constant->ordinary);
     f(constant->birefringence);
   } else if (auto* e44 = std::get_if<E44Steinberg2020>(&scene.material)) {
     f(e44->temperature_k);
+  } else if (auto* law = std::get_if<LawIndices>(&scene.material)) {
+    if (auto* constant = std::get_if<ConstantIndices>(&law->indices)) {
+      f(constant->ordinary);
+      f(constant->birefringence);
+    } else if (auto* dispersive = std::get_if<DispersiveIndices>(&law->indices)) {
+      for (ParameterRef& ref : dispersive->ordinary.refs) f(ref);
+      for (ParameterRef& ref : dispersive->extraordinary.refs) f(ref);
+    } else {
+      for (FourParameterIndices::Set& set : std::get<FourParameterIndices>(law->indices).sets)
+        for (ParameterRef* ref : {&set.mean_index, &set.mean_slope_per_k, &set.birefringence_0k, &set.exponent, &set.clearing_k}) f(*ref);
+    }
+    if (law->haller)
+      for (ParameterRef* ref : {&law->haller->reference_k, &law->haller->clearing_k, &law->haller->exponent, &law->haller->mean_slope_per_k})
+        f(*ref);
+    f(law->temperature_k);
+    f(law->birefringence_factor);
   }
   f(scene.surround_index);
   f(scene.microscope.wavelength_nm);

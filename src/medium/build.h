@@ -10,6 +10,8 @@
 #include "medium/families/planar.h"
 #include "medium/families/profile.h"
 #include "medium/families/radial.h"
+#include "medium/materials/dispersion.h"
+#include "medium/materials/nematic.h"
 
 namespace birefit {
 
@@ -18,9 +20,54 @@ struct Indices {
   S ordinary, extraordinary;  ///< n_o, n_e
 };
 
+/// Without the law of temperature: at the reference temperature of one, if there is one.
+template <class S, class V>
+Indices<S> indices_at_reference(const LawIndices& law, const V& value, const S& wavelength_um) {
+  const S factor = value.get(law.birefringence_factor, 1.0);
+  if (const auto* constant = std::get_if<ConstantIndices>(&law.indices)) {
+    const S n_o = value(constant->ordinary);
+    return {n_o, n_o + factor * value(constant->birefringence)};
+  }
+  const auto& dispersive = std::get<DispersiveIndices>(law.indices);
+  const S n_o = index_at<S>(dispersive.ordinary, wavelength_um, value);
+  return {n_o, n_o + factor * (index_at<S>(dispersive.extraordinary, wavelength_um, value) - n_o)};
+}
+
+/// The law of temperature of a material that has one (a HallerLaw or FourParameterIndices) at one wavelength.
+template <class S, class V>
+NematicLaw<S> nematic_law(const LawIndices& law, const V& value, const S& wavelength_um) {
+  if (const auto* four = std::get_if<FourParameterIndices>(&law.indices)) {
+    // The number of each set, straight lines in 1/wavelength^2 between the sets.
+    const auto at = [&](ParameterRef FourParameterIndices::Set::* number) {
+      const auto& sets = four->sets;
+      if (sets.size() == 1) return S(value(sets[0].*number));
+      std::size_t i = 0;
+      while (i + 2 < sets.size() && lane(plain(wavelength_um), 0) > sets[i + 1].wavelength_um) ++i;
+      const double from = 1 / square(sets[i].wavelength_um), to = 1 / square(sets[i + 1].wavelength_um);
+      const S part = (1.0 / (wavelength_um * wavelength_um) - from) * (1 / (to - from));
+      const S a = value(sets[i].*number), b = value(sets[i + 1].*number);
+      return S(a + part * (b - a));
+    };
+    using Set = FourParameterIndices::Set;
+    return {at(&Set::mean_index), value.get(law.birefringence_factor, 1.0) * at(&Set::birefringence_0k), S(0.0),
+            1.0 / at(&Set::clearing_k), at(&Set::exponent), at(&Set::mean_slope_per_k)};
+  }
+  const Indices<S> n = indices_at_reference<S>(law, value, wavelength_um);
+  return {(n.extraordinary + 2.0 * n.ordinary) * (1.0 / 3), n.extraordinary - n.ordinary, value(law.haller->reference_k),
+          1.0 / value(law.haller->clearing_k), value(law.haller->exponent), value.get(law.haller->mean_slope_per_k, 0.0)};
+}
+
 /// `value(ref)` gives a parameter as S, `value.radians(ref)` an angle, `value.get(ref, fallback)` an optional one.
 template <class S, class V>
-Indices<S> material_indices(const Material& material, const V& value) {
+Indices<S> material_indices(const Material& material, const V& value, const S& wavelength_um) {
+  if (const auto* law = std::get_if<LawIndices>(&material)) {
+    if (law->haller || std::holds_alternative<FourParameterIndices>(law->indices)) {
+      Indices<S> n;
+      nematic_law<S>(*law, value, wavelength_um).at(value.get(law->temperature_k, 298.15), n.ordinary, n.extraordinary);
+      return n;
+    }
+    return indices_at_reference<S>(*law, value, wavelength_um);
+  }
   if (const auto* constant = std::get_if<ConstantIndices>(&material)) {
     const S n_o = value(constant->ordinary);
     return {n_o, n_o + value(constant->birefringence)};
@@ -47,7 +94,7 @@ Vec3<S> rotated(const Vec3<S>& axis, const S& angle_rad) {
 /// Column through a plane-parallel sample (cell, plate, slab), turned by `rotation_rad` about z.
 template <class S, class V>
 std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Material& material, const V& value,
-                                              const S& rotation_rad) {
+                                              const S& rotation_rad, const S& wavelength_um) {
   const auto make = [](auto law, bool planar) -> std::unique_ptr<Column<S>> {
     auto column = std::make_unique<LawColumn<S, decltype(law)>>(std::move(law));
     column->planar = planar;
@@ -61,7 +108,7 @@ std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Materi
     column->breaks.assign(table->edges().begin() + 1, table->edges().end() - 1);
     return column;
   }
-  const Indices<S> n = material_indices<S>(material, value);
+  const Indices<S> n = material_indices<S>(material, value, wavelength_um);
   const S eo = n.ordinary * n.ordinary, ee = n.extraordinary * n.extraordinary;
   if (const auto* cell = std::get_if<Cell>(&sample)) {
     const S thickness = value(cell->thickness_um);
@@ -75,7 +122,12 @@ std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Materi
   const Plate& plate = std::get<Plate>(sample);
   const S thickness = value(plate.thickness_um);
   const Vec3<S> axis = rotated(uniform_axis<S>(plate.director, value), rotation_rad);
-  if (const auto* heat = std::get_if<HeatStep>(&plate.heat))
+  const auto* heat = std::get_if<HeatStep>(&plate.heat);
+  if (const auto* law = std::get_if<LawIndices>(&material); heat && law)
+    return make(HeatedNematicLaw<S>{axis, value(heat->fourier_number), value(heat->cold_k), value(heat->hot_k), thickness,
+                                    nematic_law<S>(*law, value, wavelength_um)},
+                true);
+  if (heat)
     return make(HeatedLaw<S>{axis, value(heat->fourier_number), value(heat->cold_k), value(heat->hot_k), thickness},
                 true);
   return make(UniformLaw<S>{axis, eo, ee, thickness}, true);

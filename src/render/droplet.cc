@@ -136,12 +136,12 @@ DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho
 template <class S>
 DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
   const Droplet& droplet = std::get<Droplet>(scene.sample);
-  const Indices<S> n = material_indices<S>(scene.material, value);
+  const Indices<S> n = material_indices<S>(scene.material, value, wavelength_um(scene, value));
   DropletOptics<S> o;
   o.radius_um = 0.5 * value(droplet.diameter_um);
   o.n_o = n.ordinary;
   o.n_e = n.extraordinary;
-  o.n_host = value(scene.surround_index);
+  o.n_host = host_index(scene, value);
   o.ratio = o.n_host / o.n_o;
   o.k0 = wavenumber_per_um(scene, value);
   using Director = typename DropletOptics<S>::Director;

@@ -8,6 +8,7 @@
 
 #include "birefit/render.h"
 #include "core/scalar.h"
+#include "medium/materials/dispersion.h"
 #include "render/fringe.h"
 
 namespace birefit {
@@ -63,6 +64,17 @@ S wavenumber_per_um(const Scene& scene, const Values<S>& value) {
   return (2000 * std::numbers::pi) / value(scene.microscope.wavelength_nm);
 }
 
+/// The same wavelength in um, and the index of what is around the sample at it.
+template <class S>
+S wavelength_um(const Scene& scene, const Values<S>& value) {
+  return value(scene.microscope.wavelength_nm) * 1e-3;
+}
+template <class S>
+S host_index(const Scene& scene, const Values<S>& value) {
+  if (scene.surround_dispersion) return index_at<S>(*scene.surround_dispersion, wavelength_um(scene, value), value);
+  return value.get(scene.surround_index, 1.0);
+}
+
 template <class S>
 struct Polarizers {
   S px, py, ax, ay;  ///< unit vectors of polarizer and analyser in the image's x, y
@@ -82,6 +94,8 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_planar_model(const Scene&, const RenderPlan&, const Values<S>&);
 template <class S>
 std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene&, const RenderPlan&, const Values<S>&);
+template <class S>
+std::unique_ptr<PixelModel<S>> make_disc_model(const Scene&, const RenderPlan&, const Values<S>&);
 template <class S>
 std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene&, const RenderPlan&, const Values<S>&);
 

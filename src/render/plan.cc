@@ -10,6 +10,8 @@
 
 #include "birefit/render.h"
 #include "medium/build.h"
+#include "medium/validity.h"
+#include "render/disc.h"
 #include "render/droplet.h"
 #include "render/fringe_table.h"
 #include "render/pilots.h"
@@ -538,6 +540,55 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   return plan;
 }
 
+/// Retardance (rad) of a disc at a place in units of its radius.
+double disc_phase(const DiscOptics<double>& o, double x, double y) {
+  const StressPair<double> p = o.phases(x, y);
+  return std::hypot(p.normal, p.shear);
+}
+
+RenderPlan plan_disc(const Scene& scene, const Values<double>& value) {
+  if (scene.method != "auto" && scene.method != "diagonal")
+    throw UserError(Where{}, fmt::format("transport method '{}' does not apply to a photoelastic disc", scene.method),
+                    "leave transport.method at auto");
+  if (!(scene.view.pixel_size_um > 0)) throw UserError(Where{}, "a disc needs micrograph.pixel_size_um", "the size of a pixel on the disc");
+  RenderPlan plan;
+  plan.method = "closed_form";
+  plan.reasons.push_back("plane stress is the same at all depths: one retarder a point, in closed form");
+  const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+  const DiscOptics<double> o(scene, value);
+  const double radius_px = 1 / o.px_per_radius_inverse;
+  if (radius_px > 100000) throw UserError(Where{}, "the disc is more than 200000 pixels across", "check diameter_um and pixel_size_um");
+  const DiscMargins margins = disc_margins(disc, 0.5 * value(disc.diameter_um));
+  double largest_phase = 0;
+  // The fringes change slowly from radius to radius: measured on 120 radii. Inside the contacts nothing is fitted.
+  std::vector<double> gradient(121);
+  const double h = 0.5 / radius_px;
+  for (int i = 0; i <= 120; ++i)
+    for (int k = 0; k < 72; ++k) {
+      const double r = i / 120.0, x = r * std::sin(k * kPi / 36), y = r * std::cos(k * kPi / 36);
+      if (std::min(std::hypot(x, y - 1), std::hypot(x, y + 1)) < margins.contact) continue;
+      largest_phase = std::max(largest_phase, disc_phase(o, x, y));
+      gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(disc_phase(o, x + h, y) - disc_phase(o, x - h, y), disc_phase(o, x, y + h) - disc_phase(o, x, y - h)));
+    }
+  const int bins = std::max(2, static_cast<int>(std::ceil(radius_px)) + 2);
+  sample_by_phase(plan, o.center_x_px, o.center_y_px, bins, [&](double r) {
+    if (std::abs(r - radius_px) < 2) return 9.0;  // the edge
+    const double f = std::min(119.999, r / radius_px * 120);
+    const std::size_t i = static_cast<std::size_t>(f);
+    return std::max(gradient[i], gradient[i + 1]);
+  });
+  plan.samples.push_back(1);  // outside
+  const double fastest = *std::max_element(gradient.begin(), gradient.end());
+  plan.reasons.push_back(fmt::format("the retardance reaches {:.3g} rad outside the contacts and changes by up to {:.2g} rad a pixel; pixel means from up to {} x {} points",
+                                     largest_phase, fastest, *std::max_element(plan.samples.begin(), plan.samples.end()),
+                                     *std::max_element(plan.samples.begin(), plan.samples.end())));
+  if (fastest > 2 * kPi)
+    plan.warnings.push_back(fmt::format("Fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um leaves these out.", fastest));
+  note_illumination(scene, value, largest_phase, plan);
+  plan.cost_seconds = 4e-8 * scene.view.width * scene.view.height;
+  return plan;
+}
+
 /// Retardance phases at points fixed relative to the sample, for judging how fast fringes move.
 std::vector<double> phases(const Scene& scene, const Theta& theta) {
   const Values<double> value(theta, {});
@@ -550,6 +601,12 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
     double field = 1;
     for (ParameterRef c : crystal->field_legendre) field += value(c);
     result.push_back(kPi * value(crystal->bias_v) / value(crystal->half_wave_voltage_v) * field);
+  } else if (std::holds_alternative<StressedDisc>(scene.sample)) {
+    const DiscOptics<double> o(scene, value);
+    for (const auto& [x, y] : {std::pair{0.0, 0.0}, {0.0, 0.4}, {0.4, 0.0}, {0.3, 0.6}, {-0.3, 0.6}, {0.5, -0.5}, {0.0, -0.8}, {-0.7, 0.1}}) {
+      const StressPair<double> p = o.phases(x, y);
+      result.insert(result.end(), {p.normal, p.shear});
+    }
   } else {
     const PlanarOptics<double> o = planar_optics(scene, value);
     for (const auto& [tx, ty] : pilot_directions(scene, value)) result.push_back(planar_phase(o, tx, ty));
@@ -560,10 +617,25 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
   return result;
 }
 
+/// What the literature's birefringence is off by.
+void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
+  const auto* law = std::get_if<LawIndices>(&scene.material);
+  if (!law || law->birefringence_uncertainty <= 0) return;
+  double largest_phase = 0;
+  for (double phase : phases(scene, theta)) largest_phase = std::max(largest_phase, std::abs(phase));
+  const double unsure = largest_phase * law->birefringence_uncertainty;
+  plan.model_error = std::hypot(plan.model_error, 0.5 * std::min(1.0, unsure));  // the steepest slope of sin^2(phase/2)
+  plan.warnings.push_back(fmt::format(
+      "The material's birefringence is known to {:.2g} % only (standard deviation): the largest retardance, {:.3g} rad, to {:.2g} rad. "
+      "Intervals do not contain this unless sample.material.birefringence_factor is fitted with prior_sd: {:.2g}.",
+      100 * law->birefringence_uncertainty, largest_phase, unsure, law->birefringence_uncertainty));
+}
+
 }  // namespace
 
 RenderPlan plan(const Scene& scene, const Theta& theta) {
   check_method(scene);
+  check_validity(scene, theta);
   const Values<double> value(theta, {});
   RenderPlan result;
   if (std::holds_alternative<Droplet>(scene.sample)) {
@@ -577,9 +649,12 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     result.cost_seconds = 5e-9 * scene.view.width * scene.view.height;
     const Crystal& crystal = std::get<Crystal>(scene.sample);
     note_illumination(scene, value, std::abs(kPi * value(crystal.bias_v) / value(crystal.half_wave_voltage_v)), result);
+  } else if (std::holds_alternative<StressedDisc>(scene.sample)) {
+    result = plan_disc(scene, value);
   } else {
     result = plan_planar(scene, value);
   }
+  note_material(scene, theta, result);
   result.physics = scene.ceiling == Ceiling::e_only        ? "e_only"
                    : scene.ceiling == Ceiling::reflections ? "reflections"
                                                            : "one_way";

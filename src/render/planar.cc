@@ -18,9 +18,9 @@ template <class S>
 PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value) {
   PlanarOptics<S> o;
   o.column = std::make_unique<CachedColumn<S>>(
-      make_planar_column<S>(scene.sample, scene.material, value, value.radians(scene.view.rotation_deg)));
+      make_planar_column<S>(scene.sample, scene.material, value, value.radians(scene.view.rotation_deg), wavelength_um(scene, value)));
   o.k0 = wavenumber_per_um(scene, value);
-  o.n_host = value.get(scene.surround_index, 1.0);
+  o.n_host = host_index(scene, value);
   o.continuity = scene.ceiling == Ceiling::e_only ? Continuity::e_only : Continuity::e_and_h;
   return o;
 }

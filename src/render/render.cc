@@ -17,6 +17,7 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   if (std::holds_alternative<Droplet>(scene.sample)) return make_droplet_model(scene, plan, value);
   if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
+  if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
   return make_planar_model(scene, plan, value);
 }
 

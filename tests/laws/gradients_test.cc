@@ -210,6 +210,73 @@ std::vector<Case> cases() {
     c.scene.sample = crystal;
     all.push_back(c);
   }
+  {
+    // Every number of the laws of materials: wavelength (in the indices too), temperature, clearing point, coefficients.
+    Case c = base("nematic droplet in a liquid of known dispersion");
+    Droplet d;
+    d.diameter_um = c.t.fixed("diameter_um", 16);
+    c.scene.sample = d;
+    const auto law = [&](const std::string& name, Dispersion::Form form, std::vector<double> coefficients, std::vector<int> fitted) {
+      Dispersion r;
+      r.form = form;
+      r.coefficients = coefficients;
+      r.refs.resize(coefficients.size());
+      for (int i : fitted) r.refs[static_cast<std::size_t>(i)] = c.t.fixed(name + std::to_string(i), coefficients[static_cast<std::size_t>(i)]);
+      r.lower_um = 0.4;
+      r.upper_um = 0.8;
+      return r;
+    };
+    LawIndices m;
+    m.indices = DispersiveIndices{law("cauchy", Dispersion::Form::cauchy, {1.5139, 0.0052, -2, 0.0008, -4.5}, {0, 1, 3}),
+                                  law("sellmeier", Dispersion::Form::sellmeier_2, {0, 1.83, 0.018}, {1, 2})};
+    m.haller = HallerLaw{c.t.fixed("reference_k", 298), c.t.fixed("clearing_k", 309), c.t.fixed("exponent", 0.17), c.t.fixed("slope", 2e-4)};
+    m.temperature_k = c.t.fixed("temperature_k", 304);
+    m.birefringence_factor = c.t.fixed("factor", 1.05);
+    c.scene.material = m;
+    Dispersion table;
+    table.form = Dispersion::Form::table;
+    table.wavelength_um = {0.4, 0.55, 0.62, 0.8};
+    table.index = {1.47, 1.44, 1.433, 1.42};
+    table.lower_um = 0.4;
+    table.upper_um = 0.8;
+    c.scene.surround_dispersion = table;
+    all.push_back(c);
+  }
+  {
+    Case c = base("heated nematic plate");
+    Plate plate;
+    plate.thickness_um = c.t.fixed("thickness_um", 60);
+    plate.director.azimuth_deg = c.t.fixed("azimuth_deg", 40);
+    plate.director.tilt_deg = c.t.fixed("tilt_deg", 35);
+    plate.heat = HeatStep{c.t.fixed("fourier_number", 0.07), c.t.fixed("cold_k", 290), c.t.fixed("hot_k", 304)};
+    plate.half_angle_deg = c.t.fixed("half_angle_deg", 15);
+    c.scene.sample = plate;
+    LawIndices m;
+    FourParameterIndices four;
+    for (const auto& [um, a, b, dn, e, k] : {std::tuple{0.589, 1.6327, 1.347e-4, 0.3261, 0.1645, 308.74}, {0.633, 1.6238, 1.204e-4, 0.3185, 0.1650, 308.77}}) {
+      const std::string name = "set" + std::to_string(um);
+      four.sets.push_back({um, c.t.fixed(name + "a", a), c.t.fixed(name + "b", b), c.t.fixed(name + "dn", dn), c.t.fixed(name + "e", e), c.t.fixed(name + "k", k)});
+    }
+    m.indices = four;
+    m.birefringence_factor = c.t.fixed("factor", 0.95);
+    c.scene.material = m;
+    c.t.table[c.scene.microscope.wavelength_nm].value = 610;
+    all.push_back(c);
+  }
+  for (bool circular : {false, true}) {
+    Case c = base(circular ? "disc, circular polariscope" : "disc, plane polariscope");
+    StressedDisc disc;
+    disc.diameter_um = c.t.fixed("diameter_um", 40);  // larger than the picture: no edge in it
+    disc.thickness_um = c.t.fixed("thickness_um", 5000);
+    disc.load_n = c.t.fixed("load_n", 0.4);
+    disc.stress_optic_brewster = c.t.fixed("stress_optic_brewster", 30);
+    disc.load_azimuth_deg = c.t.fixed("load_azimuth_deg", 70);
+    disc.residual_normal_mpa = {c.t.fixed("n1", 0.5), c.t.fixed("nx", 0.4), c.t.fixed("ny", -0.3)};
+    disc.residual_shear_mpa = {c.t.fixed("s1", -0.2), c.t.fixed("sx", 0.1), c.t.fixed("sy", 0.3), c.t.fixed("sxx", 0.6)};
+    c.scene.sample = disc;
+    c.scene.microscope.quarter_wave = circular;
+    all.push_back(c);
+  }
   return all;
 }
 

@@ -189,7 +189,6 @@ TEST_F(Config, CountsNoBracketsInQuotesAndComments) {
 TEST_F(Config, SaysWhatComesLater) {
   EXPECT_NE(mistakes(kRender + "physics: {ceiling: wave}\n").find("not available yet"), std::string::npos);
   EXPECT_NE(mistakes(kRender + "physics: {ceiling: reflections}\n").find("cells and slabs"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kRender, "ordinary: 1.52, ", "file: a.yml, ")).find("come later"), std::string::npos);
 }
 
 TEST_F(Config, ListsTheKnownMaterials) {

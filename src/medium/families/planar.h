@@ -3,6 +3,7 @@
 
 #include "medium/column.h"
 #include "medium/materials/heat.h"
+#include "medium/materials/nematic.h"
 
 namespace birefit {
 
@@ -49,6 +50,21 @@ struct HeatedLaw {
     const T ne = e44_steinberg2020_extraordinary(temperature);
     return {{T(axis.x), T(axis.y), T(axis.z)}, T(kE44Steinberg2020Ordinary * kE44Steinberg2020Ordinary), ne * ne,
             T(0.0), T(0.0), T(thickness_um)};
+  }
+};
+
+/// The same with a nematic's own law of temperature.
+template <class S>
+struct HeatedNematicLaw {
+  Vec3<S> axis;
+  S fourier_number, cold_k, hot_k, thickness_um;
+  NematicLaw<S> nematic;
+  template <class T>
+  BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
+    const T temperature = T(cold_k) + T(hot_k - cold_k) * heat_fraction<T>(u, T(fourier_number));
+    T no, ne;
+    nematic.at(temperature, no, ne);
+    return {{T(axis.x), T(axis.y), T(axis.z)}, no * no, ne * ne, T(0.0), T(0.0), T(thickness_um)};
   }
 };
 

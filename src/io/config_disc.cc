@@ -1,0 +1,106 @@
+#include "io/config_disc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/disc.h"
+
+namespace birefit {
+namespace {
+
+NumberSpec positive(double upper, std::string unit) {
+  NumberSpec spec;
+  spec.lower = 0;
+  spec.lower_open = true;
+  spec.upper = upper;
+  spec.unit = std::move(unit);
+  spec.physical_lower = 0;
+  return spec;
+}
+
+std::vector<ParameterRef> read_polynomial(ConfigReader& reader, const Block& block, const std::string& key) {
+  std::vector<ParameterRef> refs;
+  const YamlNode* list = block.find(key);
+  if (!list) return refs;
+  if (!list->is_sequence() || list->items.empty() || list->items.size() > 36) {
+    reader.problems.add(list->where, key + " must be a list of 1 to 36 coefficients of 1, X, Y, X^2, XY, Y^2, .., found " +
+                                         (list->is_sequence() ? std::to_string(list->items.size()) + " items" : list->describe()));
+    return refs;
+  }
+  NumberSpec spec;
+  spec.lower = -1e6;
+  spec.upper = 1e6;
+  spec.unit = "MPa";
+  for (std::size_t i = 0; i < list->items.size(); ++i)
+    refs.push_back(reader.number_at(list->items[i], block.path_of(key) + "[" + std::to_string(i + 1) + "]", spec));
+  return refs;
+}
+
+}  // namespace
+
+StressedDisc read_stressed_disc(ConfigReader& reader, const Block& parent) {
+  StressedDisc disc;
+  const Block block = reader.block(parent, "disc",
+                                   {"diameter_um", "thickness_um", "load_n", "stress_optic_brewster", "load_azimuth_deg", "contact_radius_um",
+                                    "rim_um", "residual"},
+                                   true);
+  disc.diameter_um = reader.number(block, "diameter_um", positive(1e7, "um"));
+  NumberSpec load = positive(1e7, "N");
+  load.lower_open = false;  // no load: an unloaded disc may show its residual stress
+  disc.load_n = reader.number(block, "load_n", load);
+  NumberSpec optic;
+  optic.lower = -1e5;
+  optic.upper = 1e5;
+  optic.unit = "brewster";
+  disc.stress_optic_brewster = reader.number(block, "stress_optic_brewster", optic);
+  NumberSpec angle;
+  angle.unit = "deg";
+  angle.lower = -36000;
+  angle.upper = 36000;
+  disc.load_azimuth_deg = reader.number(block, "load_azimuth_deg", angle, 90);
+  disc.contact_radius_um = reader.plain(block, "contact_radius_um", positive(1e7, "um")).value_or(0);
+  disc.rim_um = reader.plain(block, "rim_um", positive(1e7, "um")).value_or(0);
+  const bool residual = block.find("residual");
+  if (residual) {
+    const Block stress = reader.block(block, "residual", {"normal_mpa", "shear_mpa"}, true);
+    disc.residual_normal_mpa = read_polynomial(reader, stress, "normal_mpa");
+    disc.residual_shear_mpa = read_polynomial(reader, stress, "shear_mpa");
+    if (stress.node && !stress.find("normal_mpa") && !stress.find("shear_mpa"))
+      reader.missing(stress, "normal_mpa or shear_mpa", "coefficients of sxx - syy and 2 sxy");
+  }
+  // The load's retardance does not depend on the thickness; the residual stress's does.
+  disc.thickness_um = residual ? reader.number(block, "thickness_um", positive(1e7, "um"))
+                               : reader.number(block, "thickness_um", positive(1e7, "um"), 1000);
+  return disc;
+}
+
+void mask_stressed_disc(ConfigReader& reader, Micrograph& micrograph) {
+  const auto* disc = std::get_if<StressedDisc>(&micrograph.scene.sample);
+  if (!disc || !reader.problems.empty()) return;
+  const auto value = [&](ParameterRef ref) { return reader.table[ref].value; };
+  const View& view = micrograph.scene.view;
+  const double radius_um = 0.5 * value(disc->diameter_um), radius_px = radius_um / view.pixel_size_um;
+  const DiscMargins margins = disc_margins(*disc, radius_um);
+  const double load = (value(disc->load_azimuth_deg) + value(view.rotation_deg)) * std::numbers::pi / 180;
+  const double cx = value(view.center_x_px), cy = value(view.center_y_px), ux = std::cos(load), uy = std::sin(load);
+  long left = 0;
+  for (int row = 0; row < view.height; ++row)
+    for (int column = 0; column < view.width; ++column) {
+      if (!micrograph.mask(column, row)) continue;
+      const double x = (column - cx) / radius_px, y = (cy - row) / radius_px;
+      const double to_force = std::min(std::hypot(x - ux, y - uy), std::hypot(x + ux, y + uy));
+      if (std::hypot(x, y) <= 1 - margins.rim && to_force >= margins.contact) {
+        ++left;
+        continue;
+      }
+      micrograph.mask(column, row) = 0;
+      ++micrograph.outside_roi;
+    }
+  const Parameter& diameter = reader.table[disc->diameter_um];
+  if (left == 0)
+    reader.problems.add(diameter.where, "no pixel of " + micrograph.name + " is left inside a disc of " + show(radius_px) + " pixels radius at [" + show(cx) + ", " +
+                                            show(cy) + "]", "check diameter_um, pixel_size_um, center_px, contact_radius_um and rim_um");
+}
+
+}  // namespace birefit

@@ -1,0 +1,28 @@
+#pragma once
+// Where the laws of materials hold: nothing is extrapolated.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "birefit/scene.h"
+
+namespace birefit {
+
+/// Closer to the clearing point than this the birefringence falls faster than any temperature is known.
+inline constexpr double kClearingMargin_k = 0.2;
+
+struct WavelengthRange {
+  double lower, upper;
+};
+/// The wavelengths (um) for which all dispersions of the scene hold; nothing where there is none.
+std::optional<WavelengthRange> wavelengths_um(const Material& material, const std::optional<Dispersion>& surround);
+/// The references to temperatures that the indices of this scene are computed at.
+std::vector<ParameterRef> temperatures(const Sample& sample, const LawIndices& law);
+/// The references to clearing points.
+std::vector<ParameterRef> clearing_points(const LawIndices& law);
+
+/// Throws UserError when theta is outside what the material's law covers: wavelength, temperature, clearing point.
+void check_validity(const Scene& scene, const Theta& theta);
+
+}  // namespace birefit

@@ -1,0 +1,75 @@
+#include "render/disc.h"
+
+#include "transport/method.h"
+
+namespace birefit {
+
+template <class S>
+DiscOptics<S>::DiscOptics(const Scene& scene, const Values<S>& value) {
+  const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+  const S radius_um = 0.5 * value(disc.diameter_um);
+  const S k0 = wavenumber_per_um(scene, value), optic = value(disc.stress_optic_brewster);
+  center_x_px = value(scene.view.center_x_px);
+  center_y_px = value(scene.view.center_y_px);
+  px_per_radius_inverse = scene.view.pixel_size_um / radius_um;
+  sin_cos(value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg), load_sin, load_cos);
+  // 1 brewster = 1e-12/Pa, 1 N/um^2 = 1e12 Pa: the powers of ten cancel, and so does the thickness.
+  load_phase = k0 * optic * value(disc.load_n) / radius_um;
+  residual_phase = k0 * optic * value(disc.thickness_um) * 1e-6;
+  for (ParameterRef ref : disc.residual_normal_mpa) residual_normal.push_back(value(ref));
+  for (ParameterRef ref : disc.residual_shear_mpa) residual_shear.push_back(value(ref));
+}
+
+DiscMargins disc_margins(const StressedDisc& disc, double radius_um) {
+  return {disc.contact_radius_um > 0 ? disc.contact_radius_um / radius_um : 0.1, disc.rim_um > 0 ? disc.rim_um / radius_um : 0.02};
+}
+
+namespace {
+
+template <class S>
+class DiscModel final : public PixelModel<S> {
+ public:
+  DiscModel(const Scene& scene, const Values<S>& value) : optics_(scene, value), circular_(scene.microscope.quarter_wave) {
+    const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+    const S load = value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg) - 0.5 * std::numbers::pi;
+    const S p = value.radians(scene.microscope.polarizer_deg) - load, a = value.radians(scene.microscope.analyzer_deg) - load;
+    sin_cos(S(a - p), sin_between_, cos_between_);
+    // Linear: the pair seen along p + a. Circular: along 2 p.
+    sin_cos(S(circular_ ? 2.0 * p : p + a), sin_sum_, cos_sum_);
+  }
+  S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const override {
+    S x, y;
+    optics_.place(S(column), S(row), x, y);
+    StressPair<S> pair = optics_.phases(x, y);
+    const auto outside = plain(S(x * x + y * y)) > PlainOf<S>(1.0);
+    pair.normal = select(outside, S(0.0), pair.normal);
+    pair.shear = select(outside, S(0.0), pair.shear);
+    // The retarder is cos(d/2) + i sin(d/2)/d [[normal, shear], [shear, -normal]], d^2 = normal^2 + shear^2.
+    const CosSinc<S> f = cos_sinc_sq(S(0.25 * (pair.normal * pair.normal + pair.shear * pair.shear)));
+    const S half = 0.5 * f.sinc_sq;
+    const S along = half * (pair.normal * cos_sum_ + pair.shear * sin_sum_);
+    const S straight = f.cos_sq * cos_between_;
+    if (!circular_) return straight * straight + along * along;
+    const S across = half * (pair.shear * cos_sum_ - pair.normal * sin_sum_) * sin_between_;
+    const S sum = straight + along * sin_between_;
+    return sum * sum + across * across;
+  }
+
+ private:
+  DiscOptics<S> optics_;
+  bool circular_;
+  S sin_between_, cos_between_, sin_sum_, cos_sum_;
+};
+
+}  // namespace
+
+template <class S>
+std::unique_ptr<PixelModel<S>> make_disc_model(const Scene& scene, const RenderPlan&, const Values<S>& value) {
+  return std::make_unique<DiscModel<S>>(scene, value);
+}
+#define BIREFIT_INSTANTIATE(S)     \
+  template struct DiscOptics<S>;   \
+  template std::unique_ptr<PixelModel<S>> make_disc_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+}  // namespace birefit

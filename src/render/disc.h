@@ -1,0 +1,42 @@
+#pragma once
+// A photoelastic disc: one retarder a point, its retardance and axis set by the stress.
+
+#include <vector>
+
+#include "medium/families/disc.h"
+#include "render/pixel_model.h"
+
+namespace birefit {
+
+template <class S>
+struct DiscOptics {
+  S center_x_px, center_y_px, px_per_radius_inverse;
+  S load_cos, load_sin;  ///< of the load's azimuth in the image
+  S load_phase;          ///< rad per P/(t R)
+  S residual_phase;      ///< rad per MPa
+  std::vector<S> residual_normal, residual_shear;
+
+  DiscOptics(const Scene& scene, const Values<S>& value);
+  /// Place in the load's frame, units of the radius: y along the line of the forces.
+  void place(const S& column, const S& row, S& x, S& y) const {
+    const S east = (column - center_x_px) * px_per_radius_inverse, north = (center_y_px - row) * px_per_radius_inverse;
+    x = east * load_sin - north * load_cos;
+    y = east * load_cos + north * load_sin;
+  }
+  /// Retardance (rad) times cos and sin of twice the azimuth of the slow axis from x of the load's frame.
+  StressPair<S> phases(const S& x, const S& y) const {
+    const StressPair<S> load = diametral_stress(x, y);
+    StressPair<S> p{load_phase * load.normal, load_phase * load.shear};
+    if (!residual_normal.empty()) p.normal = p.normal + residual_phase * plane_polynomial<S>(residual_normal, x, y);
+    if (!residual_shear.empty()) p.shear = p.shear + residual_phase * plane_polynomial<S>(residual_shear, x, y);
+    return p;
+  }
+};
+
+/// Radii (in radii of the disc) of what a fit leaves out: around the two forces, and inside of the edge.
+struct DiscMargins {
+  double contact, rim;
+};
+DiscMargins disc_margins(const StressedDisc& disc, double radius_um);
+
+}  // namespace birefit

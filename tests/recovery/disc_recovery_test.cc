@@ -1,0 +1,105 @@
+// Load and centre of a photoelastic disc from one image. Truth: the textbook's stresses and intensity, in code of its own.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "birefit/fit.h"
+#include "independent_disc.h"
+#include "independent_droplet.h"  // camera()
+#include "scene_builder.h"
+
+namespace birefit {
+namespace {
+using namespace testing;
+
+constexpr int kSide = 64;
+constexpr double kGain = 1000, kOffset = 50;
+
+IndependentDisc truth() {
+  IndependentDisc d;
+  d.center_x_px = 32.3;
+  d.center_y_px = 30.6;
+  d.um_per_px = 200;
+  d.load_n = 150;
+  return d;
+}
+
+FitJob disc_job(double counts_per_photon, double read_counts, unsigned long seed, bool coefficient_free = false) {
+  static const std::vector<double> mean = [] {
+    const IndependentDisc d = truth();
+    std::vector<double> m;
+    for (int row = 0; row < kSide; ++row)
+      for (int column = 0; column < kSide; ++column) m.push_back(kOffset + kGain * d.pixel(column, row, 16));
+    return m;
+  }();
+  const IndependentDisc d = truth();
+  TableBuilder b;
+  Scene scene;
+  StressedDisc disc;
+  disc.diameter_um = b.fixed("diameter_um", 2 * d.radius_um);
+  disc.thickness_um = b.fixed("thickness_um", d.thickness_um);
+  disc.load_n = b.fitted("load_n", 125, 60, 350);
+  disc.stress_optic_brewster = coefficient_free ? b.fitted("stress_optic_brewster", 52, 20, 100) : b.fixed("stress_optic_brewster", d.stress_optic_brewster);
+  disc.load_azimuth_deg = b.fixed("load_azimuth_deg", 90);
+  scene.sample = disc;
+  scene.microscope.wavelength_nm = b.fixed("wavelength_nm", d.wavelength_nm);
+  scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+  scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+  scene.microscope.quarter_wave = true;
+  scene.view.width = scene.view.height = kSide;
+  scene.view.pixel_size_um = d.um_per_px;
+  scene.view.center_x_px = b.fitted("center_x", 32, 29, 35);
+  scene.view.center_y_px = b.fitted("center_y", 31, 28, 34);
+  scene.view.rotation_deg = b.fixed("rotation", 0);
+  const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
+  FitJob job;
+  Micrograph m = micrograph_of("disc", scene, camera(mean, counts_per_photon, read_counts, seed, false), gain, offset, {read_counts, counts_per_photon});
+  const double radius = d.radius_um / d.um_per_px;
+  for (int row = 0; row < kSide; ++row)  // not the edge, not the forces
+    for (int column = 0; column < kSide; ++column) {
+      const double x = column - 32, y = 31 - row;
+      if (std::hypot(x, y) > 0.95 * radius || std::hypot(x, std::abs(y) - radius) < 0.2 * radius) m.mask(column, row) = 0;
+    }
+  job.micrographs.push_back(m);
+  job.parameters = b.table;
+  job.options.threads = 1;
+  return job;
+}
+
+std::map<std::string, Spread> recover(double counts_per_photon, double read_counts, int seeds) {
+  std::map<std::string, Spread> spread;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const FitResult r = fit(disc_job(counts_per_photon, read_counts, static_cast<unsigned long>(seed)));
+    EXPECT_TRUE(r.has_answer()) << "seed " << seed << ": " << r.verdict;
+    for (const auto& [name, value] : {std::pair{"load_n", truth().load_n}, std::pair{"center_x", truth().center_x_px}, std::pair{"center_y", truth().center_y_px},
+                                      std::pair{"gain", kGain}, std::pair{"offset", kOffset}}) {
+      const ParameterEstimate* p = find_estimate(r, name);
+      EXPECT_LT(std::abs(p->value - value), 5 * p->stderr_) << name << " seed " << seed << " " << p->value;
+      spread[name].add(p->value - value, p->stderr_);
+    }
+  }
+  for (const auto& [name, s] : spread)
+    std::printf("  photon %g read %g %-9s spread/stderr %.3f bias %.2f worst %.2f (stderr %.2g)\n", counts_per_photon, read_counts, name.c_str(), s.ratio(),
+                s.bias(), s.worst(), s.stderr_[0]);
+  return spread;
+}
+
+TEST(DiscRecovery, LoadAndCentreAreWithinFiveStandardErrors) { recover(1, 3, 12); }
+
+// The image holds stress_optic * load / (wavelength * radius): of the two factors only the product.
+TEST(DiscRecovery, CoefficientAndLoadTogetherAreNotIdentifiable) {
+  const FitResult r = fit(disc_job(1, 3, 5, true));
+  EXPECT_FALSE(r.has_answer());
+  EXPECT_NE(r.verdict.find("stress_optic_brewster"), std::string::npos) << r.verdict;
+  EXPECT_NE(r.verdict.find("load_n"), std::string::npos) << r.verdict;
+}
+
+TEST(LongDiscRecovery, StandardErrorsAreTheSpread) {
+  for (const auto& [name, s] : recover(1, 3, 200)) EXPECT_NEAR(s.ratio(), 1, 0.2) << name;
+}
+
+}  // namespace
+}  // namespace birefit
