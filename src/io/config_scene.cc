@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "io/config_director.h"
 #include "io/table.h"
 #include "transport/method.h"
 
@@ -162,8 +163,8 @@ Cell read_cell(ConfigReader& reader, const Block& parent) {
   Cell cell;
   const Block block = reader.block(parent, "cell", {"thickness_um", "director"}, true);
   cell.thickness_um = reader.number(block, "thickness_um", open_length(10000));
-  const Block director = reader.block(block, "director", {"uniform", "twisted", "freedericksz"}, true);
-  const auto kind = one_kind(reader, director, {"uniform", "twisted"}, {"freedericksz"});
+  const Block director = reader.block(block, "director", {"uniform", "twisted", "freedericksz", "helix"}, true);
+  const auto kind = one_kind(reader, director, {"uniform", "twisted", "freedericksz", "helix"});
   if (kind == "uniform") {
     cell.director = read_uniform(reader, director);
   } else if (kind == "twisted") {
@@ -173,6 +174,10 @@ Cell read_cell(ConfigReader& reader, const Block& parent) {
     field.azimuth_deg = reader.number(twisted, "azimuth_deg", angle(), 0);
     field.pretilt_deg = reader.number(twisted, "pretilt_deg", angle_within(-90, 90), 0);
     cell.director = field;
+  } else if (kind == "freedericksz") {
+    cell.director = read_freedericksz(reader, director);
+  } else if (kind == "helix") {
+    cell.director = read_helix(reader, director);
   }
   return cell;
 }
@@ -359,7 +364,7 @@ void check_within(ConfigReader& reader, ParameterRef ref, double lower, double u
 
 Material read_material(ConfigReader& reader, const Block& sample, const Sample& kind) {
   const Block block =
-      reader.block(sample, "material", {"ordinary", "birefringence", "name", "temperature_k", "file"}, true);
+      reader.block(sample, "material", {"ordinary", "birefringence", "resonance_nm", "name", "temperature_k", "file"}, true);
   if (const YamlNode* file = block.find("file")) {
     reader.problems.add(file->where, "material files come later", "give ordinary and birefringence");
     return ConstantIndices{};
@@ -367,7 +372,7 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
   const Plate* plate = std::get_if<Plate>(&kind);
   const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
   if (block.find("name")) {
-    for (const char* other : {"ordinary", "birefringence"})
+    for (const char* other : {"ordinary", "birefringence", "resonance_nm"})
       if (const YamlNode* node = block.find(other))
         reader.problems.add(node->where, std::string(other) + " is given beside a material's name", "give one of the two");
     if (!reader.choice(block, "name", {"E44-steinberg2020"})) return ConstantIndices{};
@@ -397,6 +402,11 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
   ConstantIndices material;
   material.ordinary = reader.number(block, "ordinary", index_spec());
   material.birefringence = reader.number(block, "birefringence", number_within(-1, 1));
+  if (block.find("resonance_nm")) {
+    NumberSpec resonance = number_within(50, 20000);
+    resonance.unit = "nm";
+    material.resonance_nm = reader.number(block, "resonance_nm", resonance);
+  }
   const double extraordinary = reader.table[material.ordinary].value + reader.table[material.birefringence].value;
   if (extraordinary < 1 && reader.problems.empty())
     reader.problems.add(block.where, "ordinary + birefringence = " + show(extraordinary) + " is below 1");
@@ -456,7 +466,7 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   Microscope& microscope = scene.microscope;
   const Block block = reader.block(root, "microscope",
                                    {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg",
-                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions"},
+                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions", "compensator"},
                                    true);
   const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
   NumberSpec wavelength;
@@ -469,6 +479,23 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   bandwidth.lower = 0;
   bandwidth.upper = 5000;
   microscope.bandwidth_nm = reader.plain(light, "bandwidth_nm", bandwidth).value_or(0);
+
+  if (auto* constant = std::get_if<ConstantIndices>(&scene.material); constant && constant->resonance_nm) {
+    constant->wavelength_nm = microscope.wavelength_nm;
+    const Parameter &resonance = reader.table[constant->resonance_nm], &light = reader.table[microscope.wavelength_nm];
+    // A quarter of the light's wavelength away from the band its law stops to hold; 589.3 nm is where birefringence is given.
+    const double shortest = std::min(light.free ? light.lower : light.value, 589.3);
+    if ((resonance.free ? resonance.upper : resonance.value) > 0.8 * shortest)
+      reader.problems.add(resonance.where, resonance.name + " must stay below 0.8 of the wavelength (and of 589.3 nm, where birefringence is given)",
+                          "liquid crystals have 200 to 300");
+  }
+  if (block.find("compensator")) {
+    const Block compensator = reader.block(block, "compensator", {"phase_deg", "azimuth_deg"}, true);
+    if (!std::holds_alternative<Cell>(scene.sample))
+      reader.problems.add(compensator.where, "microscope.compensator is for cells", "leave it out");
+    microscope.compensator_phase_deg = reader.number(compensator, "phase_deg", angle());
+    microscope.compensator_azimuth_deg = reader.number(compensator, "azimuth_deg", angle());
+  }
 
   const Slab* slab_sample = std::get_if<Slab>(&scene.sample);
   const bool slab = slab_sample && !slab_sample->half_angle_deg;

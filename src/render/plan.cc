@@ -547,8 +547,15 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
     const PlanarOptics<double> o = planar_optics(scene, value);
     for (const auto& [tx, ty] : pilot_directions(scene, value)) result.push_back(planar_phase(o, tx, ty));
     if (const auto* cell = std::get_if<Cell>(&scene.sample))
+    {
       if (const auto* twisted = std::get_if<TwistedDirector>(&cell->director))
         result.push_back(2 * value.radians(twisted->twist_deg));
+      if (const auto* field = std::get_if<FreederickszDirector>(&cell->director))
+        result.push_back(2 * value.radians(field->twist_deg));
+      if (const auto* helix = std::get_if<HelixDirector>(&cell->director))
+        result.push_back(4 * kPi * value(cell->thickness_um) / value(helix->pitch_um));
+    }
+    result.push_back(value.radians(scene.microscope.compensator_phase_deg));
   }
   return result;
 }
