@@ -601,6 +601,9 @@ void Fit::report_parameters(const Inverse& inverse) {
   }
 }
 
+/// Rows of a signal table are micrographs of one pixel named file:line.
+std::string table_of(const std::string& name) { return name.substr(0, name.rfind(':')); }
+
 void Fit::report_micrographs() {
   for (int g = 0; g < frames_; ++g) {
     const Micrograph& micrograph = job_.micrographs[g];
@@ -627,6 +630,19 @@ void Fit::report_micrographs() {
     out.signal_range = high - low;
     result_.micrographs.push_back(std::move(out));
   }
+  // A row of a table has no range of its own: the table's.
+  std::map<std::string, std::pair<double, double>> tables;
+  for (const MicrographResult& row : result_.micrographs)
+    if (row.used == 1) {
+      auto& [low, high] = tables.try_emplace(table_of(row.name), row.fitted(0, 0), row.fitted(0, 0)).first->second;
+      low = std::min(low, row.fitted(0, 0));
+      high = std::max(high, row.fitted(0, 0));
+    }
+  for (MicrographResult& row : result_.micrographs)
+    if (row.used == 1) {
+      const auto [low, high] = tables.at(table_of(row.name));
+      row.signal_range = high - low;
+    }
 }
 
 void Fit::collect_warnings() {
@@ -653,7 +669,7 @@ void Fit::collect_warnings() {
     if (!(range > 1e-9 * std::abs(range_high))) range = std::abs(range_high);
     const double percent = range > 0 ? 100 * micrograph.residual_rms / range : 0;
     if (micrograph.used == 1) {  // a row of a table (name:line): judged with the others of it
-      Rows& rows = tables[micrograph.name.substr(0, micrograph.name.rfind(':'))];
+      Rows& rows = tables[table_of(micrograph.name)];
       rows.number += 1;
       rows.chi_square += micrograph.chi_square;
       rows.squares += micrograph.residual_rms * micrograph.residual_rms;
