@@ -106,7 +106,7 @@ struct MicrographResult {
   int used = 0;     ///< pixels
   double chi_square = 0;
   double residual_rms = 0;        ///< units of the values
-  double signal_range = 0;        ///< of the fitted values, for judging the rms
+  double signal_range = 0;        ///< of the fitted values, for judging the rms; of a one-pixel row, its table's
   NoiseModel noise;
   RenderPlan plan;
 };

@@ -10,11 +10,20 @@
 
 namespace birefit {
 
+/// A table of signal against something (`signal:`): its rows are one-pixel micrographs of the job, one after another.
+struct SignalTable {
+  std::string name;          ///< file name
+  std::size_t first = 0;     ///< micrograph of its first row
+  std::string path;          ///< parameter that its first column sets
+  std::vector<double> x;     ///< that column
+};
+
 /// What a config describes, read and checked completely; every mistake in it was reported at once (UserError).
 struct Config {
   std::filesystem::path path;
   std::string text;       ///< the file as read, for the echo
   FitJob job;             ///< micrographs empty for render-only configs
+  std::vector<SignalTable> signals;  ///< empty when the job is of images
   Scene scene;            ///< of the first micrograph, or of `image_size_px`
 };
 

@@ -19,6 +19,9 @@ namespace birefit {
 struct ConstantIndices {
   ParameterRef ordinary;
   ParameterRef birefringence;
+  /// If given, birefringence is that at 589.3 nm and varies as w^2 / (w^2 - resonance^2) with the wavelength w (one absorption
+  /// band; Wu, Phys. Rev. A 33, 1270 (1986)); resonance below the wavelength.
+  ParameterRef resonance_nm = {};
 };
 
 /// Steinberg TOG 2020 eq. 38, named preset "E44-steinberg2020": n_o = 1.53, n_e = 2.1942 - T / (750 K), 640 nm.
@@ -91,6 +94,34 @@ struct TwistedDirector {
   ParameterRef pretilt_deg;
 };
 
+/// A nematic in a field along the cell's normal, strongly anchored at both faces: the equilibrium of its elastic and dielectric
+/// energy (src/medium/families/equilibrium.h). Voltages are rms; the threshold of reduced_voltage is that of the untwisted cell:
+/// pi sqrt(K11 / (eps0 |eps_par - eps_perp|)) for eps_par >= eps_perp, with K33 in place of K11 else.
+struct FreederickszDirector {
+  enum class Anchoring {
+    planar,       ///< tilt = pretilt at both faces
+    homeotropic,  ///< tilt = 90 degrees - pretilt at both faces; eps_par <= eps_perp
+    hybrid,       ///< tilt = pretilt at the entry, 90 degrees at the exit
+  } anchoring = Anchoring::planar;
+  ParameterRef reduced_voltage;        ///< V / threshold; not given: voltage_v with threshold_v, or with k11_pn and both eps
+  ParameterRef voltage_v, threshold_v;
+  ParameterRef k33_over_k11, k22_over_k11, eps_ratio;  ///< eps_ratio = eps_par / eps_perp; k22 only with twist or pitch
+  ParameterRef k11_pn, k22_pn, k33_pn, eps_parallel, eps_perpendicular;  ///< instead of the ratios
+  ParameterRef pretilt_deg;            ///< [0, 45]
+  ParameterRef azimuth_deg;            ///< at the entry face
+  ParameterRef twist_deg;              ///< between the faces, > 0 right-handed; not given: none
+  ParameterRef pitch_um;               ///< of the unstrained chiral nematic, > 0 right-handed; not given: none
+};
+
+/// Cholesteric helix along the normal: azimuth(z) = azimuth_deg + 360 degrees z / pitch, no tilt. With a modulus k in [0, 1) the
+/// helix is partly unwound by a field in the layer plane along azimuth_deg + 90 degrees (de Gennes & Prost, The Physics of
+/// Liquid Crystals, 6.2.2): azimuth = azimuth_deg + am(pi^2 z / (pitch E(k)) | k), field / critical field = k / E(k).
+struct HelixDirector {
+  ParameterRef pitch_um;     ///< without field; > 0 right-handed
+  ParameterRef azimuth_deg;  ///< at the entry face
+  ParameterRef modulus;      ///< not given: no field
+};
+
 /// Radial hedgehog, n = r/|r|; with twist_deg != 0 the radial field turned about the optical axis by
 /// twist_deg (1 - r/R): homeotropic at the surface, twisted inside (no equilibrium, a fully coupled test scene).
 struct RadialDirector {
@@ -122,7 +153,7 @@ struct Droplet {
 /// Plane-parallel cell, seen along its normal.
 struct Cell {
   ParameterRef thickness_um;
-  std::variant<UniformDirector, TwistedDirector> director;
+  std::variant<UniformDirector, TwistedDirector, FreederickszDirector, HelixDirector> director;
 };
 
 /// Heat conduction from a hot face at z = d into a plate at cold_k, a time fourier_number d^2 / diffusivity after
@@ -198,6 +229,8 @@ struct Microscope {
   ParameterRef wavelength_nm;  ///< vacuum
   ParameterRef polarizer_deg;
   ParameterRef analyzer_deg;
+  /// A lossless retarder between sample and analyser, its axis at compensator_azimuth_deg; not given: none. Cells only.
+  ParameterRef compensator_phase_deg, compensator_azimuth_deg;
   double bandwidth_nm = 0;   ///< FWHM, 0 = not stated; not modelled: enters the model error
   double condenser_na = 0;   ///< 0 = not stated; not modelled: enters the model error
   double objective_na = 0;   ///< 0 = not stated. Droplet rays leaving steeper than this are lost.
@@ -222,6 +255,10 @@ enum class Ceiling {
   reflections,  ///< all of Maxwell's equations in the layers, both faces included; cells and slabs
 };
 
+/// How light runs through a droplet: both modes on the refracted straight chord, or each on its own ray (geometrical optics of
+/// the radial droplet in closed form). What follows from the choice: docs/methods.md.
+enum class Rays { straight, eikonal };
+
 struct Scene {
   Sample sample;
   Material material;
@@ -230,6 +267,7 @@ struct Scene {
   Microscope microscope;
   View view;
   Ceiling ceiling = Ceiling::one_way;
+  Rays rays = Rays::straight;
   double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold
   std::string method = "auto";       ///< or a transport method's name
 };

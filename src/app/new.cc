@@ -54,6 +54,33 @@ microscope:
   analyzer_deg: 90
 )";
 
+const char* const kFreedericksz = R"(# A nematic cell in a field along its normal: how far above its threshold is it?
+micrograph:
+  image: cell.tif
+  gain: 1.0e4                  # of one grey level no fit can tell the light from the voltage: calibrate it, or fit several images
+  offset: 0
+sample:
+  cell:
+    thickness_um: 5
+    director:
+      freedericksz:
+        reduced_voltage: {value: 1.3, fit: [1, 1.6]}   # V over the threshold of the untwisted cell; or voltage_v and threshold_v
+        k33_over_k11: 1.54     # or k11_pn, k33_pn
+        eps_ratio: 3.70        # eps_parallel / eps_perpendicular, or both
+        pretilt_deg: 1
+        azimuth_deg: 45
+        # anchoring: planar    # planar, homeotropic or hybrid
+        # twist_deg: 90        # twisted nematic: needs k22_over_k11 (or k22_pn) too
+  material:
+    ordinary: 1.52
+    birefringence: 0.2
+  surround: {index: 1.5}       # the glass; 1.0 when left out
+microscope:
+  light: {wavelength_nm: 590}
+  polarizer_deg: 0
+  analyzer_deg: 90
+)";
+
 const char* const kPlate = R"(# A heated plate in a converging cone: pixel radius is proportional to tan(incidence).
 micrograph:
   image: conoscopy.tif
@@ -135,14 +162,14 @@ microscope:
 Command add_new_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("new", "print a commented config to start from");
   auto kind = std::make_shared<std::string>();
-  command->add_option("KIND", *kind, "droplet, cell, plate, crystal, slab or disc")->required();
+  command->add_option("KIND", *kind, "droplet, cell, freedericksz, plate, crystal, slab or disc")->required();
   return {command, [kind] {
             const std::map<std::string, const char*> templates = {
-                {"droplet", kDroplet}, {"cell", kCell}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}};
-            if (*kind == "shell") throw UserError({}, "new shell: shells come later", "known: droplet, cell, plate, crystal, slab, disc");
+                {"droplet", kDroplet}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}};
+            if (*kind == "shell") throw UserError({}, "new shell: shells come later", "known: droplet, cell, freedericksz, plate, crystal, slab, disc");
             const auto found = templates.find(*kind);
             if (found == templates.end())
-              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, cell, plate, crystal, slab, disc");
+              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, cell, freedericksz, plate, crystal, slab, disc");
             std::cout << found->second;
             return kExitDone;
           }};

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <set>
 
@@ -242,12 +243,17 @@ double Fit::look_for_minima(double hopeless_above) {
   for (std::size_t j = 0; j < phase.size(); ++j) {
     const int index = unknowns_.searched[j];
     const Parameter& parameter = job_.parameters[index];
-    // The rate may change across the bounds: take the fastest of both ends and the start.
-    for (const double at : {theta_[index], parameter.lower, parameter.upper}) {
+    // The rate may change across the bounds, and be largest between them (a voltage around its threshold): take the fastest of
+    // the start, both ends and the quarters.
+    const double width = parameter.upper - parameter.lower;
+    // Of hundreds of rows of a table a few dozen show it.
+    const int stride = (frames_ + 31) / 32;
+    for (const double at : {theta_[index], parameter.lower, parameter.lower + 0.25 * width, parameter.lower + 0.5 * width,
+                            parameter.lower + 0.75 * width, parameter.upper}) {
       if (!std::isfinite(at)) continue;
       Theta probe = theta_;
       probe[index] = at;
-      for (int g = 0; g < frames_; ++g) {
+      for (int g = 0; g < frames_; g += stride) {
         const double rate = fringe_phase_per_unit(job_.micrographs[g].scene, probe, index);
         if (std::isfinite(rate)) phase[j] = std::max(phase[j], std::abs(rate));
       }
@@ -615,6 +621,9 @@ void Fit::report_parameters(const Inverse& inverse) {
   }
 }
 
+/// Rows of a signal table are micrographs of one pixel named file:line.
+std::string table_of(const std::string& name) { return name.substr(0, name.rfind(':')); }
+
 void Fit::report_micrographs() {
   for (int g = 0; g < frames_; ++g) {
     const Micrograph& micrograph = job_.micrographs[g];
@@ -641,6 +650,19 @@ void Fit::report_micrographs() {
     out.signal_range = high - low;
     result_.micrographs.push_back(std::move(out));
   }
+  // A row of a table has no range of its own: the table's.
+  std::map<std::string, std::pair<double, double>> tables;
+  for (const MicrographResult& row : result_.micrographs)
+    if (row.used == 1) {
+      auto& [low, high] = tables.try_emplace(table_of(row.name), row.fitted(0, 0), row.fitted(0, 0)).first->second;
+      low = std::min(low, row.fitted(0, 0));
+      high = std::max(high, row.fitted(0, 0));
+    }
+  for (MicrographResult& row : result_.micrographs)
+    if (row.used == 1) {
+      const auto [low, high] = tables.at(table_of(row.name));
+      row.signal_range = high - low;
+    }
 }
 
 void Fit::collect_warnings() {
@@ -653,6 +675,10 @@ void Fit::collect_warnings() {
     for (const auto& set : {micrograph.fitted})
       for (const double value : set.values())
         range_low = std::min(range_low, value), range_high = std::max(range_high, value);
+  struct Rows {
+    double number = 0, chi_square = 0, squares = 0, low = std::numeric_limits<double>::infinity(), high = -low;
+  };
+  std::map<std::string, Rows> tables;
   for (int g = 0; g < frames_; ++g) {
     const MicrographResult& micrograph = result_.micrographs[g];
     for (const std::string& warning : micrograph.plan.warnings) warn(warning);
@@ -662,6 +688,16 @@ void Fit::collect_warnings() {
     if (!(range > 1e-6 * (range_high - range_low))) range = range_high - range_low;
     if (!(range > 1e-9 * std::abs(range_high))) range = std::abs(range_high);
     const double percent = range > 0 ? 100 * micrograph.residual_rms / range : 0;
+    if (micrograph.used == 1) {  // a row of a table (name:line): judged with the others of it
+      Rows& rows = tables[table_of(micrograph.name)];
+      rows.number += 1;
+      rows.chi_square += micrograph.chi_square;
+      rows.squares += micrograph.residual_rms * micrograph.residual_rms;
+      const double value = job_.micrographs[g].values(pixels_[g][0][0], pixels_[g][0][1]);
+      rows.low = std::min(rows.low, value);
+      rows.high = std::max(rows.high, value);
+      continue;
+    }
     if (reduced > 2) {
       warn(fmt::format(
           "{}: the model does not describe the image within its noise (reduced chi-square {:.3g}, residual "
@@ -670,6 +706,15 @@ void Fit::collect_warnings() {
           percent > 15 ? ": so large a misfit means that the model is wrong or incomplete; do not trust the values."
                        : "; the errors allow for it as far as the residuals show it."));
     }
+  }
+  for (const auto& [name, rows] : tables) {
+    const double percent = rows.high > rows.low ? 100 * std::sqrt(rows.squares / rows.number) / (rows.high - rows.low) : 0;
+    if (rows.chi_square / rows.number > 2 && rows.number > 3)
+      warn(fmt::format("{}: the model does not describe the signal within its noise (reduced chi-square {:.3g}, residual {:.2g} % of the "
+                       "signal's spread){}",
+                       name, rows.chi_square / rows.number, percent,
+                       percent > 5 ? ": a curve this far off is another one, or its label is wrong; do not trust the values."
+                                   : "; the errors allow for it as far as the residuals show it."));
   }
   for (const ParameterEstimate& estimate : result_.parameters)
     if (estimate.prior_sd && estimate.stderr_ > 0.98 * *estimate.prior_sd)

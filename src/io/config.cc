@@ -13,6 +13,7 @@
 #include "io/config_pixels.h"
 #include "io/config_reader.h"
 #include "io/config_scene.h"
+#include "io/config_signal.h"
 #include "io/prior.h"
 
 namespace birefit {
@@ -477,7 +478,8 @@ void replace_ref(Micrograph& micrograph, ParameterRef from, ParameterRef to) {
 }
 
 /// A micrograph of the shared scene with its own values of what its `set:` names.
-Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item& item, std::size_t index) {
+Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item& item, std::size_t index,
+                     const std::string& list = "micrographs") {
   Micrograph micrograph = shared;
   const std::map<std::string, NumberSpec> shared_specs = reader.specs;
   const std::map<std::string, ParameterRef> shared_refs = reader.refs;
@@ -492,7 +494,7 @@ Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item&
                           !near.empty() ? "did you mean " + near + "?" : "known here: " + list_words(known));
       continue;
     }
-    const ParameterRef own = reader.number_at(*node, "micrographs[" + std::to_string(index) + "]." + path, spec->second);
+    const ParameterRef own = reader.number_at(*node, list + "[" + std::to_string(index) + "]." + path, spec->second);
     if (spec->second.linear && !std::isfinite(reader.table[own].value))
       reader.table[own].value = reader.table[shared_refs.at(path)].value;
     replace_ref(micrograph, shared_refs.at(path), own);
@@ -715,7 +717,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
   const YamlNode tree = parse_yaml(config.text, reader.file, reader.problems);
   const Block root{&tree, "", {reader.file}};
   reader.check_keys(tree, "", {"micrograph", "micrographs", "calibration", "image_size_px", "sample", "microscope",
-                               "accuracy", "physics", "transport", "prior", "fit"});
+                               "accuracy", "physics", "transport", "prior", "fit", "signal"});
 
   const YamlNode* list = root.find("micrographs");
   std::vector<Item> items = read_items(reader, root);
@@ -726,6 +728,19 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       });
       if (everywhere) reader.set_everywhere.push_back(name);
     }
+  }
+  const std::vector<SignalItem> signals = read_signals(reader, root);
+  if (!signals.empty()) {
+    const auto everywhere = [&](const std::string& path) {
+      return std::all_of(signals.begin(), signals.end(), [&](const SignalItem& item) {
+        const auto names = [&](const auto& entry) { return entry.first == path; };
+        return std::any_of(item.columns.begin(), item.columns.end(), names) || std::any_of(item.set.begin(), item.set.end(), names);
+      });
+    };
+    for (const auto& [path, unused] : signals[0].columns)
+      if (everywhere(path)) reader.set_everywhere.push_back(path);
+    for (const auto& [path, unused] : signals[0].set)
+      if (everywhere(path)) reader.set_everywhere.push_back(path);
   }
   Micrograph shared;
   shared.scene = read_scene(reader, root);
@@ -764,6 +779,22 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
   }
 
   std::vector<Micrograph> micrographs;
+  if (!signals.empty()) {
+    if (image) reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `signal:`");
+    if (settings.image) reader.problems.add(settings.image_where, "micrograph.image is given beside signal", "give one of the two");
+    if (!std::holds_alternative<Cell>(shared.scene.sample) && reader.problems.empty())
+      reader.problems.add(signals[0].where, "signal is for cells: every row sees the same light");
+    set_view(reader, settings, 1, 1, 0, "the signal", shared.scene);
+    if (reader.problems.empty()) resolve_automatic(reader, shared.scene, nullptr, nullptr, "the signal");
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+      Item own;
+      own.set = signals[i].set;
+      own.set_where = signals[i].set_where;
+      const Micrograph base = apply_set(reader, shared, own, i, "signal");
+      append_signal(reader, signals[i], i, base, replace_ref, config, micrographs);
+    }
+    items.clear();
+  }
   for (std::size_t i = 0; i < items.size(); ++i) micrographs.push_back(apply_set(reader, shared, items[i], i));
 
   if (use == ConfigUse::fit) {
@@ -785,7 +816,9 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
                           "the size of a pixel on the sample, for example 0.05");
   };
 
-  if (use == ConfigUse::render) {
+  if (use == ConfigUse::render && !signals.empty()) {
+    if (!micrographs.empty()) config.scene = micrographs[0].scene;  // of the first row
+  } else if (use == ConfigUse::render) {
     Scene& scene = micrographs[0].scene;
     const Item& item = items[0];
     const std::string name = item.image.value_or("the image");
@@ -817,7 +850,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
     }
     config.scene = scene;
   } else {
-    if (!list && !items[0].image && !image) {
+    if (!list && signals.empty() && !items[0].image && !image) {
       const Block micrograph{root.find("micrograph"), "micrograph",
                              settings.where.line > 0 ? settings.where : Where{reader.file}};
       if (!micrograph.node || !micrograph.node->find("image")) reader.missing(micrograph, "image");
@@ -870,7 +903,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       offset.value = calibration->crossed_median;
       offset.prior_sd = calibration->crossed_sd;
     }
-    config.scene = micrographs[0].scene;
+    if (!micrographs.empty()) config.scene = micrographs[0].scene;
     config.job.micrographs = std::move(micrographs);
     if (const auto* droplet = std::get_if<Droplet>(&config.scene.sample))
       if (const auto* axial = std::get_if<AxialDirector>(&droplet->director); axial && axial->compare) add_branches(config.job);

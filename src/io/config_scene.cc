@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "io/config_disc.h"
+#include "io/config_director.h"
 #include "io/config_material.h"
 #include "io/table.h"
 #include "transport/method.h"
@@ -206,8 +207,8 @@ Cell read_cell(ConfigReader& reader, const Block& parent) {
   Cell cell;
   const Block block = reader.block(parent, "cell", {"thickness_um", "director"}, true);
   cell.thickness_um = reader.number(block, "thickness_um", open_length(10000));
-  const Block director = reader.block(block, "director", {"uniform", "twisted", "freedericksz"}, true);
-  const auto kind = one_kind(reader, director, {"uniform", "twisted"}, {"freedericksz"});
+  const Block director = reader.block(block, "director", {"uniform", "twisted", "freedericksz", "helix"}, true);
+  const auto kind = one_kind(reader, director, {"uniform", "twisted", "freedericksz", "helix"});
   if (kind == "uniform") {
     cell.director = read_uniform(reader, director);
   } else if (kind == "twisted") {
@@ -217,6 +218,10 @@ Cell read_cell(ConfigReader& reader, const Block& parent) {
     field.azimuth_deg = reader.number(twisted, "azimuth_deg", angle(), 0);
     field.pretilt_deg = reader.number(twisted, "pretilt_deg", angle_within(-90, 90), 0);
     cell.director = field;
+  } else if (kind == "freedericksz") {
+    cell.director = read_freedericksz(reader, director);
+  } else if (kind == "helix") {
+    cell.director = read_helix(reader, director);
   }
   return cell;
 }
@@ -402,14 +407,14 @@ void check_within(ConfigReader& reader, ParameterRef ref, double lower, double u
 }
 
 Material read_material(ConfigReader& reader, const Block& sample, const Sample& kind) {
-  std::vector<std::string> keys = {"ordinary", "birefringence", "name", "temperature_k"};
+  std::vector<std::string> keys = {"ordinary", "birefringence", "resonance_nm", "name", "temperature_k"};
   keys.insert(keys.end(), law_material_keys().begin(), law_material_keys().end());
   const Block block = reader.block(sample, "material", keys, true);
   if (is_law_material(block)) return read_law_material(reader, block, kind);
   const Plate* plate = std::get_if<Plate>(&kind);
   const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
   if (block.find("name")) {
-    for (const char* other : {"ordinary", "birefringence"})
+    for (const char* other : {"ordinary", "birefringence", "resonance_nm"})
       if (const YamlNode* node = block.find(other))
         reader.problems.add(node->where, std::string(other) + " is given beside a material's name", "give one of the two");
     if (!reader.choice(block, "name", {"E44-steinberg2020"})) return ConstantIndices{};
@@ -439,6 +444,11 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
   ConstantIndices material;
   material.ordinary = reader.number(block, "ordinary", index_spec());
   material.birefringence = reader.number(block, "birefringence", number_within(-1, 1));
+  if (block.find("resonance_nm")) {
+    NumberSpec resonance = number_within(50, 20000);
+    resonance.unit = "nm";
+    material.resonance_nm = reader.number(block, "resonance_nm", resonance);
+  }
   const double extraordinary = reader.table[material.ordinary].value + reader.table[material.birefringence].value;
   if (extraordinary < 1 && reader.problems.empty())
     reader.problems.add(block.where, "ordinary + birefringence = " + show(extraordinary) + " is below 1");
@@ -503,7 +513,7 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   Microscope& microscope = scene.microscope;
   const Block block = reader.block(root, "microscope",
                                    {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg",
-                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions", "quarter_wave"},
+                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions", "quarter_wave", "compensator"},
                                    true);
   const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
   NumberSpec wavelength;
@@ -516,6 +526,22 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   bandwidth.lower = 0;
   bandwidth.upper = 5000;
   microscope.bandwidth_nm = reader.plain(light, "bandwidth_nm", bandwidth).value_or(0);
+
+  if (auto* constant = std::get_if<ConstantIndices>(&scene.material); constant && constant->resonance_nm) {
+    const Parameter &resonance = reader.table[constant->resonance_nm], &light = reader.table[microscope.wavelength_nm];
+    // A quarter of the light's wavelength away from the band its law stops to hold; 589.3 nm is where birefringence is given.
+    const double shortest = std::min(light.free ? light.lower : light.value, 589.3);
+    if ((resonance.free ? resonance.upper : resonance.value) > 0.8 * shortest)
+      reader.problems.add(resonance.where, resonance.name + " must stay below 0.8 of the wavelength (and of 589.3 nm, where birefringence is given)",
+                          "liquid crystals have 200 to 300");
+  }
+  if (block.find("compensator")) {
+    const Block compensator = reader.block(block, "compensator", {"phase_deg", "azimuth_deg"}, true);
+    if (!std::holds_alternative<Cell>(scene.sample))
+      reader.problems.add(compensator.where, "microscope.compensator is for cells", "leave it out");
+    microscope.compensator_phase_deg = reader.number(compensator, "phase_deg", angle());
+    microscope.compensator_azimuth_deg = reader.number(compensator, "azimuth_deg", angle());
+  }
 
   const Slab* slab_sample = std::get_if<Slab>(&scene.sample);
   const bool slab = slab_sample && !slab_sample->half_angle_deg;
@@ -557,7 +583,14 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   const Block accuracy = reader.block(root, "accuracy", {"intensity"}, false);
   scene.intensity_accuracy = reader.plain(accuracy, "intensity", number_within(1e-12, 0.1)).value_or(1e-4);
 
-  const Block physics = reader.block(root, "physics", {"ceiling", "max_seconds"}, false);
+  const Block physics = reader.block(root, "physics", {"ceiling", "rays", "max_seconds"}, false);
+  if (const YamlNode* rays = physics.find("rays")) {
+    const auto* droplet = std::get_if<Droplet>(&scene.sample);
+    const auto* radial = droplet ? std::get_if<RadialDirector>(&droplet->director) : nullptr;
+    scene.rays = reader.choice(physics, "rays", {"straight", "eikonal"}).value_or("straight") == "eikonal" ? Rays::eikonal : Rays::straight;
+    if (scene.rays == Rays::eikonal && (!radial || radial->twist_deg))
+      reader.problems.add(rays->where, "rays: eikonal is for radial droplets without twist", "use straight");
+  }
   const YamlNode* ceiling = physics.find("ceiling");
   const Slab* slab = std::get_if<Slab>(&scene.sample);
   const bool layered = std::holds_alternative<Cell>(scene.sample) || (slab && !slab->half_angle_deg);

@@ -32,6 +32,13 @@ void for_each_ref(Scene& scene, F&& f) {
       f(director->azimuth_deg);
       f(director->pretilt_deg);
     }
+    if (auto* d = std::get_if<FreederickszDirector>(&cell->director))
+      for (ParameterRef* ref : {&d->reduced_voltage, &d->voltage_v, &d->threshold_v, &d->k33_over_k11, &d->k22_over_k11, &d->eps_ratio,
+                                &d->k11_pn, &d->k22_pn, &d->k33_pn, &d->eps_parallel, &d->eps_perpendicular, &d->pretilt_deg,
+                                &d->azimuth_deg, &d->twist_deg, &d->pitch_um})
+        f(*ref);
+    if (auto* d = std::get_if<HelixDirector>(&cell->director))
+      for (ParameterRef* ref : {&d->pitch_um, &d->azimuth_deg, &d->modulus}) f(*ref);
   } else if (auto* plate = std::get_if<Plate>(&scene.sample)) {
     f(plate->thickness_um);
     uniform(plate->director);
@@ -59,6 +66,7 @@ void for_each_ref(Scene& scene, F&& f) {
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material)) {
     f(constant->ordinary);
     f(constant->birefringence);
+    f(constant->resonance_nm);
   } else if (auto* e44 = std::get_if<E44Steinberg2020>(&scene.material)) {
     f(e44->temperature_k);
   } else if (auto* law = std::get_if<LawIndices>(&scene.material)) {
@@ -82,6 +90,8 @@ void for_each_ref(Scene& scene, F&& f) {
   f(scene.microscope.wavelength_nm);
   f(scene.microscope.polarizer_deg);
   f(scene.microscope.analyzer_deg);
+  f(scene.microscope.compensator_phase_deg);
+  f(scene.microscope.compensator_azimuth_deg);
   f(scene.view.center_x_px);
   f(scene.view.center_y_px);
   f(scene.view.rotation_deg);

@@ -162,6 +162,7 @@ struct Frame {
 
 std::vector<Frame> frames_of(const Config& config, const FitResult& result) {
   std::vector<Frame> frames;
+  if (!config.signals.empty()) return frames;  // one-pixel images show nothing: the signal is drawn instead
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
     Frame frame;
     const MicrographResult& m = result.micrographs[i];
@@ -397,6 +398,58 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
       figure++, profile.words,
       profile.mean ? " of one pixel, averaged like the profile" : "; the bands are \u00b11 and \u00b12 \u03c3");
   return out;
+}
+
+/// Measured and fitted signal of one table against its first column.
+std::string signal_section(const SignalTable& table, const FitResult& result, int& figure) {
+  std::vector<std::size_t> order;
+  for (std::size_t r = 0; r < table.x.size(); ++r)
+    if (table.first + r < result.micrographs.size() && !result.micrographs[table.first + r].fitted.empty()) order.push_back(r);
+  if (order.empty()) return "";
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.x[a] < table.x[b]; });
+  std::vector<double> x, measured, fitted, whitened;
+  double squares = 0, largest = 0;
+  for (const std::size_t r : order) {
+    const MicrographResult& m = result.micrographs[table.first + r];
+    const double residual = m.residual(0, 0), sigma = m.sigma(0, 0);
+    x.push_back(table.x[r]);
+    fitted.push_back(m.fitted(0, 0));
+    measured.push_back(m.fitted(0, 0) + residual);
+    whitened.push_back(sigma > 0 ? residual / sigma : kMissing);
+    if (std::isfinite(residual)) squares += residual * residual;
+    if (std::isfinite(whitened.back())) largest = std::max(largest, std::abs(whitened.back()));
+  }
+  const auto [low, high] = std::minmax_element(measured.begin(), measured.end());
+  const double rms = std::sqrt(squares / static_cast<double>(order.size()));
+  Chart chart;
+  chart.title = "signal";
+  chart.x_label = table.path;
+  if (x.back() > x.front()) chart.x_range = {x.front(), x.back()};
+  const double dot = x.size() > 150 ? 2.8 : 3.6;
+  Panel values;
+  values.y_label = "signal";
+  values.height = 230;
+  values.series.push_back({Series::Kind::points, "measured", x, measured, kMeasured, dot});
+  values.series.push_back({Series::Kind::line, "fitted", x, fitted, kFitted, 1.5});
+  Panel residuals;
+  residuals.y_label = "residual (\u03c3)";
+  residuals.height = 88;
+  const double end = std::max(1.1 * largest, 3.3);
+  residuals.y_range = {-end, end};
+  residuals.bands = {{-2, 2, kBand2}, {-1, 1, kBand1}};
+  residuals.series.push_back({Series::Kind::line, "", {x.front(), x.back()}, {0, 0}, "#8a919b", 0.9});
+  residuals.series.push_back({Series::Kind::points, "", x, whitened, kMeasured, dot});
+  chart.panels = {values, residuals};
+  return "<h3>" + escape_html(table.name) + "</h3>\n<figure>\n" + wide_and_narrow(chart) +
+         fmt::format("<figcaption><b>Figure {}.</b> Measured and fitted signal of {} rows; residual rms {} ({} of the signal\u2019s spread). Below, the "
+                     "residual in units of its noise \u03c3.</figcaption>\n</figure>\n",
+                     figure++, order.size(), plain(rms), *high > *low ? format_percent(rms / (*high - *low)) : "\u2013");
+}
+
+/// The table that this micrograph is a row of, but not its first: what was said of the first holds.
+bool later_row(const Config& config, std::size_t micrograph) {
+  return !config.signals.empty() &&
+         std::none_of(config.signals.begin(), config.signals.end(), [&](const SignalTable& t) { return t.first == micrograph; });
 }
 
 // ---- tables ---------------------------------------------------------------------------------------------------------
@@ -668,11 +721,12 @@ std::string identifiability(const Config& config, const FitResult& result) {
   return out;
 }
 
-std::string model_section(const FitResult& result) {
+std::string model_section(const Config& config, const FitResult& result) {
   std::string out = "<h2>Model</h2>\n";
   const RenderPlan* previous = nullptr;
   for (const MicrographResult& m : result.micrographs) {
     const RenderPlan& plan = m.plan;
+    if (later_row(config, static_cast<std::size_t>(&m - result.micrographs.data()))) continue;
     if (previous != nullptr && previous->method == plan.method && previous->physics == plan.physics &&
         previous->reasons == plan.reasons)
       continue;  // frames of one series share it
@@ -700,6 +754,7 @@ std::string data_section(const Config& config, const FitResult& result) {
       "pixel</th>"
       "<th>read<br>noise</th><th>counts per<br>photon</th></tr>\n";
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
+    if (later_row(config, i)) continue;
     const MicrographResult& m = result.micrographs[i];
     const Micrograph none;
     const Micrograph& input = i < config.job.micrographs.size() ? config.job.micrographs[i] : none;
@@ -767,6 +822,8 @@ std::string report_html(const Config& config, const FitResult& result) {
   out += key_numbers(result);
   if (!result.warnings.empty()) out += "<div class=\"warnings\"><b>Warnings</b>\n" + list(result.warnings) + "</div>\n";
 
+  if (!config.signals.empty()) out += "<h2>Signal</h2>\n";
+  for (const SignalTable& table : config.signals) out += signal_section(table, result, figure);
   if (!frames.empty()) out += "<h2>Images</h2>\n";
   for (const Frame& frame : frames) out += frame_section(frame, result, figure, largest_side);
 
@@ -774,7 +831,7 @@ std::string report_html(const Config& config, const FitResult& result) {
   out += correlation_table(result);
   out += diagnostics(result, frames, figure);
   out += identifiability(config, result);
-  out += model_section(result);
+  out += model_section(config, result);
   out += data_section(config, result);
 
   out += "<h2>Provenance</h2>\n<dl class=\"facts\">\n" + fact("program", "birefit " BIREFIT_VERSION) +

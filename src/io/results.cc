@@ -120,7 +120,10 @@ std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
 std::string log_text(const Config& config, const FitResult& result) {
   std::string text =
       fmt::format("birefit {}\nconfig: {}\n\n{}\n", BIREFIT_VERSION, config.path.string(), summary(result));
-  for (const MicrographResult& m : result.micrographs) {
+  for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
+    const MicrographResult& m = result.micrographs[i];
+    const bool row = std::none_of(config.signals.begin(), config.signals.end(), [&](const SignalTable& t) { return t.first == i; });
+    if (!config.signals.empty() && row) continue;  // the first row of a table speaks for the others
     text += fmt::format("\nmicrograph {}\n  {} pixels used, chi-square {:.6g}, residual rms {:.4g}\n", m.name, m.used,
                         m.chi_square, m.residual_rms);
     text += fmt::format("  noise: read {:.4g} counts, {:.4g} counts per photon{}\n", m.noise.read_counts,
@@ -277,7 +280,18 @@ void write_results(const std::filesystem::path& folder, const Config& config, co
                     "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
                     "choose another --out");
   std::vector<FileContent> files;
-  for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
+  for (std::size_t k = 0; k < config.signals.size(); ++k) {
+    const SignalTable& table = config.signals[k];
+    std::string text = table.path + ",measured,fitted,residual,sigma\n";
+    for (std::size_t r = 0; r < table.x.size() && table.first + r < result.micrographs.size(); ++r) {
+      const MicrographResult& m = result.micrographs[table.first + r];
+      if (m.fitted.empty()) continue;
+      text += fmt::format("{:.10g},{:.10g},{:.10g},{:.10g},{:.4g}\n", table.x[r], m.fitted(0, 0) + m.residual(0, 0), m.fitted(0, 0),
+                          m.residual(0, 0), m.sigma(0, 0));
+    }
+    files.push_back({folder / ("fitted" + (config.signals.size() > 1 ? "_" + std::to_string(k) : "") + ".csv"), text});
+  }
+  for (std::size_t i = 0; config.signals.empty() && i < result.micrographs.size(); ++i) {
     const std::string number = result.micrographs.size() > 1 ? "_" + std::to_string(i) : "";
     const auto add = [&](const std::string& name, const Image& image) {
       if (image.empty()) return;

@@ -55,7 +55,7 @@ std::optional<double> parse_number(std::string_view text) {
   return value;
 }
 
-PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where) {
+PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where, bool numbered) {
   std::error_code code;
   if (!std::filesystem::exists(path, code)) throw UserError(where, path.string() + " does not exist");
   if (!std::filesystem::is_regular_file(path, code)) throw UserError(where, path.string() + " is not a file");
@@ -81,7 +81,7 @@ PlacedTable load_placed_table(const std::filesystem::path& path, const Where& wh
       for (Field& cell : cells) {
         for (const std::string& earlier : placed.table.columns)
           if (earlier == cell.text) problems.add({file, number, cell.column}, "duplicate column " + cell.text);
-        if (cell.text.empty()) problems.add({file, number, cell.column}, "a column has no name");
+        if (cell.text.empty() && !(numbered && placed.table.columns.empty())) problems.add({file, number, cell.column}, "a column has no name");
         if (parse_number(cell.text))
           problems.add({file, number, cell.column}, "the first line must name the columns, found " + cell.text);
         placed.header_columns.push_back(cell.column);

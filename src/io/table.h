@@ -21,6 +21,7 @@ struct PlacedTable {
   std::vector<int> lines;                      ///< line of each row
   std::vector<std::vector<int>> cell_columns;  ///< character column of each cell
 };
-PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where);
+/// `numbered`: the first column may lack a name (row numbers, as programs write them).
+PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where, bool numbered = false);
 
 }  // namespace birefit

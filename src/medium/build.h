@@ -7,6 +7,8 @@
 
 #include "birefit/scene.h"
 #include "medium/column.h"
+#include "medium/families/freedericksz.h"
+#include "medium/families/helix.h"
 #include "medium/families/planar.h"
 #include "medium/families/profile.h"
 #include "medium/families/radial.h"
@@ -70,7 +72,11 @@ Indices<S> material_indices(const Material& material, const V& value, const S& w
   }
   if (const auto* constant = std::get_if<ConstantIndices>(&material)) {
     const S n_o = value(constant->ordinary);
-    return {n_o, n_o + value(constant->birefringence)};
+    if (!constant->resonance_nm) return {n_o, n_o + value(constant->birefringence)};
+    // Of one absorption band, scaled to its value at 589.3 nm.
+    const S w2 = wavelength_um * wavelength_um, r = 1e-3 * value(constant->resonance_nm), r2 = r * r;
+    constexpr double kSodium2 = 0.5893 * 0.5893;
+    return {n_o, n_o + value(constant->birefringence) * (w2 * (kSodium2 - r2)) / (kSodium2 * (w2 - r2))};
   }
   const auto& e44 = std::get<E44Steinberg2020>(material);
   return {S(kE44Steinberg2020Ordinary), e44_steinberg2020_extraordinary(value.get(e44.temperature_k, 298.0))};
@@ -114,6 +120,16 @@ std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Materi
     const S thickness = value(cell->thickness_um);
     if (const auto* uniform = std::get_if<UniformDirector>(&cell->director))
       return make(UniformLaw<S>{rotated(uniform_axis<S>(*uniform, value), rotation_rad), eo, ee, thickness}, true);
+    if (const auto* field = std::get_if<FreederickszDirector>(&cell->director)) {
+      const CellForces<S> forces = cell_forces(*field, thickness, value);
+      return make(FreederickszLaw<S>{make_director_profile(forces), value.radians(field->azimuth_deg) + rotation_rad, eo, ee, thickness},
+                  !forces.twisted);
+    }
+    if (const auto* helix = std::get_if<HelixDirector>(&cell->director)) {
+      const S azimuth = value.radians(helix->azimuth_deg) + rotation_rad, pitch = value(helix->pitch_um);
+      if (helix->modulus) return make(UnwoundHelixLaw<S>(pitch, azimuth, value(helix->modulus), eo, ee, thickness), false);
+      return make(TwistedLaw<S>{azimuth, (2 * std::numbers::pi) * thickness / pitch, S(0.0), eo, ee, thickness}, false);
+    }
     const auto& twisted = std::get<TwistedDirector>(cell->director);
     return make(TwistedLaw<S>{value.radians(twisted.azimuth_deg) + rotation_rad, value.radians(twisted.twist_deg),
                               value.radians(twisted.pretilt_deg), eo, ee, thickness},

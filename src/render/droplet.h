@@ -78,6 +78,17 @@ S rim_edge(const RimTable& rim, const S& ratio, const S& n_host) {
 /// The ray whose backward extension meets the mid plane at image radius rho_um < rim.rho_max() R.
 template <class S>
 DropletRay<S> trace(const DropletOptics<S>& optics, const RimTable& rim, const S& rho_um);
+/// Field of one mode at image radius rho_um in the mid plane when every mode runs on its own ray through the radial droplet:
+/// amplitude (surface transmissions and ray tube included, 0 where no ray arrives) and phase (rad, common part left out).
+template <class S>
+struct EikonalRay {
+  S amplitude, phase_rad, cos_turn;  ///< cosine of the angle between ray and view behind the droplet
+};
+/// Satiro & Moraes' cone for the extraordinary ray: in the meridional plane r sin(angle to r) is conserved and the polar angle
+/// turns n_o/n_e times as fast, so that a ray of tangential wavevector kappa = n_host sin(psi) sweeps (pi - 2 psi_0) n_o/n_e,
+/// sin psi_0 = kappa / n_e, on an optical path 2 n_o R cos psi_0; the ordinary one sweeps pi - 2 psi_0, sin psi_0 = kappa / n_o.
+template <class S>
+EikonalRay<S> eikonal_ray(const DropletOptics<S>&, bool extraordinary, const S& rho_um, double objective_na);
 /// Retarder on (p, s) = (radial, azimuthal) of the ray's frame inside, common phase left out.
 template <class S>
 Su2<S> droplet_retarder(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&);
@@ -126,13 +137,15 @@ class DropletImage final : public PixelModel<S> {
   static bool all(bool inside) { return inside; }
   static bool all(const Pack::batch_bool_type& inside) { return xsimd::all(inside); }
   void terms_at(const S& rho_um, S* out) const;
+  void eikonal_terms_at(const S& rho_um, S* out) const;
   S through(const S& rho_um, const P* basis, const P* turned, P* turned_sum) const;
 
   DropletOptics<S> optics_;
   RimTable rim_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  bool aplanatic_;
+  bool aplanatic_, eikonal_;
+  double objective_na_;
   S cos_between_, sin_between_, cos_sum_, sin_sum_, sum_rad_;  ///< of analyser - polarizer, of analyser + polarizer
   double pixel_um_;
   S center_x_, center_y_, edge_um_, inverse_edge_, open_;

@@ -202,6 +202,11 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
                                      pilots.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
+  if (scene.rays == Rays::eikonal) {
+    if (o.coupled() || axial)
+      throw UserError(Where{}, "physics.rays: eikonal knows the radial droplet only", "use straight");
+    plan.reasons.push_back("each mode on its own curved ray, in closed form: the method above is not used");
+  }
   plan_radial_table(scene, value, plan);
 
   const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.radius_um;
@@ -611,8 +616,15 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
     const PlanarOptics<double> o = planar_optics(scene, value);
     for (const auto& [tx, ty] : pilot_directions(scene, value)) result.push_back(planar_phase(o, tx, ty));
     if (const auto* cell = std::get_if<Cell>(&scene.sample))
+    {
       if (const auto* twisted = std::get_if<TwistedDirector>(&cell->director))
         result.push_back(2 * value.radians(twisted->twist_deg));
+      if (const auto* field = std::get_if<FreederickszDirector>(&cell->director))
+        result.push_back(2 * value.radians(field->twist_deg));
+      if (const auto* helix = std::get_if<HelixDirector>(&cell->director))
+        result.push_back(4 * kPi * value(cell->thickness_um) / value(helix->pitch_um));
+    }
+    result.push_back(value.radians(scene.microscope.compensator_phase_deg));
   }
   return result;
 }

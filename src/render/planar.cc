@@ -77,6 +77,15 @@ FringePoint<S> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh
 
 namespace {
 
+/// exp(i phase/2) along its axis, exp(-i phase/2) across it.
+template <class S>
+std::optional<Mat2<S>> compensator(const Scene& scene, const Values<S>& value) {
+  if (!scene.microscope.compensator_phase_deg) return std::nullopt;
+  const S half = 0.5 * value.radians(scene.microscope.compensator_phase_deg), twice = 2.0 * value.radians(scene.microscope.compensator_azimuth_deg);
+  const S c = cos(half), s = sin(half), along = cos(twice), across = sin(twice);
+  return Mat2<S>{{c, s * along}, {S(0.0), s * across}, {S(0.0), s * across}, {c, -(s * along)}};
+}
+
 template <class S>
 class PlanarModel final : public PixelModel<S> {
  public:
@@ -86,6 +95,7 @@ class PlanarModel final : public PixelModel<S> {
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.column->breaks) : plan.mesh),
         polarizers_(polarizers(scene, value)),
+        compensator_(compensator(scene, value)),
         coupling_(plan.method == "modal"),
         blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
         tabulated_blocks_(plan.fringe_blocks) {
@@ -129,7 +139,8 @@ class PlanarModel final : public PixelModel<S> {
     return planar_fringe(optics_, coupling_, mesh_, polarizers_, (S(column) - center_x_) * tan_per_px_,
                          (center_y_ - S(row)) * tan_per_px_);
   }
-  S intensity_of(const Mat2<S>& j) const {
+  S intensity_of(const Mat2<S>& sample) const {
+    const Mat2<S> j = compensator_ ? *compensator_ * sample : sample;
     return norm(polarizers_.ax * (polarizers_.px * j.a + polarizers_.py * j.b) +
                 polarizers_.ay * (polarizers_.px * j.c + polarizers_.py * j.d));
   }
@@ -137,6 +148,7 @@ class PlanarModel final : public PixelModel<S> {
   const TransportMethod<S>& method_;
   Mesh mesh_;
   Polarizers<S> polarizers_;
+  std::optional<Mat2<S>> compensator_;
   bool coupling_, conoscopic_ = false;
   FringeBlocks blocks_;
   std::vector<std::uint8_t> tabulated_blocks_;

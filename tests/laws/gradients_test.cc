@@ -172,6 +172,61 @@ std::vector<Case> cases() {
     c.scene.sample = cell;
     all.push_back(c);
   }
+  using Anchoring = FreederickszDirector::Anchoring;
+  const auto field_cell = [&](const std::string& name, Anchoring anchoring, double eps_ratio, double voltage) {
+    Case c = base(name);
+    Cell cell;
+    cell.thickness_um = c.t.fixed("thickness_um", 5);
+    FreederickszDirector d;
+    d.anchoring = anchoring;
+    d.reduced_voltage = c.t.fixed("reduced_voltage", voltage);
+    d.k33_over_k11 = c.t.fixed("k33_over_k11", 1.5);
+    d.eps_ratio = c.t.fixed("eps_ratio", eps_ratio);
+    d.pretilt_deg = c.t.fixed("pretilt_deg", 2);
+    d.azimuth_deg = c.t.fixed("azimuth_deg", 30);
+    cell.director = d;
+    c.scene.sample = cell;
+    return c;
+  };
+  const auto field_of = [](Case& c) -> FreederickszDirector& { return std::get<FreederickszDirector>(std::get<Cell>(c.scene.sample).director); };
+  all.push_back(field_cell("planar cell below its threshold", Anchoring::planar, 3.7, 0.9));
+  all.push_back(field_cell("planar cell above its threshold", Anchoring::planar, 3.7, 1.05));
+  all.push_back(field_cell("homeotropic cell", Anchoring::homeotropic, 0.5, 1.3));
+  all.push_back(field_cell("hybrid cell", Anchoring::hybrid, 2, 0.7));
+  {
+    Case c = field_cell("twisted cell in a field", Anchoring::planar, 3.7, 1.4);
+    field_of(c).k22_over_k11 = c.t.fixed("k22_over_k11", 0.6);
+    field_of(c).twist_deg = c.t.fixed("twist_deg", 80);
+    field_of(c).pitch_um = c.t.fixed("pitch_um", 60);
+    all.push_back(c);
+  }
+  {
+    Case c = field_cell("cell in volts, elastic constants in pN, behind a compensator", Anchoring::planar, 1, 0);
+    FreederickszDirector& d = field_of(c);
+    d.reduced_voltage = d.k33_over_k11 = d.eps_ratio = {};
+    d.voltage_v = c.t.fixed("voltage_v", 1.3);
+    d.k11_pn = c.t.fixed("k11_pn", 11.1);
+    d.k33_pn = c.t.fixed("k33_pn", 17.1);
+    d.eps_parallel = c.t.fixed("eps_parallel", 19.3);
+    d.eps_perpendicular = c.t.fixed("eps_perpendicular", 5.2);
+    c.scene.microscope.compensator_phase_deg = c.t.fixed("compensator_phase_deg", 70);
+    c.scene.microscope.compensator_azimuth_deg = c.t.fixed("compensator_azimuth_deg", 25);
+    ConstantIndices& m = std::get<ConstantIndices>(c.scene.material);
+    m.resonance_nm = c.t.fixed("resonance_nm", 250);
+    all.push_back(c);
+  }
+  {
+    Case c = base("unwound helix");
+    Cell cell;
+    cell.thickness_um = c.t.fixed("thickness_um", 5);
+    HelixDirector helix;
+    helix.pitch_um = c.t.fixed("pitch_um", 4);
+    helix.azimuth_deg = c.t.fixed("azimuth_deg", 20);
+    helix.modulus = c.t.fixed("modulus", 0.9);
+    cell.director = helix;
+    c.scene.sample = cell;
+    all.push_back(c);
+  }
   {
     Case c = base("heated plate");
     Plate plate;

@@ -346,5 +346,55 @@ TEST_F(Config, RefusesAnImageOptionBesideMicrographs) {
   EXPECT_THROW(load_config(write("config.yaml", kCrystal), ConfigUse::fit, folder_ / "a.tif"), UserError);
 }
 
+const std::string kSignal = R"(signal:
+  - {file: a.csv, value: out, columns: {sample.cell.director.freedericksz.voltage_v: volts}, set: {microscope.light.wavelength_nm: 500}}
+  - {file: b.csv, value: out, columns: {sample.cell.director.freedericksz.voltage_v: volts}, set: {microscope.light.wavelength_nm: 600, micrograph.gain: {fit: auto}}, noise: 0.5, every: 2}
+sample:
+  cell:
+    thickness_um: {value: 5, fit: [4, 6]}
+    director: {freedericksz: {threshold_v: 1, k33_over_k11: 1.5, eps_ratio: 3, azimuth_deg: 45}}
+  material: {ordinary: 1.52, birefringence: 0.2}
+microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}
+)";
+
+TEST_F(Config, MakesEveryRowOfASignalAMicrographOfOnePixel) {
+  write("a.csv", ",volts,out\n0,0.5,1\n1,1,2\n2,2,4\n3,3,8\n");
+  write("b.csv", "out,volts\n1,0.5\n2,1\n3,1.5\n4,2\n5,2.5\n");
+  const auto config = load(kSignal, ConfigUse::fit);
+  ASSERT_EQ(config.job.micrographs.size(), 4u + 3u);
+  ASSERT_EQ(config.signals.size(), 2u);
+  EXPECT_EQ(config.signals[1].first, 4u);
+  EXPECT_EQ(config.signals[1].x, (std::vector<double>{0.5, 1.5, 2.5}));
+  const Theta theta = config.job.parameters.values();
+  const auto voltage = [&](std::size_t row) {
+    return theta[std::get<FreederickszDirector>(std::get<Cell>(config.job.micrographs[row].scene.sample).director).voltage_v.index];
+  };
+  EXPECT_EQ(config.job.micrographs[3].values(0, 0), 8);
+  EXPECT_EQ(voltage(3), 3);
+  EXPECT_EQ(voltage(5), 1.5);
+  EXPECT_EQ(theta[config.job.micrographs[2].scene.microscope.wavelength_nm.index], 500);
+  EXPECT_EQ(theta[config.job.micrographs[4].scene.microscope.wavelength_nm.index], 600);
+  EXPECT_EQ(config.job.micrographs[4].noise->read_counts, 0.5);
+  EXPECT_GT(config.job.micrographs[0].noise->read_counts, 0);
+  // The first table has the shared gain, the second its own, one for all its rows.
+  EXPECT_NE(config.job.micrographs[0].gain.index, config.job.micrographs[4].gain.index);
+  EXPECT_EQ(config.job.micrographs[4].gain.index, config.job.micrographs[6].gain.index);
+  // Without images: the scene of the first row.
+  EXPECT_EQ(load(kSignal).scene.view.width, 1);
+}
+
+TEST_F(Config, SaysWhereASignalIsWrong) {
+  write("a.csv", "volts,out\n0.5,1\n-1,2\n2,4\n");
+  write("b.csv", "volts,aut\n0.5,1\n1,2\n1.5,3\n");
+  EXPECT_EQ(mistakes(kSignal, ConfigUse::fit),
+            "config.yaml:3:12: b.csv has no column out; did you mean aut?\n"
+            "a.csv:3:1: volts = -1 is outside [0, 100000], the range of sample.cell.director.freedericksz.voltage_v");
+  EXPECT_NE(mistakes(replaced(kSignal, "voltage_v: volts", "voltage: volts"), ConfigUse::fit).find("did you mean"), std::string::npos);
+  EXPECT_NE(mistakes("image_size_px: [3, 3]\n" + kSignal, ConfigUse::fit).find("image_size_px is given beside signal"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kSignal, "columns: {sample.cell.director.freedericksz.voltage_v: volts}, set", "set"), ConfigUse::fit)
+                .find("columns"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace birefit

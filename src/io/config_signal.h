@@ -1,0 +1,36 @@
+#pragma once
+// `signal:` of docs/configuration.md: a cell fitted to tables of signal against voltage. Every row becomes a micrograph of one
+// pixel, so that the fit knows nothing of tables.
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/config_reader.h"
+
+namespace birefit {
+
+/// One table as the config describes it.
+struct SignalItem {
+  std::string file;
+  Where where, file_where;
+  std::string value_column;
+  std::vector<std::pair<std::string, std::string>> columns;  ///< parameter path, column
+  std::vector<Where> column_where;
+  std::vector<std::pair<std::string, const YamlNode*>> set;
+  std::vector<Where> set_where;
+  int every = 1;
+  std::optional<double> noise;
+};
+
+/// `signal:` as one table or a list of them; empty without the key.
+std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root);
+
+/// Rows of a table as micrographs, made from `base` (the shared scene with what the table sets). `replace` gives a micrograph
+/// another reference for a parameter.
+void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Micrograph& base,
+                   const std::function<void(Micrograph&, ParameterRef, ParameterRef)>& replace, Config& config,
+                   std::vector<Micrograph>& micrographs);
+
+}  // namespace birefit

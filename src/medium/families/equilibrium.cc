@@ -1,0 +1,541 @@
+#include "medium/families/equilibrium.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <numbers>
+
+#include <Eigen/Dense>
+
+#include "birefit/error.h"
+
+namespace birefit {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// ---- the start -----------------------------------------------------------------------------------------------------------
+
+/// Complete elliptic integral K by the arithmetic-geometric mean, from 1 - m.
+double complete_k(double one_minus_m) {
+  double a = 1, b = std::sqrt(one_minus_m);
+  for (int i = 0; i < 40 && std::abs(a - b) > 1e-15 * a; ++i) {
+    const double mean = 0.5 * (a + b);
+    b = std::sqrt(a * b);
+    a = mean;
+  }
+  return kPi / (a + b);
+}
+
+/// am(x | m) by descending Landen steps (Abramowitz & Stegun 16.4).
+double amplitude(double x, double one_minus_m) {
+  double a[24], c[24];
+  a[0] = 1;
+  c[0] = std::sqrt(1 - one_minus_m);
+  double b = std::sqrt(one_minus_m);
+  int n = 0;
+  while (n < 23 && std::abs(c[n]) > 1e-15 * a[n]) {
+    a[n + 1] = 0.5 * (a[n] + b);
+    c[n + 1] = 0.5 * (a[n] - b);
+    b = std::sqrt(a[n] * b);
+    ++n;
+  }
+  double phi = std::ldexp(a[n] * x, n);
+  for (; n > 0; --n) phi = 0.5 * (phi + std::asin(std::clamp(c[n] / a[n] * std::sin(phi), -1.0, 1.0)));
+  return phi;
+}
+
+/// Angle from the anchored direction at depth zeta, at V/Vth = v, of one constant, a uniform field and a pretilt: a start, no
+/// more. v > 1: sin t = sqrt(m) sn(2 K zeta), K(m) = pi v / 2; below, the cubic amplitude equation of the pretilted cell.
+class EllipticStart {
+ public:
+  EllipticStart(double v, double pretilt) : pretilt_(pretilt) {
+    if (v > 1) {
+      double low = -600, high = 0;  // ln(1 - m)
+      for (int i = 0; i < 80; ++i) {
+        const double middle = 0.5 * (low + high);
+        (complete_k(std::exp(middle)) > kPi / 2 * v ? low : high) = middle;
+      }
+      one_minus_m_ = std::exp(0.5 * (low + high));
+      quarter_ = complete_k(one_minus_m_);
+    } else {
+      double low = 0, high = kPi / 2;
+      for (int i = 0; i < 60; ++i) {
+        const double t = 0.5 * (low + high);
+        (0.25 * t * t * t + (1 - v) * t < 2 / kPi * pretilt ? low : high) = t;
+      }
+      swing_ = low;
+    }
+  }
+  double at(double zeta) const {
+    const double swing = quarter_ > 0 ? std::asin(std::clamp(std::sqrt(1 - one_minus_m_) * std::sin(amplitude(2 * quarter_ * zeta, one_minus_m_)), 0.0, 1.0))
+                                      : swing_ * std::sin(kPi * zeta);
+    return pretilt_ + (1 - pretilt_ * 2 / kPi) * swing;
+  }
+
+ private:
+  double pretilt_, one_minus_m_ = 1, quarter_ = 0, swing_ = 0;
+};
+
+// ---- the discrete energy -------------------------------------------------------------------------------------------------
+
+/// Density at one point without the electric part: its derivatives by t, t', f' and those of q = sin^2 t / (1 + gamma sin^2 t).
+template <class R>
+struct Density {
+  R e, e_t, e_tp, e_fp;
+  R q, q_t;
+  // second derivatives
+  R tt, ttp, tptp, tfp, fpfp, q_tt;
+};
+
+template <bool kTwisted, bool kSecond, class R>
+Density<R> density(const CellForces<R>& p, const R& t, const R& tp, const R& fp) {
+  R s, c;
+  sin_cos(t, s, c);
+  const R x = s * s, x1 = 2.0 * s * c, x2 = 2.0 * (c * c - x);
+  const R bend = p.k33 - 1.0, a = 1.0 + bend * x;
+  Density<R> r;
+  r.e = 0.5 * a * tp * tp;
+  r.e_t = 0.5 * bend * x1 * tp * tp;
+  r.e_tp = a * tp;
+  const R d = inverse(1.0 + p.gamma * x), d2 = d * d;
+  r.q = x * d;
+  r.q_t = x1 * d2;
+  if constexpr (kSecond) {
+    r.tt = 0.5 * bend * x2 * tp * tp;
+    r.ttp = bend * x1 * tp;
+    r.tptp = a;
+    r.q_tt = x2 * d2 - 2.0 * p.gamma * x1 * x1 * d2 * d;
+  }
+  if constexpr (kTwisted) {
+    const R difference = p.k33 - p.k22, inner = p.k22 + difference * x;
+    const R b = c * c * inner, b_x = c * c * difference - inner, pull = p.k22 * p.chirality;
+    r.e = r.e + (0.5 * b * fp - pull * c * c) * fp;
+    r.e_t = r.e_t + (0.5 * b_x * fp + pull) * x1 * fp;
+    r.e_fp = b * fp - pull * c * c;
+    if constexpr (kSecond) {
+      r.tt = r.tt + (-difference * x1 * x1 * fp + (0.5 * b_x * fp + pull) * x2) * fp;
+      r.tfp = (b_x * fp + pull) * x1;
+      r.fpfp = b;
+    }
+  }
+  return r;
+}
+
+/// Symmetric positive definite band, one row after another: entry (i, j), i - width <= j <= i.
+class SymmetricBand {
+ public:
+  SymmetricBand(int size, int width) : size_(size), width_(width), a_(static_cast<std::size_t>(size) * static_cast<std::size_t>(width + 1), 0.0) {}
+  double& operator()(int i, int j) { return a_[static_cast<std::size_t>(i) * static_cast<std::size_t>(width_ + 1) + static_cast<std::size_t>(j - i + width_)]; }
+  double operator()(int i, int j) const { return const_cast<SymmetricBand&>(*this)(i, j); }
+  /// Cholesky's factor in place; false when not positive definite.
+  bool factor() {
+    for (int i = 0; i < size_; ++i) {
+      const int from = std::max(0, i - width_);
+      for (int j = from; j <= i; ++j) {
+        const int start = std::max(from, j - width_);
+        const double *ri = &(*this)(i, start), *rj = &(*this)(j, start);
+        double sum = (*this)(i, j);
+        for (int k = 0; k < j - start; ++k) sum -= ri[k] * rj[k];
+        if (j < i) {
+          (*this)(i, j) = sum / (*this)(j, j);
+        } else {
+          if (!(sum > 0)) return false;
+          (*this)(i, i) = std::sqrt(sum);
+        }
+      }
+    }
+    return true;
+  }
+  void solve(std::vector<double>& b) const {
+    for (int i = 0; i < size_; ++i) {
+      double sum = b[static_cast<std::size_t>(i)];
+      for (int j = std::max(0, i - width_); j < i; ++j) sum -= (*this)(i, j) * b[static_cast<std::size_t>(j)];
+      b[static_cast<std::size_t>(i)] = sum / (*this)(i, i);
+    }
+    for (int i = size_ - 1; i >= 0; --i) {
+      const double x = b[static_cast<std::size_t>(i)] / (*this)(i, i);
+      b[static_cast<std::size_t>(i)] = x;
+      for (int j = std::max(0, i - width_); j < i; ++j) b[static_cast<std::size_t>(j)] -= (*this)(i, j) * x;
+    }
+  }
+  void add_to_diagonal(double x) {
+    for (int i = 0; i < size_; ++i) (*this)(i, i) += x;
+  }
+
+ private:
+  int size_, width_;
+  std::vector<double> a_;
+};
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+/// Energy, gradient by the inner nodes' unknowns (tilt, or tilt and azimuth in turn) and pull = dQ/d(unknowns).
+template <class R>
+struct Slopes {
+  R energy = R(0.0), q = R(0.0);
+  std::vector<R> gradient, pull;
+};
+
+template <bool kTwisted, class R>
+Slopes<R> slopes(const CellForces<R>& p, const DirectorMesh& mesh, const std::vector<R>& t, const std::vector<R>& f, SymmetricBand* hessian) {
+  constexpr int kEach = kTwisted ? 2 : 1;
+  const int n = mesh.degree() + 1, inner = mesh.nodes() - 2;
+  Slopes<R> r;
+  r.gradient.assign(static_cast<std::size_t>(inner * kEach), R(0.0));
+  r.pull.assign(r.gradient.size(), R(0.0));
+  std::vector<Density<R>> points(static_cast<std::size_t>(mesh.nodes() + mesh.elements()));
+  // The electric energy's slope by Q needs Q first.
+  for (int e = 0; e < mesh.elements(); ++e) {
+    const double scale = 2 / mesh.width(e);
+    const std::size_t base = static_cast<std::size_t>(e * mesh.degree());
+    for (int k = 0; k < n; ++k) {
+      R tp(0.0), fp(0.0);
+      for (int j = 0; j < n; ++j) {
+        const double d = mesh.slope(k, j) * scale;
+        tp = tp + d * t[base + static_cast<std::size_t>(j)];
+        if constexpr (kTwisted) fp = fp + d * f[base + static_cast<std::size_t>(j)];
+      }
+      const R& here = t[base + static_cast<std::size_t>(k)];
+      Density<R>& point = points[static_cast<std::size_t>(e * n + k)];
+      point = hessian ? density<kTwisted, true>(p, here, tp, fp) : density<kTwisted, false>(p, here, tp, fp);
+      const double w = mesh.weight(k) / scale;
+      r.energy = r.energy + w * point.e;
+      r.q = r.q + w * point.q;
+    }
+  }
+  const R room = inverse(1.0 - p.gamma * r.q);
+  r.energy = r.energy - 0.5 * p.drive * r.q * room;
+  const R electric = -0.5 * p.drive * room * room;
+  for (int e = 0; e < mesh.elements(); ++e) {
+    const double scale = 2 / mesh.width(e);
+    const int base = e * mesh.degree() - 1;  // of the unknowns
+    for (int k = 0; k < n; ++k) {
+      const Density<R>& point = points[static_cast<std::size_t>(e * n + k)];
+      const double w = mesh.weight(k) / scale;
+      const int row = base + k;
+      if (row >= 0 && row < inner) {
+        const std::size_t i = static_cast<std::size_t>(row * kEach);
+        r.gradient[i] = r.gradient[i] + w * (point.e_t + electric * point.q_t);
+        r.pull[i] = r.pull[i] + w * point.q_t;
+      }
+      for (int j = 0; j < n; ++j) {
+        const int other = base + j;
+        if (other < 0 || other >= inner) continue;
+        const double d = mesh.slope(k, j) * scale * w;
+        const std::size_t i = static_cast<std::size_t>(other * kEach);
+        r.gradient[i] = r.gradient[i] + d * point.e_tp;
+        if constexpr (kTwisted) r.gradient[i + 1] = r.gradient[i + 1] + d * point.e_fp;
+      }
+      if constexpr (std::is_same_v<R, double>) {
+        if (!hessian) continue;
+        SymmetricBand& h = *hessian;
+        const auto add = [&](int i, int j, double x) { h(std::max(i, j), std::min(i, j)) += x; };
+        if (row >= 0 && row < inner) add(row * kEach, row * kEach, w * (point.tt + electric * point.q_tt));
+        for (int j = 0; j < n; ++j) {
+          const int other = base + j;
+          if (other < 0 || other >= inner) continue;
+          const double d = mesh.slope(k, j) * scale;
+          if (row >= 0 && row < inner) {
+            // (t_k, t'_j): once for each order of the pair, so twice on the diagonal.
+            add(row * kEach, other * kEach, (other == row ? 2 : 1) * w * d * point.ttp);
+            if constexpr (kTwisted) add(row * kEach, other * kEach + 1, w * d * point.tfp);
+          }
+          for (int i = 0; i <= j; ++i) {
+            const int first = base + i;
+            if (first < 0) continue;
+            const double both = w * d * mesh.slope(k, i) * scale;
+            add(other * kEach, first * kEach, both * point.tptp);
+            if constexpr (kTwisted) add(other * kEach + 1, first * kEach + 1, both * point.fpfp);
+          }
+        }
+      }
+    }
+  }
+  return r;
+}
+
+/// The Hessian is a band less a rank-one part: curvature (<= 0) times pull pull^T.
+struct Newton {
+  SymmetricBand band;
+  std::vector<double> pull, band_pull;
+  double curvature;
+  Newton(SymmetricBand b, std::vector<double> a, double c) : band(std::move(b)), pull(std::move(a)), curvature(c) {}
+  void prepare() {
+    band_pull = pull;
+    band.solve(band_pull);
+  }
+  double room() const { return 1 + curvature * dot(pull, band_pull); }  ///< > 0: positive definite with the rank-one part
+  /// H x = b by Sherman and Morrison.
+  void solve(std::vector<double>& b, bool with_rank_one = true) const {
+    band.solve(b);
+    if (!with_rank_one) return;
+    const double along = curvature * dot(pull, b) / room();
+    for (std::size_t i = 0; i < b.size(); ++i) b[i] -= along * band_pull[i];
+  }
+};
+
+double curvature_by_q(const CellForces<double>& p, double q) {
+  const double room = 1 / (1 - p.gamma * q);
+  return -p.drive * p.gamma * room * room * room;
+}
+
+int band_width(const DirectorMesh& mesh, bool twisted) { return twisted ? 2 * mesh.degree() + 1 : mesh.degree(); }
+
+template <bool kTwisted>
+DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, std::vector<double> t, std::vector<double> f) {
+  constexpr int kEach = kTwisted ? 2 : 1;
+  constexpr int kMostIterations = 200;
+  const int unknowns = (mesh.nodes() - 2) * kEach;
+  DirectorSolution result;
+  double before = 1;
+  const auto moved = [&](const std::vector<double>& from, const std::vector<double>& step, double share, int offset) {
+    std::vector<double> to = from;
+    for (int i = 0; i < mesh.nodes() - 2; ++i) to[static_cast<std::size_t>(i + 1)] += share * step[static_cast<std::size_t>(i * kEach + offset)];
+    return to;
+  };
+  for (int iteration = 1; iteration <= kMostIterations; ++iteration) {
+    SymmetricBand band(unknowns, band_width(mesh, kTwisted));
+    const Slopes<double> here = slopes<kTwisted, double>(p, mesh, t, f, &band);
+    Newton newton(band, here.pull, curvature_by_q(p, here.q));
+    for (double shift = 1e-3; !newton.band.factor(); shift *= 10) {  // away from the minimum: steepest descent, the more the worse
+      newton.band = band;
+      newton.band.add_to_diagonal(shift);
+    }
+    newton.prepare();
+    std::vector<double> step = here.gradient;
+    for (double& x : step) x = -x;
+    newton.solve(step, newton.room() > 1e-3);
+    double largest = 0;  // turn of the director; an azimuth near the normal means little and is known as little
+    for (std::size_t i = 0; i < step.size(); ++i)
+      largest = std::max(largest, std::abs(step[i]) * (kTwisted && i % 2 == 1 ? std::cos(t[i / 2 + 1]) : 1.0));
+    const double descent = dot(step, here.gradient);
+    // No step turns the director by more than a radian.
+    double share = std::min(1.0, 1 / largest);
+    result.iterations = iteration;
+    // The last steps are below the rounding of the energy, which can judge them no more.
+    const bool last = largest < 1e-5;
+    std::vector<double> next_t = moved(t, step, share, 0), next_f = kTwisted ? moved(f, step, share, 1) : f;
+    for (int halvings = 0; !last && halvings < 60; ++halvings) {
+      if (slopes<kTwisted, double>(p, mesh, next_t, next_f, nullptr).energy <= here.energy + 1e-4 * share * descent + 1e-13 * std::abs(here.energy)) break;
+      share *= 0.5;
+      next_t = moved(t, step, share, 0);
+      if (kTwisted) next_f = moved(f, step, share, 1);
+    }
+    t = std::move(next_t);
+    f = std::move(next_f);
+    result.energy = here.energy;
+    // Near the normal the azimuth is known to rounding over cos^2 of the tilt: steps that no longer shrink are its last digits.
+    const bool done = largest < 1e-11 || (last && largest > 0.25 * before);
+    before = largest;
+    if (done) {
+      result.tilt = std::move(t);
+      result.azimuth = std::move(f);
+      return result;
+    }
+  }
+  throw UserError(Where{}, "the director of this cell has no equilibrium that could be found",
+                  "check the voltage, the elastic constants and the twist of sample.cell.director.freedericksz");
+}
+
+template <bool kTwisted, int N>
+void tangents(const CellForces<Dual<double, N>>& p, const DirectorMesh& mesh, const DirectorSolution& solution,
+              std::vector<std::array<double, N>>& tilt, std::vector<std::array<double, N>>& azimuth) {
+  constexpr int kEach = kTwisted ? 2 : 1;
+  using D = Dual<double, N>;
+  CellForces<double> plain_forces{p.k33.value, p.k22.value, p.gamma.value, p.drive.value, p.chirality.value,
+                                  p.tilt_entry.value, p.tilt_exit.value, p.twist.value, p.twisted};
+  const int unknowns = (mesh.nodes() - 2) * kEach;
+  SymmetricBand band(unknowns, band_width(mesh, kTwisted));
+  const Slopes<double> here = slopes<kTwisted, double>(plain_forces, mesh, solution.tilt, solution.azimuth, &band);
+  Newton newton(std::move(band), here.pull, curvature_by_q(plain_forces, here.q));
+  const bool stable = newton.band.factor();
+  if (stable) newton.prepare();
+  std::vector<D> t(solution.tilt.begin(), solution.tilt.end()), f(solution.azimuth.begin(), solution.azimuth.end());
+  t.front() = p.tilt_entry;
+  t.back() = p.tilt_exit;
+  if (kTwisted) f.back() = p.twist;
+  const Slopes<D> moved = slopes<kTwisted, D>(p, mesh, t, f, nullptr);
+  tilt.assign(t.size(), {});
+  azimuth.assign(kTwisted ? t.size() : 0, {});
+  for (std::size_t d = 0; d < static_cast<std::size_t>(N); ++d) {
+    std::vector<double> change(static_cast<std::size_t>(unknowns));
+    for (std::size_t i = 0; i < change.size(); ++i) change[i] = -moved.gradient[i].d[d];
+    if (stable) newton.solve(change);
+    else std::fill(change.begin(), change.end(), 0.0);  // at the very threshold of a cell without pretilt no slope exists
+    for (std::size_t i = 0; i + 2 < t.size(); ++i) {
+      tilt[i + 1][d] = change[i * kEach];
+      if constexpr (kTwisted) azimuth[i + 1][d] = change[i * kEach + 1];
+    }
+    tilt.front()[d] = p.tilt_entry.d[d];
+    tilt.back()[d] = p.tilt_exit.d[d];
+    if constexpr (kTwisted) azimuth.back()[d] = p.twist.d[d];
+  }
+}
+
+}  // namespace
+
+DirectorMesh::DirectorMesh(int elements, int degree) : degree_(degree) {
+  const int n = degree + 1;
+  for (int i = 0; i <= elements; ++i) edges_.push_back(0.5 * (1 - std::cos(kPi * i / elements)));
+  edges_.front() = 0;
+  edges_.back() = 1;
+  // Gauss-Lobatto points: ends and zeros of P'_degree, by Newton from the Chebyshev points.
+  for (int i = 0; i < n; ++i) {
+    double x = -std::cos(kPi * i / degree), p = 0;
+    for (int pass = 0; pass < 100; ++pass) {
+      double before = 1;
+      p = x;
+      for (int k = 2; k <= degree; ++k) {
+        const double next = ((2 * k - 1) * x * p - (k - 1) * before) / k;
+        before = p;
+        p = next;
+      }
+      const double step = (x * p - before) / (n * p);
+      x -= step;
+      if (std::abs(step) < 1e-16) break;
+    }
+    if (i == 0) x = -1;
+    if (i == degree) x = 1;
+    point_.push_back(x);
+    weight_.push_back(2 / (degree * n * p * p));
+  }
+  std::vector<double> legendre(static_cast<std::size_t>(n));  // P_degree at the points
+  for (int i = 0; i < n; ++i) legendre[static_cast<std::size_t>(i)] = std::sqrt(2 / (degree * n * weight_[static_cast<std::size_t>(i)])) * ((degree - i) % 2 ? -1 : 1);
+  slope_.assign(static_cast<std::size_t>(n * n), 0.0);
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j) {
+      double& d = slope_[static_cast<std::size_t>(k * n + j)];
+      if (k != j)
+        d = legendre[static_cast<std::size_t>(k)] / legendre[static_cast<std::size_t>(j)] / (point_[static_cast<std::size_t>(k)] - point_[static_cast<std::size_t>(j)]);
+      else if (k == 0)
+        d = -0.25 * degree * n;
+      else if (k == degree)
+        d = 0.25 * degree * n;
+    }
+  Eigen::MatrixXd powers(n, n);
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j) powers(k, j) = std::pow(point_[static_cast<std::size_t>(k)], j);
+  const Eigen::MatrixXd inverse_powers = powers.inverse();
+  monomial_.resize(static_cast<std::size_t>(n * n));
+  for (int power = 0; power < n; ++power)
+    for (int j = 0; j < n; ++j) monomial_[static_cast<std::size_t>(power * n + j)] = inverse_powers(power, j);
+}
+
+double DirectorMesh::place(int node) const {
+  const int e = std::min(node / degree_, elements() - 1);
+  return middle(e) + 0.5 * width(e) * point_[static_cast<std::size_t>(node - e * degree_)];
+}
+
+int DirectorMesh::element_at(double u) const {
+  const auto it = std::upper_bound(edges_.begin() + 1, edges_.end() - 1, u);
+  return static_cast<int>(it - edges_.begin()) - 1;
+}
+
+const DirectorMesh& cell_mesh() {
+  static const DirectorMesh mesh(16, 10);
+  return mesh;
+}
+
+namespace {
+
+DirectorSolution solve_from_start(const CellForces<double>& p, const DirectorMesh& mesh) {
+  std::vector<double> t, f;
+  const double entry = p.tilt_entry, exit = p.tilt_exit;
+  // What a planar cell does for deps > 0 a homeotropic one does for deps < 0, with bend for splay, measured from the normal.
+  const bool falls = p.drive < 0;
+  double stiffness = falls ? p.k33 : 1;
+  if (p.twisted && !falls) stiffness += ((p.k33 - 2 * p.k22) * p.twist * p.twist + 2 * p.k22 * p.chirality * p.twist) / (kPi * kPi);
+  const double v = std::sqrt(std::abs(p.drive) / std::max(stiffness, 1e-2)) / kPi;
+  const bool even = std::abs(entry - exit) < 0.5;
+  const double mean = 0.5 * (entry + exit), side = falls ? (mean > kPi / 2 ? -1 : 1) : (mean < 0 ? -1 : 1), upright = kPi / 2;
+  const EllipticStart start(even ? v : 0, side * (falls ? upright - mean : mean));
+  for (int i = 0; i < mesh.nodes(); ++i) {
+    const double zeta = mesh.place(i), linear = entry + (exit - entry) * zeta;
+    const double swung = falls ? upright - side * start.at(zeta) : side * start.at(zeta);
+    t.push_back(even ? swung + linear - mean : linear);
+  }
+  t.front() = entry;
+  t.back() = exit;
+  if (!p.twisted) return solve<false>(p, mesh, std::move(t), {});
+  // The azimuth that this tilt would have: (flux) / stiffness against twist, the chiral part included.
+  f.assign(t.size(), 0.0);
+  std::vector<double> yielding(t.size()), driven(t.size());
+  const auto rate = [&](std::size_t i) {
+    const double c = std::cos(t[i]), s = std::sin(t[i]), stiff = p.k22 * c * c + p.k33 * s * s;
+    return std::pair(1 / (c * c * stiff + 1e-6), p.k22 * p.chirality / stiff);
+  };
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    const double h = mesh.place(static_cast<int>(i)) - mesh.place(static_cast<int>(i) - 1);
+    const auto [a, b] = rate(i - 1);
+    const auto [c, d] = rate(i);
+    yielding[i] = yielding[i - 1] + 0.5 * h * (a + c);
+    driven[i] = driven[i - 1] + 0.5 * h * (b + d);
+  }
+  const double flux = (p.twist - driven.back()) / yielding.back();
+  for (std::size_t i = 1; i < t.size(); ++i) f[i] = driven[i] + flux * yielding[i];
+  f.back() = p.twist;
+  return solve<true>(p, mesh, std::move(t), std::move(f));
+}
+
+/// Solutions of the latest few thousand forces. Plans, passes over groups of derivatives and changes of anything but the
+/// director ask for the same one again and again; what is kept is what would be computed.
+class SolutionCache {
+ public:
+  using Key = std::array<double, 9>;
+  bool find(const Key& key, DirectorSolution& solution) {
+    const std::lock_guard lock(mutex_);
+    const auto found = solutions_.find(key);
+    if (found == solutions_.end()) return false;
+    solution = found->second;
+    return true;
+  }
+  void keep(const Key& key, const DirectorSolution& solution) {
+    constexpr std::size_t kMost = 4096;  // 10 to 20 MB
+    const std::lock_guard lock(mutex_);
+    if (!solutions_.emplace(key, solution).second) return;
+    order_.push_back(key);
+    if (order_.size() <= kMost) return;
+    solutions_.erase(order_.front());
+    order_.pop_front();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<Key, DirectorSolution> solutions_;
+  std::deque<Key> order_;
+};
+
+}  // namespace
+
+DirectorSolution solve_director(const CellForces<double>& p, const DirectorMesh& mesh) {
+  if (&mesh != &cell_mesh()) return solve_from_start(p, mesh);
+  static SolutionCache cache;
+  const SolutionCache::Key key{p.k33, p.k22, p.gamma, p.drive, p.chirality, p.tilt_entry, p.tilt_exit, p.twist, p.twisted ? 1.0 : 0.0};
+  DirectorSolution solution;
+  if (cache.find(key, solution)) return solution;
+  solution = solve_from_start(p, mesh);
+  cache.keep(key, solution);
+  return solution;
+}
+
+template <int N>
+void director_tangents(const CellForces<Dual<double, N>>& forces, const DirectorMesh& mesh, const DirectorSolution& solution,
+                       std::vector<std::array<double, N>>& tilt, std::vector<std::array<double, N>>& azimuth) {
+  if (forces.twisted)
+    tangents<true, N>(forces, mesh, solution, tilt, azimuth);
+  else
+    tangents<false, N>(forces, mesh, solution, tilt, azimuth);
+}
+template void director_tangents<1>(const CellForces<Dual<double, 1>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 1>>&, std::vector<std::array<double, 1>>&);
+template void director_tangents<2>(const CellForces<Dual<double, 2>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 2>>&, std::vector<std::array<double, 2>>&);
+template void director_tangents<4>(const CellForces<Dual<double, 4>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 4>>&, std::vector<std::array<double, 4>>&);
+
+}  // namespace birefit
