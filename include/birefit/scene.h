@@ -128,7 +128,7 @@ struct RadialDirector {
   ParameterRef twist_deg;  ///< not given: no twist, diagonal transport
 };
 
-/// Normal anchoring, an electric field along the viewing axis, positive dielectric anisotropy, one elastic constant (Humar et
+/// Normal anchoring, an electric field along the viewing axis or in the image plane, positive dielectric anisotropy, one elastic constant (Humar et
 /// al., Opt. Express 17, 2009): a point hedgehog that a field turns into a wall across the equator, or, with ring_radius,
 /// an equatorial disclination ring. An image tells one number: e = radius / coherence length, the coherence length being
 /// sqrt(K / (eps0 deps)) / local field. Given as it is, or as field_v_per_um with what makes e of it:
@@ -139,15 +139,31 @@ struct AxialDirector {
   ParameterRef coherence_voltage_v;  ///< sqrt(K / (eps0 deps)): 0.27 V for 5CB, 0.34 V for E7
   ParameterRef local_field_factor;   ///< field in the droplet over applied field
   ParameterRef ring_radius;          ///< of the droplet's radius, [0.2, 0.995]; not given: hedgehog
+  ParameterRef field_azimuth_deg;    ///< field in the image plane, from +x; not given: along the view
   bool compare = false;              ///< a fit tries the hedgehog, too (FitJob::branches)
+};
+
+/// Tangential anchoring: the director follows the circles through two poles (Williams, J. Phys. A 19, 3211 (1986)).
+struct BipolarDirector {
+  ParameterRef azimuth_deg;    ///< of the poles' axis, from +x; not given: 0
+  ParameterRef tilt_deg;       ///< of that axis out of the image plane, towards +z; not given: 0
+  ParameterRef pole_distance;  ///< from the centre, in radii, >= 1: 1 on the surface, large uniform; not given: 1
+};
+
+/// Liquid crystal between a sphere and an isotropic core, normal anchoring at both: radial where the core is in the middle, the
+/// normals of nested spheres otherwise. Light is not refracted at the core.
+struct ShellDirector {
+  ParameterRef wall_um;                       ///< difference of the two radii
+  std::array<ParameterRef, 3> offset_um = {}; ///< of the core's centre; all or none. The sign of z is not observable
+  ParameterRef core_index;                    ///< not given: the surround's; only judges what refraction at the core would change
 };
 
 // ---- samples --------------------------------------------------------------------------------------------------------
 
-/// Spherical droplet in an isotropic host; refraction at the sphere, focus on the mid plane.
+/// Spherical droplet or shell in an isotropic host; refraction at the sphere, focus on the mid plane.
 struct Droplet {
   ParameterRef diameter_um;
-  std::variant<RadialDirector, AxialDirector> director;
+  std::variant<RadialDirector, AxialDirector, BipolarDirector, ShellDirector> director;
 };
 
 /// Plane-parallel cell, seen along its normal.
@@ -156,12 +172,15 @@ struct Cell {
   std::variant<UniformDirector, TwistedDirector, FreederickszDirector, HelixDirector> director;
 };
 
-/// Heat conduction from a hot face at z = d into a plate at cold_k, a time fourier_number d^2 / diffusivity after
-/// the step (Carslaw & Jaeger; physics of docs/methods.md). T rises with z.
+/// Heat conduction in a plate at one temperature whose faces are held at cold_k (z = 0) and hot_k (z = d) since a time
+/// fourier_number d^2 / diffusivity ago (Carslaw & Jaeger, Conduction of Heat in Solids, 3.4; physics of docs/methods.md).
 struct HeatStep {
-  ParameterRef fourier_number;  ///< > 0
+  ParameterRef fourier_number;      ///< > 0; or, when not given, the following two
+  ParameterRef time_s;              ///< since the step, > 0
+  ParameterRef diffusivity_mm2_s;   ///< > 0
   ParameterRef cold_k;
   ParameterRef hot_k;
+  ParameterRef initial_k;           ///< before the step; not given: cold_k. Equal faces: a step from both sides
 };
 
 /// Plate with a fixed optic axis seen in a converging cone: image radius proportional to tan(incidence), half the

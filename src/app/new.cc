@@ -157,19 +157,42 @@ microscope:
   quarter_wave: true           # circular polariscope: no isoclinics; false: plane polariscope
 )";
 
+const char* const kShell = R"(# A shell of nematic liquid crystal with normal anchoring at both surfaces.
+micrograph:
+  image: shell.tif
+  pixel_size_um: 0.2
+  gain: {fit: auto}
+  offset: {fit: auto}
+  center_px: {fit: auto}
+sample:
+  shell:
+    diameter_um: {value: 40, fit: auto}
+    wall_um: {value: 5, fit: [2, 10]}
+    # core_offset_um: [{value: 1, fit: [-3, 3]}, {value: 0, fit: [-3, 3]}, 0]   # the core's centre; the sign of z does not show
+    core: {index: 1.42}
+  material:
+    ordinary: 1.534           # 5CB at 590 nm
+    birefringence: 0.173
+  surround: {index: 1.42}
+microscope:
+  light: {wavelength_nm: 590}
+  polarizer_deg: 0
+  analyzer_deg: 90
+  objective_na: 0.6
+)";
+
 }  // namespace
 
 Command add_new_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("new", "print a commented config to start from");
   auto kind = std::make_shared<std::string>();
-  command->add_option("KIND", *kind, "droplet, cell, freedericksz, plate, crystal, slab or disc")->required();
+  command->add_option("KIND", *kind, "droplet, shell, cell, freedericksz, plate, crystal, slab or disc")->required();
   return {command, [kind] {
             const std::map<std::string, const char*> templates = {
-                {"droplet", kDroplet}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}};
-            if (*kind == "shell") throw UserError({}, "new shell: shells come later", "known: droplet, cell, freedericksz, plate, crystal, slab, disc");
+                {"droplet", kDroplet}, {"shell", kShell}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}};
             const auto found = templates.find(*kind);
             if (found == templates.end())
-              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, cell, freedericksz, plate, crystal, slab, disc");
+              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, shell, cell, freedericksz, plate, crystal, slab, disc");
             std::cout << found->second;
             return kExitDone;
           }};

@@ -76,18 +76,10 @@ NumberSpec kelvin() {
 /// The key of a map that names a kind: {radial: {..}}. A problem unless there is exactly one; of several the first is
 /// returned, so that its mistakes are found too.
 std::optional<std::string> one_kind(ConfigReader& reader, const Block& block, const std::vector<std::string>& known,
-                                    const std::vector<std::string>& later = {},
                                     const std::vector<std::string>& others = {}) {
   std::vector<std::string> found;
   for (const std::string& kind : known)
     if (block.find(kind)) found.push_back(kind);
-  bool postponed = false;
-  for (const std::string& kind : later) {
-    if (const YamlNode* node = block.find(kind)) {
-      reader.problems.add(node->where, block.path_of(kind) + " is not available yet", "known: " + list_words(known));
-      postponed = true;
-    }
-  }
   if (found.size() == 1) return found[0];
   if (found.size() > 1) {
     // The second one is the one too many.
@@ -101,7 +93,7 @@ std::optional<std::string> one_kind(ConfigReader& reader, const Block& block, co
       first = entry.key;
     }
     return first;
-  } else if (block.node && !postponed) {
+  } else if (block.node) {
     // A misspelt kind was reported as an unknown key, with the right one suggested.
     const bool misspelt = std::any_of(block.node->entries.begin(), block.node->entries.end(), [&](const YamlEntry& entry) {
       return std::find(others.begin(), others.end(), entry.key) == others.end();
@@ -146,7 +138,7 @@ UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
 /// Under a field along the view: the reduced field, or the applied one with the two numbers that reduce it.
 AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
   AxialDirector axial;
-  const Block block = reader.block(parent, "axial", {"reduced_field", "field_v_per_um", "coherence_voltage_v", "local_field_factor", "ring_radius", "branch"}, true);
+  const Block block = reader.block(parent, "axial", {"reduced_field", "field_v_per_um", "coherence_voltage_v", "local_field_factor", "ring_radius", "branch", "field_azimuth_deg"}, true);
   const YamlNode *reduced = block.find("reduced_field"), *applied = block.find("field_v_per_um");
   if (reduced && applied)
     reader.problems.add(applied->where, block.path + " has a reduced field and an applied one", "give one of the two");
@@ -170,6 +162,7 @@ AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
     axial.coherence_voltage_v = reader.number(block, "coherence_voltage_v", voltage);
     axial.local_field_factor = reader.number(block, "local_field_factor", number_within(0.01, 3));
   }
+  if (block.find("field_azimuth_deg")) axial.field_azimuth_deg = reader.number(block, "field_azimuth_deg", angle());
   if (block.find("ring_radius")) axial.ring_radius = reader.number(block, "ring_radius", number_within(0.2, 0.995));
   const std::string branch = reader.choice(block, "branch", {"hedgehog", "ring", "compare"}).value_or(axial.ring_radius ? "ring" : "hedgehog");
   axial.compare = branch == "compare";
@@ -187,9 +180,20 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   diameter.automatic = true;
   droplet.diameter_um = reader.number(block, "diameter_um", diameter);
   const Block director = reader.block(block, "director", {"radial", "bipolar", "axial"}, true);
-  const auto kind = one_kind(reader, director, {"radial", "axial"}, {"bipolar"});
+  const auto kind = one_kind(reader, director, {"radial", "axial", "bipolar"});
   if (kind == "axial") {
     droplet.director = read_axial(reader, director);
+    return droplet;
+  }
+  if (kind == "bipolar") {
+    BipolarDirector bipolar;
+    if (director.find("bipolar")->kind != YamlNode::Kind::null) {
+      const Block poles = reader.block(director, "bipolar", {"azimuth_deg", "tilt_deg", "pole_distance"}, true);
+      bipolar.azimuth_deg = reader.number(poles, "azimuth_deg", angle(), 0);
+      bipolar.tilt_deg = reader.number(poles, "tilt_deg", angle_within(-90, 90), 0);
+      bipolar.pole_distance = reader.number(poles, "pole_distance", number_within(1, 1000), 1);
+    }
+    droplet.director = bipolar;
     return droplet;
   }
   if (kind == "radial") {
@@ -200,6 +204,50 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   const Block radial = reader.block(director, "radial", {"twist_deg"}, false);
   // No twist is a simpler scene, not a twist of zero: its transport is diagonal.
   if (radial.find("twist_deg")) droplet.director = RadialDirector{reader.number(radial, "twist_deg", angle(), 0)};
+  return droplet;
+}
+
+/// A droplet with a core: `sample.shell`.
+Droplet read_shell(ConfigReader& reader, const Block& parent) {
+  Droplet droplet;
+  ShellDirector shell;
+  const Block block = reader.block(parent, "shell", {"diameter_um", "wall_um", "core_offset_um", "director", "core"}, true);
+  NumberSpec diameter = open_length(10000);
+  diameter.automatic = true;
+  droplet.diameter_um = reader.number(block, "diameter_um", diameter);
+  shell.wall_um = reader.number(block, "wall_um", open_length(5000));
+  const Block director = reader.block(block, "director", {"radial"}, false);
+  if (director.node) one_kind(reader, director, {"radial"});
+  const Block core = reader.block(block, "core", {"index"}, false);
+  if (core.find("index")) shell.core_index = reader.number(core, "index", index_spec());
+  double away = 0;
+  if (const YamlNode* offset = block.find("core_offset_um")) {
+    if (!offset->is_sequence() || offset->items.size() != 3) {
+      reader.problems.add(offset->where, "core_offset_um must be three numbers [x, y, z], found " +
+                                             (offset->is_sequence() ? std::to_string(offset->items.size()) + " items" : offset->describe()));
+    } else {
+      bool zero = true;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const char* const letters[] = {"x", "y", "z"};
+        NumberSpec spec = number_within(-5000, 5000);
+        spec.unit = "um";
+        shell.offset_um[i] = reader.number_at(offset->items[i], block.path_of("core_offset_um") + "." + letters[i], spec);
+        const Parameter& p = reader.table[shell.offset_um[i]];
+        away += std::pow(p.value, 2);
+        zero = zero && p.value == 0 && !p.free;
+      }
+      if (zero) shell.offset_um = {};  // a core in the middle is a simpler scene
+    }
+  }
+  if (reader.problems.empty() && std::isfinite(reader.table[droplet.diameter_um].value)) {
+    const Parameter& wall = reader.table[shell.wall_um];
+    const double radius = 0.5 * reader.table[droplet.diameter_um].value;
+    if (wall.value >= radius)
+      reader.problems.add(wall.where, "wall_um = " + show(wall.value) + " leaves no core in a radius of " + show(radius) + " um", "a droplet has no wall_um");
+    else if (std::sqrt(away) >= wall.value)
+      reader.problems.add(block.find("core_offset_um")->where, "core_offset_um is " + show(std::sqrt(away)) + " um long: the core would leave the wall of " + show(wall.value) + " um");
+  }
+  droplet.director = shell;
   return droplet;
 }
 
@@ -239,12 +287,27 @@ Plate read_plate(ConfigReader& reader, const Block& parent) {
   const Block director = reader.block(block, "director", {"uniform"}, true);
   if (one_kind(reader, director, {"uniform"})) plate.director = read_uniform(reader, director);
   if (block.find("heat")) {
-    const Block heat = reader.block(block, "heat", {"fourier_number", "cold_k", "hot_k"}, true);
+    const Block heat = reader.block(block, "heat", {"fourier_number", "time_s", "diffusivity_mm2_s", "cold_k", "hot_k", "initial_k"}, true);
     NumberSpec fourier = number_within(0, 1e4);
     fourier.lower_open = true;
     fourier.physical_lower = 0;
     HeatStep step;
-    step.fourier_number = reader.number(heat, "fourier_number", fourier);
+    const YamlNode* time = heat.find("time_s");
+    if (time && heat.find("fourier_number"))
+      reader.problems.add(time->where, "time_s is given beside fourier_number", "give one of the two: fourier_number = diffusivity * time / thickness^2");
+    if (time) {
+      NumberSpec seconds = number_within(0, 1e9), diffusivity = number_within(0, 1e4);
+      seconds.lower_open = diffusivity.lower_open = true;
+      seconds.unit = "s";
+      diffusivity.unit = "mm2/s";
+      step.time_s = reader.number(heat, "time_s", seconds);
+      step.diffusivity_mm2_s = reader.number(heat, "diffusivity_mm2_s", diffusivity);
+    } else {
+      step.fourier_number = reader.number(heat, "fourier_number", fourier);
+      if (const YamlNode* node = heat.find("diffusivity_mm2_s"))
+        reader.problems.add(node->where, "diffusivity_mm2_s has no effect on a Fourier number", "give time_s in place of fourier_number");
+    }
+    if (heat.find("initial_k")) step.initial_k = reader.number(heat, "initial_k", kelvin());
     step.cold_k = reader.number(heat, "cold_k", kelvin());
     step.hot_k = reader.number(heat, "hot_k", kelvin());
     plate.heat = step;
@@ -431,6 +494,7 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
                             "leave it out");
       check_within(reader, heat->cold_k, 250, 373, validity);
       check_within(reader, heat->hot_k, 250, 373, validity);
+      if (heat->initial_k) check_within(reader, heat->initial_k, 250, 373, validity);
       material.temperature_k = reader.constant("sample.material.temperature_k", temperature, 298.15);
       reader.specs.erase("sample.material.temperature_k");
     }
@@ -459,9 +523,9 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   std::vector<std::string> keys = kSampleKinds;
   keys.insert(keys.end(), {"material", "surround"});
   const Block block = reader.block(root, "sample", keys, true);
-  const std::vector<std::string> available = {"droplet", "cell", "plate", "crystal", "slab", "disc"};
-  const auto kind = one_kind(reader, block, available, {"shell"}, {"material", "surround"});
+  const auto kind = one_kind(reader, block, kSampleKinds, {"material", "surround"});
   if (!kind) return;
+  if (*kind == "shell") scene.sample = read_shell(reader, block);
   if (*kind == "droplet") scene.sample = read_droplet(reader, block);
   if (*kind == "cell") scene.sample = read_cell(reader, block);
   if (*kind == "plate") scene.sample = read_plate(reader, block);

@@ -23,6 +23,14 @@ void for_each_ref(Scene& scene, F&& f) {
     if (auto* axial = std::get_if<AxialDirector>(&droplet->director)) {
       for (ParameterRef* ref : {&axial->reduced_field, &axial->field_v_per_um, &axial->coherence_voltage_v, &axial->local_field_factor, &axial->ring_radius})
         f(*ref);
+      f(axial->field_azimuth_deg);
+    }
+    if (auto* bipolar = std::get_if<BipolarDirector>(&droplet->director))
+      for (ParameterRef* ref : {&bipolar->azimuth_deg, &bipolar->tilt_deg, &bipolar->pole_distance}) f(*ref);
+    if (auto* shell = std::get_if<ShellDirector>(&droplet->director)) {
+      f(shell->wall_um);
+      for (ParameterRef& offset : shell->offset_um) f(offset);
+      f(shell->core_index);
     }
   } else if (auto* cell = std::get_if<Cell>(&scene.sample)) {
     f(cell->thickness_um);
@@ -44,8 +52,7 @@ void for_each_ref(Scene& scene, F&& f) {
     uniform(plate->director);
     if (auto* heat = std::get_if<HeatStep>(&plate->heat)) {
       f(heat->fourier_number);
-      f(heat->cold_k);
-      f(heat->hot_k);
+      for (ParameterRef* ref : {&heat->time_s, &heat->diffusivity_mm2_s, &heat->cold_k, &heat->hot_k, &heat->initial_k}) f(*ref);
     }
     f(plate->half_angle_deg);
   } else if (auto* crystal = std::get_if<Crystal>(&scene.sample)) {

@@ -139,13 +139,18 @@ std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Materi
   const S thickness = value(plate.thickness_um);
   const Vec3<S> axis = rotated(uniform_axis<S>(plate.director, value), rotation_rad);
   const auto* heat = std::get_if<HeatStep>(&plate.heat);
+  HeatProfile<S> profile{};
+  if (heat) {
+    profile.from_cold = !heat->initial_k;
+    profile.cold_k = value(heat->cold_k);
+    profile.hot_k = value(heat->hot_k);
+    profile.initial_k = profile.from_cold ? profile.cold_k : value(heat->initial_k);
+    profile.fourier_number = heat->fourier_number ? value(heat->fourier_number)
+                                                  : value(heat->diffusivity_mm2_s) * value(heat->time_s) * inverse(thickness * thickness) * 1e6;
+  }
   if (const auto* law = std::get_if<LawIndices>(&material); heat && law)
-    return make(HeatedNematicLaw<S>{axis, value(heat->fourier_number), value(heat->cold_k), value(heat->hot_k), thickness,
-                                    nematic_law<S>(*law, value, wavelength_um)},
-                true);
-  if (heat)
-    return make(HeatedLaw<S>{axis, value(heat->fourier_number), value(heat->cold_k), value(heat->hot_k), thickness},
-                true);
+    return make(HeatedNematicLaw<S>{axis, profile, thickness, nematic_law<S>(*law, value, wavelength_um)}, true);
+  if (heat) return make(HeatedLaw<S>{axis, profile, thickness}, true);
   return make(UniformLaw<S>{axis, eo, ee, thickness}, true);
 }
 

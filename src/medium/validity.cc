@@ -41,7 +41,7 @@ std::vector<ParameterRef> temperatures(const Sample& sample, const LawIndices& l
   const Plate* plate = std::get_if<Plate>(&sample);
   const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
   if (heat)
-    refs = {heat->cold_k, heat->hot_k};
+    refs = {heat->cold_k, heat->hot_k, heat->initial_k ? heat->initial_k : heat->cold_k};
   else if (law.temperature_k)
     refs = {law.temperature_k};
   if (law.haller) refs.push_back(law.haller->reference_k);

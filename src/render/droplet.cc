@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "medium/build.h"
+#include "render/ball.h"
 #include "render/droplet.h"
 #include "render/pixel_model.h"
 #include "transport/method.h"
@@ -222,7 +223,10 @@ DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
   using Director = typename DropletOptics<S>::Director;
   if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) {
     if (radial->twist_deg) o.director = Director::twisted, o.twist_rad = value.radians(radial->twist_deg);
-  } else {
+  } else if (const auto* shell = std::get_if<ShellDirector>(&droplet.director)) {
+    o.director = Director::shell;
+    o.core_um = o.radius_um - value(shell->wall_um);
+  } else if (std::holds_alternative<AxialDirector>(droplet.director)) {
     const AxialDirector& axial = std::get<AxialDirector>(droplet.director);
     o.director = Director::axial;
     const S e = axial.reduced_field ? value(axial.reduced_field)
@@ -447,6 +451,7 @@ S DropletImage<S>::intensity(const P& column, const P& row) const {
 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+  if (!looks_round(std::get<Droplet>(scene.sample))) return make_ball_model(scene, plan, value);
   return std::make_unique<DropletImage<S>>(scene, plan, value);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                       \

@@ -37,8 +37,9 @@ class RimTable {
 template <class S>
 struct DropletOptics {
   S radius_um, n_o, n_e, n_host, ratio, k0;
-  enum class Director { radial, twisted, axial } director = Director::radial;
+  enum class Director { radial, twisted, axial, shell } director = Director::radial;
   S twist_rad = S(0.0);  // not {0.0}: a pack would take that for a list of lanes
+  S core_um = S(0.0);        ///< radius of a shell's core
   std::shared_ptr<const AxialField<S>> axial;
   Continuity continuity = Continuity::e_and_h;
   bool coupled() const { return director == Director::twisted; }  ///< the axis leaves the meridional plane
@@ -105,6 +106,13 @@ auto with_droplet_column(const DropletOptics<S>& o, const DropletRay<S>& r, cons
   const Chord<S> chord(impact, half, o.radius_um);
   if (o.director == Director::twisted)
     return f(LawColumn<S, TwistedRadialLaw<S>>({chord, r.sin_deflection, r.cos_deflection, o.twist_rad, eo, ee}));
+  if (o.director == Director::shell) {
+    // Beside the core the piece begins in the middle of the chord; the small number keeps the derivative finite at the edge.
+    const S from = root(max_of(o.core_um * o.core_um - impact * impact, 1e-14 * (o.radius_um * o.radius_um)));
+    LawColumn<S, ShellLaw<S>> shell({impact, from, half - from, eo, ee});
+    shell.planar = true;
+    return f(shell);
+  }
   LawColumn<S, RadialLaw<S>> column({chord, eo, ee});
   column.planar = true;
   return f(column);

@@ -5,7 +5,7 @@
 
 #include "medium/counting_column.h"
 #include "medium/families/radial.h"
-#include "render/droplet.h"
+#include "render/ball.h"
 #include "render/planar.h"
 
 namespace birefit {
@@ -60,8 +60,8 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
 }
 
 Pilots::Pilots(const Scene& scene, const Values<double>& value) {
-  if (std::holds_alternative<Droplet>(scene.sample))
-    add_droplet(scene, value);
+  if (const auto* droplet = std::get_if<Droplet>(&scene.sample))
+    looks_round(*droplet) ? add_droplet(scene, value) : add_ball(scene, value);
   else
     add_planar(scene, value);
 }
@@ -94,6 +94,42 @@ void Pilots::add_droplet(const Scene& scene, const Values<double>& value) {
       method.retarder(counted, {o.k0, 0.0, 0.0, o.continuity}, mesh);
       return static_cast<int>(counted.count());
     });
+  };
+}
+
+void Pilots::add_ball(const Scene& scene, const Values<double>& value) {
+  const auto o = std::make_shared<const BallOptics<double>>(ball_optics(scene, value));
+  const RimTable rim(o->sphere.ratio, o->sphere.n_host, scene.microscope.objective_na);
+  const Mesh fine = uniform_mesh(512);
+  breaks_ = {0.5};
+  const auto jones = [=](double fraction, double azimuth, const TransportMethod<double>& method, const Mesh& mesh) {
+    const DropletRay<double> ray = trace(o->sphere, rim, fraction * rim.rho_max() * o->sphere.radius_um);
+    return ball_jones<double>(*o, ray, std::cos(azimuth), std::sin(azimuth), method, mesh, 1.0);
+  };
+  int turn = 0;
+  for (double f : {0.02, 0.15, 0.3, 0.45, 0.6, 0.75, 0.88, 0.97})
+    for (int k = 0; k < 3; ++k) {
+      const double azimuth = 2.399963 * turn++;  // the golden angle: no two alike
+      const Mat2<double> exact = jones(f, azimuth, transport_method<double>("magnus4"), fine);
+      rays_.push_back([=](const TransportMethod<double>& method, const Mesh& mesh) {
+        try {
+          return checked(intensity_distance(exact, jones(f, azimuth, method, mesh)));
+        } catch (const std::logic_error&) {  // a method that asks for more than this column knows
+          return 1e300;
+        }
+      });
+    }
+  samples_ = [=](const TransportMethod<double>& method, const Mesh& mesh) {
+    try {
+      const DropletRay<double> ray = trace(o->sphere, rim, 0.5 * rim.rho_max() * o->sphere.radius_um);
+      return with_ball_column(*o, ray, 0.8, 0.6, [&](const auto& column) {
+        const CountingColumn<double> counted(column);
+        method.retarder(counted, {o->sphere.k0, 0.0, 0.0, o->sphere.continuity}, mesh);
+        return static_cast<int>(counted.count());
+      });
+    } catch (const std::logic_error&) {
+      return 1000000;
+    }
   };
 }
 

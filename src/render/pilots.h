@@ -28,6 +28,7 @@ class Pilots {
 
  private:
   void add_droplet(const Scene& scene, const Values<double>& value);
+  void add_ball(const Scene& scene, const Values<double>& value);
   void add_planar(const Scene& scene, const Values<double>& value);
   std::vector<std::function<double(const TransportMethod<double>&, const Mesh&)>> rays_;
   std::function<int(const TransportMethod<double>&, const Mesh&)> samples_;

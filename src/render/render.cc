@@ -4,9 +4,10 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "core/threads.h"
-#include "render/droplet.h"
+#include "render/ball.h"
 #include "render/pixel_model.h"
 #include "render/planar.h"
 #include "render/sampling.h"
@@ -412,6 +413,8 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
     const DropletOptics<double> optics = droplet_optics(scene, value);
     const RimTable rim(optics.ratio, optics.n_host, scene.microscope.objective_na);
     const TransportMethod<double>& method = transport_method<double>(plan.method);
+    std::optional<BallOptics<double>> ball;
+    if (!looks_round(std::get<Droplet>(scene.sample))) ball = ball_optics(scene, value);
     for (int r = 0; r < h; ++r)
       for (int c = 0; c < w; ++c) {
         const double x = (c - value(scene.view.center_x_px)) * scene.view.pixel_size_um;
@@ -420,6 +423,10 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
         const JonesRow row{.theta_deg = 0, .azimuth_deg = 0, .row = r, .column = c};
         if (rho >= optics.radius_um * rim.rho_max()) {
           add(Mat2<double>::identity(), 0, row);
+          continue;
+        }
+        if (ball) {
+          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, mesh, 1.0), 0, row);
           continue;
         }
         // droplet_jones is in (p, s) = (radial, azimuthal): turn it into x, y.

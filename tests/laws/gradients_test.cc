@@ -149,6 +149,28 @@ std::vector<Case> cases() {
     c.scene.sample = d;
     all.push_back(c);
   }
+  for (int kind = 0; kind < 4; ++kind) {
+    Case c = base(std::array{"bipolar droplet", "droplet in a field in the image plane", "shell", "eccentric shell"}[static_cast<std::size_t>(kind)]);
+    Droplet d;
+    d.diameter_um = c.t.fixed("diameter_um", 16);
+    if (kind == 0) d.director = BipolarDirector{c.t.fixed("azimuth_deg", 20), c.t.fixed("tilt_deg", 30), c.t.fixed("pole_distance", 1.2)};
+    if (kind == 1) {
+      AxialDirector axial;
+      axial.reduced_field = c.t.fixed("reduced_field", 7);
+      axial.field_azimuth_deg = c.t.fixed("field_azimuth_deg", 33);
+      d.director = axial;
+    }
+    if (kind >= 2) {
+      ShellDirector shell;
+      shell.wall_um = c.t.fixed("wall_um", kind == 2 ? 1.43 : 4.1);
+      // The core's edge, where derivatives jump, crosses no sampled point: beyond the picture, or small.
+      if (kind == 3)
+        shell.offset_um = {c.t.fixed("offset_x", 0.7), c.t.fixed("offset_y", -0.4), c.t.fixed("offset_z", 0.5)};
+      d.director = shell;
+    }
+    c.scene.sample = d;
+    all.push_back(c);
+  }
   {
     Case c = base("uniform cell");
     Cell cell;
@@ -241,6 +263,13 @@ std::vector<Case> cases() {
     plate.half_angle_deg = c.t.fixed("half_angle_deg", 15);
     c.scene.sample = plate;
     c.scene.material = E44Steinberg2020{};
+    all.push_back(c);
+    c.name = "plate heated from both sides";
+    heat.fourier_number = {};
+    heat.time_s = c.t.fixed("time_s", 0.0025);
+    heat.diffusivity_mm2_s = c.t.fixed("diffusivity_mm2_s", 0.1);
+    heat.initial_k = c.t.fixed("initial_k", 290);
+    std::get<Plate>(c.scene.sample).heat = heat;
     all.push_back(c);
   }
   {

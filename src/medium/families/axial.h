@@ -18,7 +18,7 @@ class AxialField {
  public:
   using P = PlainOf<S>;
   AxialField(const S& e, const S& ring, bool has_ring)
-      : e_(e), ring_(ring), has_ring_(has_ring), equilibrium_(known_axial_equilibrium(lane(plain(e), 0), has_ring ? lane(plain(ring), 0) : 0.0)) {
+      : e_(e), ring_(ring), has_ring_(has_ring), equilibrium_(known_axial_equilibrium(lane(plain(e), 0), has_ring ? lane(plain(ring), 0) : 0.0, kPlanes > 1)) {
     const AxialGrid& grid = equilibrium_->grid;
     for (int k = 0; k <= grid.elements; ++k) {
       r_edges_.push_back(axial_radius_edge(grid, k, e, ring, has_ring));

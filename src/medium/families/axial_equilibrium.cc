@@ -159,22 +159,28 @@ struct Equations {
 
 }  // namespace
 
-AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid) {
+AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid, bool slopes) {
   const Equations equations(e, ring, grid);
   const int n = grid.nodes();
   AxialEquilibrium out{e, ring, grid, equations.r.x, equations.polar.x, {}, {}, {}};
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
   Eigen::VectorXd x = equations.start, residual = equations.residual(x);
-  constexpr int kMostSteps = 60;
-  constexpr double kSmallStep = 1e-9;  // rad; the next Newton step would be of its square
-  bool done = false;
-  for (out.newton_steps = 0; out.newton_steps < kMostSteps && !done; ++out.newton_steps) {
-    const Eigen::SparseMatrix<double> jacobian = equations.jacobian(x);
+  const auto factorize = [&](const Eigen::VectorXd& at) {
+    const Eigen::SparseMatrix<double> jacobian = equations.jacobian(at);
     if (out.newton_steps == 0) solver.analyzePattern(jacobian);
     solver.factorize(jacobian);
     if (solver.info() != Eigen::Success) throw std::domain_error("equilibrium of the droplet: singular equations");
+  };
+  constexpr int kMostSteps = 60;
+  constexpr double kSmallStep = 1e-9;  // rad
+  constexpr double kNear = 0.03;       // rad; from here the last factors serve: each step is a few percent of the one before
+  bool done = false, near = false;
+  for (out.newton_steps = 0; out.newton_steps < kMostSteps && !done; ++out.newton_steps) {
+    if (!near) factorize(x);
     const Eigen::VectorXd step = solver.solve(residual);
-    done = step.cwiseAbs().maxCoeff() < kSmallStep;
+    const double size = step.cwiseAbs().maxCoeff();
+    done = size < kSmallStep;
+    near = near || size < kNear;
     double fraction = 1;
     Eigen::VectorXd next = x - step, after = equations.residual(next);
     while (!done && fraction > 1e-3 && after.norm() > (1 - 0.1 * fraction) * residual.norm()) {
@@ -200,20 +206,22 @@ AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid)
     return m;
   };
   out.change = on_grid(x);
+  if (!slopes) return out;
+  factorize(x);
   out.by_e = on_grid(tangent(1e-5 * (1 + e), 0));
   if (ring > 0) out.by_ring = on_grid(tangent(0, 1e-5 * std::min(ring, 1 - ring)));
   return out;
 }
 
-std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring) {
+std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring, bool slopes) {
   static std::deque<std::shared_ptr<const AxialEquilibrium>> known;
   static std::mutex guard;
   {
     const std::lock_guard lock(guard);
     for (const auto& one : known)
-      if (one->e == e && one->ring == ring) return one;
+      if (one->e == e && one->ring == ring && (!slopes || one->by_e.size() > 0)) return one;
   }
-  auto fresh = std::make_shared<const AxialEquilibrium>(axial_equilibrium(e, ring, axial_production_grid(ring)));
+  auto fresh = std::make_shared<const AxialEquilibrium>(axial_equilibrium(e, ring, axial_production_grid(ring), slopes));
   const std::lock_guard lock(guard);
   known.push_front(fresh);
   if (known.size() > 64) known.pop_back();

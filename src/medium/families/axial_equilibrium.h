@@ -41,7 +41,7 @@ struct AxialEquilibrium {
   AxialGrid grid;
   Eigen::VectorXd r, polar_rad;  ///< of the nodes; polar angle falls from pi/2
   Eigen::MatrixXd change;        ///< theta - axial_boundary_angle at (r, polar), rad
-  Eigen::MatrixXd by_e, by_ring; ///< derivatives of `change` by e and ring, node by node: the nodes move, too
+  Eigen::MatrixXd by_e, by_ring; ///< of `change` by e and ring, node by node: the nodes move, too; empty unless `slopes` were asked for
   int newton_steps = 0;
   /// theta at any place of the upper half.
   double theta(double rho, double z) const;
@@ -51,12 +51,12 @@ struct AxialEquilibrium {
 
 /// Newton's method from a closed-form start, always the same: equal arguments give equal bits. e in [0, 60], ring 0 or in
 /// [0.2, 0.995]. Throws std::domain_error where Newton does not converge, which no e and ring in range do.
-AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid = {});
+AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid = {}, bool slopes = true);
 /// Grid that images use. Largest error of a hedgehog 3e-5 rad up to e = 25, 3e-4 at e = 40; of a ring, close to it, 1e-4 at
 /// e = 10, 6e-4 at e = 40, where its distance to the sphere is of the coherence length (tests/cross/axial_droplet_test.cc).
 inline AxialGrid axial_production_grid(double ring) { return {ring > 0 ? 10 : 8, 5}; }
 /// The same on the production grid; the last few are remembered, for images that differ in other parameters.
-std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring);
+std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring, bool slopes);
 
 // ---- the edges --------------------------------------------------------------------------------------------------------
 

@@ -39,15 +39,29 @@ struct TwistedLaw {
   }
 };
 
-/// One axis, temperature rising with u from cold to hot by conduction; indices by Steinberg's eq. 38 (materials/heat.h).
+/// Temperature across a plate of one temperature, initial_k, whose faces are at cold_k (u = 0) and hot_k (u = 1) since the step:
+/// each face's step superposed.
+template <class S>
+struct HeatProfile {
+  S fourier_number, cold_k, hot_k, initial_k;
+  bool from_cold;  ///< initial_k is cold_k: one term less
+  template <class T>
+  BIREFIT_INLINE T at(const T& u) const {
+    const T from_hot = T(hot_k - initial_k) * heat_fraction<T>(u, T(fourier_number));
+    if (from_cold) return T(initial_k) + from_hot;
+    return T(initial_k) + from_hot + T(cold_k - initial_k) * heat_fraction<T>(1.0 - u, T(fourier_number));
+  }
+};
+
+/// One axis, temperature by conduction; indices by Steinberg's eq. 38 (materials/heat.h).
 template <class S>
 struct HeatedLaw {
   Vec3<S> axis;
-  S fourier_number, cold_k, hot_k, thickness_um;
+  HeatProfile<S> heat;
+  S thickness_um;
   template <class T>
   BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
-    const T temperature = T(cold_k) + T(hot_k - cold_k) * heat_fraction<T>(u, T(fourier_number));
-    const T ne = e44_steinberg2020_extraordinary(temperature);
+    const T ne = e44_steinberg2020_extraordinary(heat.template at<T>(u));
     return {{T(axis.x), T(axis.y), T(axis.z)}, T(kE44Steinberg2020Ordinary * kE44Steinberg2020Ordinary), ne * ne,
             T(0.0), T(0.0), T(thickness_um)};
   }
@@ -57,13 +71,13 @@ struct HeatedLaw {
 template <class S>
 struct HeatedNematicLaw {
   Vec3<S> axis;
-  S fourier_number, cold_k, hot_k, thickness_um;
+  HeatProfile<S> heat;
+  S thickness_um;
   NematicLaw<S> nematic;
   template <class T>
   BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
-    const T temperature = T(cold_k) + T(hot_k - cold_k) * heat_fraction<T>(u, T(fourier_number));
     T no, ne;
-    nematic.at(temperature, no, ne);
+    nematic.at(heat.template at<T>(u), no, ne);
     return {{T(axis.x), T(axis.y), T(axis.z)}, no * no, ne * ne, T(0.0), T(0.0), T(thickness_um)};
   }
 };

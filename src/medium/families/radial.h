@@ -46,6 +46,19 @@ struct RadialLaw {
   }
 };
 
+/// The hedgehog between a core and the surface: as RadialLaw, from depth `from` over `length`.
+template <class S>
+struct ShellLaw {
+  S impact_um, from_um, length_um;
+  S ordinary, extraordinary;
+  template <class T>
+  BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
+    const T s = T(from_um) + T(length_um) * u, b(impact_um);
+    const T inverse_r = inverse_root(s * s + b * b);
+    return {{b * inverse_r, T(0.0), s * inverse_r}, T(ordinary), T(extraordinary), T(0.0), T(0.0), T(2.0 * length_um)};
+  }
+};
+
 /// The hedgehog turned about the droplet's axis by twist (1 - r/R): radial at the surface, twisted inside.
 template <class S>
 struct TwistedRadialLaw {

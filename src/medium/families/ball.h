@@ -1,0 +1,139 @@
+#pragma once
+// Director fields in a sphere that have no symmetry about the viewing axis, along a refracted straight ray: bipolar, a field
+// in the image plane, the gap between two spheres. Positions in radii of the sphere, axes of docs/conventions.md.
+
+#include <memory>
+#include <span>
+#include <variant>
+
+#include "medium/column.h"
+#include "medium/families/axial.h"
+
+namespace birefit {
+
+/// Tangential anchoring, poles at +-pole_distance on `axis`: along the circles through both poles (Williams, J. Phys. A 19, 3211
+/// (1986)). Pole distance 1: boojums on the surface; far away: uniform. Not a solution of the elastic equations.
+template <class S>
+struct BipolarField {
+  Vec3<S> axis;
+  S pole_distance;
+  template <class T>
+  Vec3<T> at(const Vec3<T>& r) const {
+    const Vec3<T> u{T(axis.x), T(axis.y), T(axis.z)};
+    const T w = r.x * u.x + r.y * u.y + r.z * u.z, a = T(pole_distance);
+    // (a^2 + rho^2 - w^2) u - 2 w rho; rho^2 = r^2 - w^2. The small number keeps the poles finite.
+    const T along = a * a + r.x * r.x + r.y * r.y + r.z * r.z - 2.0 * w * w + 1e-12;
+    return normalized(Vec3<T>{along * u.x - 2.0 * w * (r.x - w * u.x), along * u.y - 2.0 * w * (r.y - w * u.y), along * u.z - 2.0 * w * (r.z - w * u.z)});
+  }
+};
+
+/// Normal anchoring, a field in the direction of `axis` (axial_equilibrium.h).
+template <class S>
+struct TiltedAxialField {
+  Vec3<S> axis;
+  std::shared_ptr<const AxialField<S>> field;
+  template <class T>
+  Vec3<T> at(const Vec3<T>& r) const {
+    const Vec3<T> u{T(axis.x), T(axis.y), T(axis.z)};
+    const T z = r.x * u.x + r.y * u.y + r.z * u.z;
+    const Vec3<T> out{r.x - z * u.x, r.y - z * u.y, r.z - z * u.z};
+    const T square = out.x * out.x + out.y * out.y + out.z * out.z + 1e-18, inverse_rho = inverse_root(square);
+    const auto below = plain(z) < PlainOf<T>(0.0);
+    T n_rho, n_z;
+    sin_cos(field->theta(square * inverse_rho, T(select(below, -z, z) + 1e-12)), n_rho, n_z);
+    n_z = select(below, -n_z, n_z);
+    const T f = n_rho * inverse_rho;
+    return {f * out.x + n_z * u.x, f * out.y + n_z * u.y, f * out.z + n_z * u.z};
+  }
+};
+
+/// Normal anchoring on the unit sphere and on one of radius `core` about `offset`: normals of the spheres nested between the
+/// two, |r - s offset| = 1 - s (1 - core), s in [0, 1]. Normal to both surfaces and smooth; not an elastic equilibrium.
+template <class S>
+struct NestedField {
+  Vec3<S> offset;
+  S core;
+  template <class T>
+  Vec3<T> at(const Vec3<T>& r) const {
+    const Vec3<T> d{T(offset.x), T(offset.y), T(offset.z)};
+    const T wall = 1.0 - T(core);
+    const T a = d.x * d.x + d.y * d.y + d.z * d.z - wall * wall;
+    const T b = 2.0 * (wall - (r.x * d.x + r.y * d.y + r.z * d.z));
+    // On the surface rounding may leave c a little above zero.
+    const T c = r.x * r.x + r.y * r.y + r.z * r.z - 1.0;
+    const T root_of = b * b - 4.0 * (a * c);
+    const T s = -2.0 * c / (b + root_of * inverse_root(max_of(root_of, T(1e-30))));
+    return normalized(Vec3<T>{r.x - s * d.x, r.y - s * d.y, r.z - s * d.z});
+  }
+};
+
+template <class S>
+using BallField = std::variant<BipolarField<S>, TiltedAxialField<S>, NestedField<S>>;
+
+/// A straight piece through the unit sphere: r(s) = impact t + s k, |s| < half, with t = cos d rho + sin d z, k = cos d z - sin d rho
+/// (d: deflection inside, rho: the direction of the image point), seen in the frame (t, phi, k).
+template <class S>
+struct BallRay {
+  S impact, half;                        ///< in radii
+  S sin_deflection, cos_deflection;
+  S cos_azimuth, sin_azimuth;            ///< of the image point
+  S radius_um;
+};
+
+/// u in [0, 1/2] runs from the entry to the core or, where there is none on the way, to the middle; the rest to the exit. What
+/// lies in the core does not retard. Nodes crowd at the middle over a length `crowd` (radii).
+template <class S, class Field>
+class BallColumn final : public Column<S> {
+ public:
+  BallColumn(const Field& field, const BallRay<S>& ray, const S& ordinary, const S& extraordinary) : field_(field), ray_(ray), eo_(ordinary), ee_(extraordinary) {
+    this->breaks = {0.5};
+    before_ = after_ = S(0.0);
+    q_ = S(30.0);  // all but linear
+    if constexpr (std::is_same_v<Field, NestedField<S>>) {
+      // |impact t + s k - offset| = core.
+      const Vec3<S> t = rho_z(ray_.cos_deflection, ray_.sin_deflection), k = rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection);
+      const Vec3<S> away{ray_.impact * t.x - field.offset.x, ray_.impact * t.y - field.offset.y, ray_.impact * t.z - field.offset.z};
+      const S h = away.x * k.x + away.y * k.y + away.z * k.z;
+      const S c = away.x * away.x + away.y * away.y + away.z * away.z - field.core * field.core;
+      const S half_way = root(max_of(h * h - c, S(1e-14)));
+      before_ = S(0.0) - h - half_way;
+      after_ = half_way - h;
+    } else if constexpr (std::is_same_v<Field, TiltedAxialField<S>>) {
+      q_ = 4.0 * ray_.impact * inverse(ray_.half) + 0.05;  // the defect or the wall's middle
+    }
+  }
+  void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
+    for (std::size_t i = 0; i < u.size(); ++i) ::new (static_cast<void*>(out + i)) OpticalPoint<S>(at<S>(S(u[i]), u[i]));
+  }
+  void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      Slope<S> x{S(u[i])};
+      x.d[0] = S(1.0);
+      ::new (static_cast<void*>(out + i)) OpticalPoint<Slope<S>>(at<Slope<S>>(x, u[i]));
+    }
+  }
+
+ private:
+  Vec3<S> rho_z(const S& rho, const S& z) const { return {rho * ray_.cos_azimuth, rho * ray_.sin_azimuth, z}; }
+  template <class T>
+  OpticalPoint<T> at(const T& u, double where) const {
+    const bool first = where < 0.5;
+    const T x = first ? 1.0 - 2.0 * u : 2.0 * u - 1.0, from = first ? T(before_) : T(after_);
+    const T length = first ? T(ray_.half + before_) : T(ray_.half - after_), q(q_);
+    const T f = inverse(T(q + 1.0 - x));
+    const T distance = length * q * x * f;
+    const T slope = 2.0 * length * q * (q + 1.0) * f * f * T(ray_.radius_um);
+    const T s = first ? from - distance : from + distance;
+    const T b(ray_.impact), sd(ray_.sin_deflection), cd(ray_.cos_deflection), ca(ray_.cos_azimuth), sa(ray_.sin_azimuth);
+    const T rho = cd * b - sd * s;
+    const Vec3<T> n = field_.template at<T>(Vec3<T>{rho * ca, rho * sa, sd * b + cd * s});
+    const T n_rho = n.x * ca + n.y * sa;
+    return {{cd * n_rho + sd * n.z, n.y * ca - n.x * sa, cd * n.z - sd * n_rho}, T(eo_), T(ee_), T(0.0), T(0.0), slope};
+  }
+
+  const Field& field_;
+  BallRay<S> ray_;
+  S eo_, ee_, before_, after_, q_;
+};
+
+}  // namespace birefit
