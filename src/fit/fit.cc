@@ -153,6 +153,7 @@ class Fit {
   bool frames_scatter_ = false;  ///< measured between this fit's own frames
   double largest_area_ = 1;      ///< pixels that share one misfit
   bool misfit_ = false;          ///< more than noise in some micrograph
+  bool rows_ = false;            ///< micrographs of one pixel each: rows of a table
 };
 
 void Fit::prepare() {
@@ -179,6 +180,7 @@ void Fit::prepare() {
       throw UserError(Where{}, micrograph.name + " has no usable pixel", "check mask, roi_px and saturation_counts");
     used += pixels_.back().size();
   }
+  rows_ = used == pixels_.size();
   if (used <= static_cast<std::size_t>(unknowns_.size()))
     throw UserError(Where{}, fmt::format("{} usable pixels cannot determine {} parameters", used, unknowns_.size()),
                     "check mask and roi_px");
@@ -533,8 +535,8 @@ std::string Fit::covariance_words() const {
   double largest = 1;
   for (const Misfit& misfit : problem_->misfit()) largest = std::max(largest, misfit.shape_variance);
   if (frames_scatter_)
-    words = fmt::format("clustered by image: the frames scatter by {:.2g} of the model intensity about the joint fit",
-                        frame_sd_);
+    words = fmt::format("{} scatter by {:.2g} of the model intensity about the joint fit",
+                        rows_ ? "misfit included: the rows" : "clustered by image: the frames", frame_sd_);
   else if (job_.prior && job_.prior->frame_scatter)
     words = fmt::format("frame misfit of {:.2g} of the model intensity from the prior's fit included",
                         job_.prior->frame_scatter->intensity_sd);

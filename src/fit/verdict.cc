@@ -145,14 +145,14 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
 
 std::string verdict(const FitResult& result, bool signal) {
   std::vector<std::string> sentences;
+  const bool rows = std::all_of(result.micrographs.begin(), result.micrographs.end(), [](const MicrographResult& m) { return m.used == 1; });
   if (result.interrupted)
     sentences.push_back("The fit was interrupted: these are the best values so far, not a result.");
   else if (!result.converged)
     sentences.push_back("The fit did not converge: the values below are no result.");
   if (!signal)
-    sentences.push_back(
-        "The image shows no signal of the model: a constant image explains it as well, so that the values mean "
-        "nothing.");
+    sentences.push_back(rows ? "The table shows no signal of the model: a constant explains it as well, so that the values mean nothing."
+                             : "The image shows no signal of the model: a constant image explains it as well, so that the values mean nothing.");
   for (const FisherDirection& direction : result.directions)
     if (!direction.identifiable && !direction.words.empty())
       sentences.push_back("Not identifiable: " + direction.words + ".");
@@ -187,7 +187,7 @@ std::string verdict(const FitResult& result, bool signal) {
   if (result.has_answer())
     sentences.push_back(
         fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
-                    result.reduced_chi_square > 2 ? ": the model does not describe the image within its noise" : ""));
+                    result.reduced_chi_square > 2 ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise" : ""));
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
   return text;

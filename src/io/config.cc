@@ -106,6 +106,11 @@ Parameter& make_automatic(ConfigReader& reader, ParameterRef ref) {
   return parameter;
 }
 
+/// An automatic gain: a negative one would pass off dark fringes as bright ones, half an order away.
+void keep_positive(Parameter& gain) {
+  if (gain.automatic && !std::isfinite(gain.lower)) gain.lower = gain.physical_lower = 0;
+}
+
 /// `gain` or `offset`: absent means `fit: auto`, a nuisance every real image has.
 ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::string& key, double start) {
   const bool given = block.find(key) != nullptr;
@@ -113,8 +118,7 @@ ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::st
   if (!given) make_automatic(reader, ref);
   Parameter& parameter = reader.table[ref];
   if (!std::isfinite(parameter.value)) parameter.value = start;
-  // A negative gain would pass off dark fringes as bright ones, half an order away.
-  if (key == "gain" && parameter.automatic && !std::isfinite(parameter.lower)) parameter.lower = parameter.physical_lower = 0;
+  if (key == "gain") keep_positive(parameter);
   return ref;
 }
 
@@ -495,6 +499,7 @@ Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item&
     const ParameterRef own = reader.number_at(*node, list + "[" + std::to_string(index) + "]." + path, spec->second);
     if (spec->second.linear && !std::isfinite(reader.table[own].value))
       reader.table[own].value = reader.table[shared_refs.at(path)].value;
+    if (path == "micrograph.gain") keep_positive(reader.table[own]);
     replace_ref(micrograph, shared_refs.at(path), own);
   }
   // The names of this image's parameters are no paths for the next image's `set:`.

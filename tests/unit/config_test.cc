@@ -380,6 +380,7 @@ TEST_F(Config, MakesEveryRowOfASignalAMicrographOfOnePixel) {
   // The first table has the shared gain, the second its own, one for all its rows.
   EXPECT_NE(config.job.micrographs[0].gain.index, config.job.micrographs[4].gain.index);
   EXPECT_EQ(config.job.micrographs[4].gain.index, config.job.micrographs[6].gain.index);
+  for (const std::size_t row : {0u, 4u}) EXPECT_EQ(config.job.parameters[config.job.micrographs[row].gain].lower, 0);
   // Without images: the scene of the first row.
   EXPECT_EQ(load(kSignal).scene.view.width, 1);
 }
