@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -127,6 +128,7 @@ class Fit {
   Image fitted_image(int g) const;
   bool shows_signal(double chi_square) const;
   void report_parameters(const Inverse& inverse);
+  std::optional<double> upper_limit(int unknown) const;
   void report_micrographs();
   void collect_warnings();
   std::string covariance_words() const;
@@ -550,6 +552,57 @@ std::string Fit::covariance_words() const {
   return words.empty() ? "white noise: the noise model explains the residuals" : words;
 }
 
+/// Where the profile likelihood of a searched unknown, going up from the estimate, leaves 95 % one-sided confidence; nothing when it
+/// stays below that up to the bound, or when the physical limit at its lower bound is itself excluded. Needed where the curvature at
+/// the estimate says nothing: a director below its threshold hardly answers to the voltage, above it does.
+std::optional<double> Fit::upper_limit(int unknown) const {
+  const int index = unknowns_.table_index(unknown);
+  const Parameter& parameter = job_.parameters[index];
+  const bool prior = parameter.prior_sd || (job_.prior && std::count(job_.prior->names.begin(), job_.prior->names.end(), parameter.name) > 0);
+  if (prior || stopped_ || !std::isfinite(parameter.upper)) return std::nullopt;
+  FitJob job = job_;
+  job.parameters[index].free = false;
+  const Unknowns others = Unknowns::of(job);
+  Eigen::VectorXd start(static_cast<Eigen::Index>(others.searched.size()));
+  for (std::size_t j = 0; j < others.searched.size(); ++j) start[static_cast<Eigen::Index>(j)] = theta_[others.searched[j]];
+  const double allowed = problem_->objective() + std::pow(student_t_quantile(0.95, result_.interval_degrees_of_freedom), 2);
+  const auto objective_at = [&](double value, Eigen::VectorXd& x) {
+    job.parameters[index].value = value;
+    std::vector<PixelSet> sets;
+    for (int g = 0; g < frames_; ++g) sets.push_back(pixel_set(job.micrographs[g], sigma_[g], pixels_[g]));
+    LeastSquares problem(job, others, plans_, std::move(sets));
+    problem.set_misfit(problem_->misfit());
+    SolveOptions options;
+    options.max_iterations = 20;
+    options.interrupted = job_.options.interrupted;
+    problem.evaluate(x, false);
+    if (x.size() > 0 && problem.objective() > allowed) problem.solve(x, options);  // else the others' best is lower still
+    return problem.objective();
+  };
+  Eigen::VectorXd x = start;
+  if (objective_at(parameter.lower, x) > allowed) return std::nullopt;
+  constexpr int kSteps = 40, kHalvings = 12;  // the limit to 1e-5 of the range
+  double inside = theta_[index];
+  const double step = (parameter.upper - inside) / kSteps;
+  x = start;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double value = i == kSteps ? parameter.upper : inside + step;
+    const Eigen::VectorXd before = x;
+    if (objective_at(value, x) <= allowed) {
+      inside = value;
+      continue;
+    }
+    double outside = value;
+    for (int k = 0; k < kHalvings; ++k) {
+      const double middle = 0.5 * (inside + outside);
+      Eigen::VectorXd at = before;
+      (objective_at(middle, at) <= allowed ? inside : outside) = middle;
+    }
+    return outside;
+  }
+  return std::nullopt;
+}
+
 void Fit::report_parameters(const Inverse& inverse) {
   const Eigen::VectorXd gradient = problem_->gradient();
   const double t = student_t_quantile(0.975, result_.interval_degrees_of_freedom);
@@ -598,6 +651,15 @@ void Fit::report_parameters(const Inverse& inverse) {
         estimate.interval95_high = std::max(estimate.value, estimate.limit_value);
       }
     }
+    // The curvature at the estimate need not be that of the way to nature's bound: ask there.
+    const bool limited = !estimate.limit.empty() && estimate.limit_value < parameter.upper;
+    if (!estimate.linear && parameter.lower == parameter.physical_lower && !limited && !at_upper)
+      if (const std::optional<double> limit = upper_limit(j)) {
+        estimate.limit = "upper";
+        estimate.limit_value = *limit;
+        estimate.interval95_low = parameter.lower;
+        estimate.interval95_high = *limit;
+      }
     result_.names.push_back(parameter.name);
     result_.parameters.push_back(std::move(estimate));
   }
