@@ -78,6 +78,9 @@ bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
   return false;
 }
 
+/// Rows of a signal table are micrographs of one pixel named file:line.
+std::string table_of(const std::string& name) { return name.substr(0, name.rfind(':')); }
+
 /// One fit from start to report. The stages are in run()'s order; each leaves the state better than before, so that an
 /// interruption anywhere has something to report.
 class Fit {
@@ -125,6 +128,7 @@ class Fit {
   }
   std::vector<Misfit> assess_misfit();
   std::vector<Misfit> prior_misfit() const;
+  double row_correlation(const std::vector<LeastSquares::FrameMisfit>& frames) const;
   Image fitted_image(int g) const;
   bool shows_signal(double chi_square) const;
   void report_parameters(const Inverse& inverse);
@@ -155,6 +159,7 @@ class Fit {
   bool frames_scatter_ = false;  ///< measured between this fit's own frames
   double largest_area_ = 1;      ///< pixels that share one misfit
   bool misfit_ = false;          ///< more than noise in some micrograph
+  double row_length_ = 1;        ///< neighbouring rows of a table that share one misfit
   bool rows_ = false;            ///< micrographs of one pixel each: rows of a table
 };
 
@@ -436,13 +441,38 @@ std::vector<Misfit> Fit::assess_misfit() {
       }
       frame_sd_ = 0.5 * (low + high);
     }
-    frame_dof_ = dof;
+    // Rows of a table are its pixels: neighbours share a misfit that is wider than their distance.
+    row_length_ = rows_ && frames_scatter_ ? std::min(row_correlation(frames), dof / 4) : 1;
+    frame_dof_ = dof / row_length_;
     for (int g = 0; g < frames_; ++g) {
-      misfit[g].mean_sd = frame_sd_ * std::abs(gain_of(g));
+      misfit[g].mean_sd = frame_sd_ * std::sqrt(row_length_) * std::abs(gain_of(g));
       misfit[g].mean_follows_shape = false;
     }
   }
   return misfit;
+}
+
+/// Number of neighbouring rows that share one misfit, all tables together: (1 + r) / (1 - r), r the correlation of neighbours,
+/// where it exceeds twice its sampling error. That is exact for a correlation that falls geometrically and, as r is known far better
+/// than the sum of all lags, does not end where the sampling error does. The fitted mean makes r small by (1 + 3 r) / n
+/// (Marriott & Pope, Biometrika 41, 390 (1954)).
+double Fit::row_correlation(const std::vector<LeastSquares::FrameMisfit>& frames) const {
+  std::map<std::string, std::vector<double>> tables;
+  for (int g = 0; g < frames_; ++g) {
+    const double ratio = frame_sd_ * std::abs(gain_of(g)) / frames[g].mean_noise_sd;
+    tables[table_of(job_.micrographs[g].name)].push_back(frames[g].mean_whitened / std::sqrt(1 + ratio * ratio));
+  }
+  double squares = 0, products = 0, rows = 0, pairs = 0;
+  for (const auto& [name, residual] : tables)
+    for (std::size_t i = 0; i < residual.size(); ++i) {
+      squares += residual[i] * residual[i], ++rows;
+      if (i > 0) products += residual[i - 1] * residual[i], ++pairs;
+    }
+  if (!(squares > 0) || !(pairs > 0)) return 1;
+  double r = products / pairs / (squares / rows);
+  if (r < 2 / std::sqrt(pairs)) return 1;
+  r = std::min(r + (1 + 3 * r) / (pairs / static_cast<double>(tables.size())), 1 - 1 / pairs);
+  return (1 + r) / (1 - r);
 }
 
 void Fit::settle_misfit() {
@@ -542,6 +572,7 @@ std::string Fit::covariance_words() const {
   else if (job_.prior && job_.prior->frame_scatter)
     words = fmt::format("frame misfit of {:.2g} of the model intensity from the prior's fit included",
                         job_.prior->frame_scatter->intensity_sd);
+  if (row_length_ > 1.5) words += fmt::format(", {:.2g} neighbours alike", row_length_);
   if (misfit_) {
     if (!words.empty()) words += "; ";
     words += largest_area_ > 1.5
@@ -664,9 +695,6 @@ void Fit::report_parameters(const Inverse& inverse) {
     result_.parameters.push_back(std::move(estimate));
   }
 }
-
-/// Rows of a signal table are micrographs of one pixel named file:line.
-std::string table_of(const std::string& name) { return name.substr(0, name.rfind(':')); }
 
 void Fit::report_micrographs() {
   for (int g = 0; g < frames_; ++g) {
