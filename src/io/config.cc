@@ -769,7 +769,6 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
   std::vector<Micrograph> micrographs;
   if (!signals.empty()) {
     if (image) reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `signal:`");
-    if (settings.image) reader.problems.add(settings.image_where, "micrograph.image is given beside signal", "give one of the two");
     if (!std::holds_alternative<Cell>(shared.scene.sample) && reader.problems.empty())
       reader.problems.add(signals[0].where, "signal is for cells: every row sees the same light");
     set_view(reader, settings, 1, 1, 0, "the signal", shared.scene);

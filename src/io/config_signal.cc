@@ -90,6 +90,12 @@ std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
   for (const char* other : {"micrographs", "calibration", "image_size_px"})
     if (const YamlNode* found = root.find(other))
       reader.problems.add(found->where, std::string(other) + " is given beside signal", "give one of the two");
+  // What belongs to images would be dropped without a word.
+  if (const YamlNode* micrograph = root.find("micrograph"))
+    for (const char* key : {"image", "page", "channel", "transfer", "roi_px", "mask", "saturation_counts", "noise", "calibration"})
+      if (const YamlNode* found = micrograph->find(key))
+        reader.problems.add(found->where, std::string("micrograph.") + key + " is of images, this config has signal",
+                            std::string(key) == "noise" ? "signal has its own noise" : "leave it out");
   return items;
 }
 

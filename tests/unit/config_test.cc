@@ -392,6 +392,7 @@ TEST_F(Config, SaysWhereASignalIsWrong) {
             "config.yaml:3:12: b.csv has no column out; did you mean aut?\n"
             "a.csv:3:1: volts = -1 is outside [0, 100000], the range of sample.cell.director.freedericksz.voltage_v");
   EXPECT_NE(mistakes(replaced(kSignal, "voltage_v: volts", "voltage: volts"), ConfigUse::fit).find("did you mean"), std::string::npos);
+  EXPECT_NE(mistakes("micrograph: {roi_px: [0, 0, 3, 3]}\n" + kSignal, ConfigUse::fit).find("1:22: micrograph.roi_px is of images"), std::string::npos);
   EXPECT_NE(mistakes("image_size_px: [3, 3]\n" + kSignal, ConfigUse::fit).find("image_size_px is given beside signal"), std::string::npos);
   EXPECT_NE(mistakes(replaced(kSignal, "columns: {sample.cell.director.freedericksz.voltage_v: volts}, set", "set"), ConfigUse::fit)
                 .find("columns"),
