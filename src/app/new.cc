@@ -55,6 +55,7 @@ microscope:
 )";
 
 const char* const kFreedericksz = R"(# A nematic cell in a field along its normal: how far above its threshold is it?
+# For a table of signal against voltage give `signal:` in place of `micrograph:` (docs/configuration.md).
 micrograph:
   image: cell.tif
   gain: 1.0e4                  # of one grey level no fit can tell the light from the voltage: calibrate it, or fit several images

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -77,6 +78,9 @@ bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
   return false;
 }
 
+/// Rows of a signal table are micrographs of one pixel named file:line.
+std::string table_of(const std::string& name) { return name.substr(0, name.rfind(':')); }
+
 /// One fit from start to report. The stages are in run()'s order; each leaves the state better than before, so that an
 /// interruption anywhere has something to report.
 class Fit {
@@ -136,9 +140,11 @@ class Fit {
   }
   std::vector<Misfit> assess_misfit();
   std::vector<Misfit> prior_misfit() const;
+  double row_correlation(const std::vector<LeastSquares::FrameMisfit>& frames) const;
   Image fitted_image(int g) const;
   bool shows_signal(double chi_square) const;
   void report_parameters(const Inverse& inverse);
+  std::optional<double> upper_limit(int unknown) const;
   void report_micrographs();
   void collect_warnings();
   std::string covariance_words() const;
@@ -168,6 +174,8 @@ class Fit {
   bool frames_scatter_ = false;  ///< measured between this fit's own frames
   double largest_area_ = 1;      ///< pixels that share one misfit
   bool misfit_ = false;          ///< more than noise in some micrograph
+  double row_length_ = 1;        ///< neighbouring rows of a table that share one misfit
+  bool rows_ = false;            ///< micrographs of one pixel each: rows of a table
 };
 
 void Fit::prepare() {
@@ -194,6 +202,7 @@ void Fit::prepare() {
       throw UserError(Where{}, micrograph.name + " has no usable pixel", "check mask, roi_px and saturation_counts");
     used += pixels_.back().size();
   }
+  rows_ = used == pixels_.size();
   if (used <= static_cast<std::size_t>(unknowns_.size()))
     throw UserError(Where{}, fmt::format("{} usable pixels cannot determine {} parameters", used, unknowns_.size()),
                     "check mask and roi_px");
@@ -452,13 +461,38 @@ std::vector<Misfit> Fit::assess_misfit() {
       }
       frame_sd_ = 0.5 * (low + high);
     }
-    frame_dof_ = dof;
+    // Rows of a table are its pixels: neighbours share a misfit that is wider than their distance.
+    row_length_ = rows_ && frames_scatter_ ? std::min(row_correlation(frames), dof / 4) : 1;
+    frame_dof_ = dof / row_length_;
     for (int g = 0; g < frames_; ++g) {
-      misfit[g].mean_sd = frame_sd_ * std::abs(gain_of(g));
+      misfit[g].mean_sd = frame_sd_ * std::sqrt(row_length_) * std::abs(gain_of(g));
       misfit[g].mean_follows_shape = false;
     }
   }
   return misfit;
+}
+
+/// Number of neighbouring rows that share one misfit, all tables together: (1 + r) / (1 - r), r the correlation of neighbours,
+/// where it exceeds twice its sampling error. That is exact for a correlation that falls geometrically and, as r is known far better
+/// than the sum of all lags, does not end where the sampling error does. The fitted mean makes r small by (1 + 3 r) / n
+/// (Marriott & Pope, Biometrika 41, 390 (1954)).
+double Fit::row_correlation(const std::vector<LeastSquares::FrameMisfit>& frames) const {
+  std::map<std::string, std::vector<double>> tables;
+  for (int g = 0; g < frames_; ++g) {
+    const double ratio = frame_sd_ * std::abs(gain_of(g)) / frames[g].mean_noise_sd;
+    tables[table_of(job_.micrographs[g].name)].push_back(frames[g].mean_whitened / std::sqrt(1 + ratio * ratio));
+  }
+  double squares = 0, products = 0, rows = 0, pairs = 0;
+  for (const auto& [name, residual] : tables)
+    for (std::size_t i = 0; i < residual.size(); ++i) {
+      squares += residual[i] * residual[i], ++rows;
+      if (i > 0) products += residual[i - 1] * residual[i], ++pairs;
+    }
+  if (!(squares > 0) || !(pairs > 0)) return 1;
+  double r = products / pairs / (squares / rows);
+  if (r < 2 / std::sqrt(pairs)) return 1;
+  r = std::min(r + (1 + 3 * r) / (pairs / static_cast<double>(tables.size())), 1 - 1 / pairs);
+  return (1 + r) / (1 - r);
 }
 
 void Fit::settle_misfit() {
@@ -553,11 +587,12 @@ std::string Fit::covariance_words() const {
   double largest = 1;
   for (const Misfit& misfit : problem_->misfit()) largest = std::max(largest, misfit.shape_variance);
   if (frames_scatter_)
-    words = fmt::format("clustered by image: the frames scatter by {:.2g} of the model intensity about the joint fit",
-                        frame_sd_);
+    words = fmt::format("{} scatter by {:.2g} of the model intensity about the joint fit",
+                        rows_ ? "misfit included: the rows" : "clustered by image: the frames", frame_sd_);
   else if (job_.prior && job_.prior->frame_scatter)
     words = fmt::format("frame misfit of {:.2g} of the model intensity from the prior's fit included",
                         job_.prior->frame_scatter->intensity_sd);
+  if (row_length_ > 1.5) words += fmt::format(", {:.2g} neighbours alike", row_length_);
   if (misfit_) {
     if (!words.empty()) words += "; ";
     words += largest_area_ > 1.5
@@ -566,6 +601,57 @@ std::string Fit::covariance_words() const {
                  : fmt::format("scaled by reduced chi-square {:.3g}", largest);
   }
   return words.empty() ? "white noise: the noise model explains the residuals" : words;
+}
+
+/// Where the profile likelihood of a searched unknown, going up from the estimate, leaves 95 % one-sided confidence; nothing when it
+/// stays below that up to the bound, or when the physical limit at its lower bound is itself excluded. Needed where the curvature at
+/// the estimate says nothing: a director below its threshold hardly answers to the voltage, above it does.
+std::optional<double> Fit::upper_limit(int unknown) const {
+  const int index = unknowns_.table_index(unknown);
+  const Parameter& parameter = job_.parameters[index];
+  const bool prior = parameter.prior_sd || (job_.prior && std::count(job_.prior->names.begin(), job_.prior->names.end(), parameter.name) > 0);
+  if (prior || stopped_ || !std::isfinite(parameter.upper)) return std::nullopt;
+  FitJob job = job_;
+  job.parameters[index].free = false;
+  const Unknowns others = Unknowns::of(job);
+  Eigen::VectorXd start(static_cast<Eigen::Index>(others.searched.size()));
+  for (std::size_t j = 0; j < others.searched.size(); ++j) start[static_cast<Eigen::Index>(j)] = theta_[others.searched[j]];
+  const double allowed = problem_->objective() + std::pow(student_t_quantile(0.95, result_.interval_degrees_of_freedom), 2);
+  const auto objective_at = [&](double value, Eigen::VectorXd& x) {
+    job.parameters[index].value = value;
+    std::vector<PixelSet> sets;
+    for (int g = 0; g < frames_; ++g) sets.push_back(pixel_set(job.micrographs[g], sigma_[g], pixels_[g]));
+    LeastSquares problem(job, others, plans_, std::move(sets));
+    problem.set_misfit(problem_->misfit());
+    SolveOptions options;
+    options.max_iterations = 20;
+    options.interrupted = job_.options.interrupted;
+    problem.evaluate(x, false);
+    if (x.size() > 0 && problem.objective() > allowed) problem.solve(x, options);  // else the others' best is lower still
+    return problem.objective();
+  };
+  Eigen::VectorXd x = start;
+  if (objective_at(parameter.lower, x) > allowed) return std::nullopt;
+  constexpr int kSteps = 40, kHalvings = 12;  // the limit to 1e-5 of the range
+  double inside = theta_[index];
+  const double step = (parameter.upper - inside) / kSteps;
+  x = start;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double value = i == kSteps ? parameter.upper : inside + step;
+    const Eigen::VectorXd before = x;
+    if (objective_at(value, x) <= allowed) {
+      inside = value;
+      continue;
+    }
+    double outside = value;
+    for (int k = 0; k < kHalvings; ++k) {
+      const double middle = 0.5 * (inside + outside);
+      Eigen::VectorXd at = before;
+      (objective_at(middle, at) <= allowed ? inside : outside) = middle;
+    }
+    return outside;
+  }
+  return std::nullopt;
 }
 
 void Fit::report_parameters(const Inverse& inverse) {
@@ -616,13 +702,19 @@ void Fit::report_parameters(const Inverse& inverse) {
         estimate.interval95_high = std::max(estimate.value, estimate.limit_value);
       }
     }
+    // The curvature at the estimate need not be that of the way to nature's bound: ask there.
+    const bool limited = !estimate.limit.empty() && estimate.limit_value < parameter.upper;
+    if (!estimate.linear && parameter.lower == parameter.physical_lower && !limited && !at_upper)
+      if (const std::optional<double> limit = upper_limit(j)) {
+        estimate.limit = "upper";
+        estimate.limit_value = *limit;
+        estimate.interval95_low = parameter.lower;
+        estimate.interval95_high = *limit;
+      }
     result_.names.push_back(parameter.name);
     result_.parameters.push_back(std::move(estimate));
   }
 }
-
-/// Rows of a signal table are micrographs of one pixel named file:line.
-std::string table_of(const std::string& name) { return name.substr(0, name.rfind(':')); }
 
 void Fit::report_micrographs() {
   for (int g = 0; g < frames_; ++g) {

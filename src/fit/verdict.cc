@@ -86,10 +86,12 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
     const Eigen::VectorXd v = svd.matrixV().col(i);
     for (int j = 0; j < n; ++j) direction.weights.emplace_back(result.parameters[j].name, v[j]);
     direction.identifiable = direction.stderr_ <= kHalfWidth;
+    Eigen::Index at;
+    v.cwiseAbs().maxCoeff(&at);
+    // A limit is an answer, though the estimate itself is not known.
+    if (std::abs(v[at]) > 0.999 && !result.parameters[at].limit.empty()) direction.identifiable = true;
     if (!direction.identifiable) {
       result.identifiable = false;
-      Eigen::Index at;
-      v.cwiseAbs().maxCoeff(&at);
       if (std::abs(v[at]) > 0.999)
         direction.words =
             fmt::format("{} has no measurable influence on the image", name_of(result, static_cast<int>(at)));
@@ -106,7 +108,7 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
     result.directions.push_back(std::move(direction));
   }
   for (int j = 0; j < n; ++j)
-    if (inverse.undetermined[j]) {
+    if (inverse.undetermined[j] && result.parameters[j].limit.empty()) {
       result.identifiable = false;
       result.parameters[j].stderr_ = result.parameters[j].interval95_low = result.parameters[j].interval95_high =
           std::numeric_limits<double>::quiet_NaN();
@@ -145,14 +147,14 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
 
 std::string verdict(const FitResult& result, bool signal) {
   std::vector<std::string> sentences;
+  const bool rows = std::all_of(result.micrographs.begin(), result.micrographs.end(), [](const MicrographResult& m) { return m.used == 1; });
   if (result.interrupted)
     sentences.push_back("The fit was interrupted: these are the best values so far, not a result.");
   else if (!result.converged)
     sentences.push_back("The fit did not converge: the values below are no result.");
   if (!signal)
-    sentences.push_back(
-        "The image shows no signal of the model: a constant image explains it as well, so that the values mean "
-        "nothing.");
+    sentences.push_back(rows ? "The table shows no signal of the model: a constant explains it as well, so that the values mean nothing."
+                             : "The image shows no signal of the model: a constant image explains it as well, so that the values mean nothing.");
   for (const FisherDirection& direction : result.directions)
     if (!direction.identifiable && !direction.words.empty())
       sentences.push_back("Not identifiable: " + direction.words + ".");
@@ -163,23 +165,26 @@ std::string verdict(const FitResult& result, bool signal) {
     sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),
                                     others.size() == 1 ? "um" : "a", joined(others)));
   }
-  for (const ParameterEstimate& estimate : result.parameters)
-    if (estimate.at_bound) {
-      const std::string name = short_name(estimate.name);
-      if (!estimate.limit.empty())
-        sentences.push_back(fmt::format("{} is at its physical limit {:.6g}{}: {} {:.4g}{} with 95 % confidence.", name,
-                                        estimate.value, unit_suffix(estimate),
-                                        estimate.limit == "upper" ? "at most" : "at least", estimate.limit_value,
-                                        unit_suffix(estimate)));
-      else
-        sentences.push_back(fmt::format("{} ended at its bound {:.6g}{}: the best value lies outside the bounds.", name,
-                                        estimate.value, unit_suffix(estimate)));
-    }
+  for (const ParameterEstimate& estimate : result.parameters) {
+    if (!estimate.at_bound && estimate.limit.empty()) continue;
+    const std::string name = short_name(estimate.name), unit = unit_suffix(estimate);
+    const bool upper = estimate.limit == "upper";
+    // What the unit of a reduced voltage means.
+    const std::string below = name == "reduced_voltage" && upper && estimate.limit_value < 1 ? "Below the threshold: " : "";
+    if (estimate.limit.empty())
+      sentences.push_back(fmt::format("{} ended at its bound {:.6g}{}: the best value lies outside the bounds.", name, estimate.value, unit));
+    else if (estimate.at_bound)
+      sentences.push_back(fmt::format("{}{} is at its physical limit {:.6g}{}: {} {:.4g}{} with 95 % confidence.", below, name, estimate.value,
+                                      unit, upper ? "at most" : "at least", estimate.limit_value, unit));
+    else
+      sentences.push_back(fmt::format("{}{} is at most {:.4g}{} with 95 % confidence: the data do not tell it from {:.6g}{}.", below, name,
+                                      estimate.limit_value, unit, estimate.lower, unit));
+  }
   std::vector<std::string> values;
   if (signal)
     for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
       const ParameterEstimate& estimate = result.parameters[j];
-      if (estimate.linear || !std::isfinite(estimate.stderr_) || estimate.at_bound) continue;
+      if (estimate.linear || !std::isfinite(estimate.stderr_) || estimate.at_bound || !estimate.limit.empty()) continue;
       values.push_back(fmt::format("{} = {}{}", name_of(result, j), with_error(estimate.value, estimate.stderr_),
                                    unit_suffix(estimate)));
     }
@@ -187,7 +192,7 @@ std::string verdict(const FitResult& result, bool signal) {
   if (result.has_answer())
     sentences.push_back(
         fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
-                    result.reduced_chi_square > 2 ? ": the model does not describe the image within its noise" : ""));
+                    result.reduced_chi_square > 2 ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise" : ""));
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
   return text;

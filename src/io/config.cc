@@ -107,6 +107,11 @@ Parameter& make_automatic(ConfigReader& reader, ParameterRef ref) {
   return parameter;
 }
 
+/// An automatic gain: a negative one would pass off dark fringes as bright ones, half an order away.
+void keep_positive(Parameter& gain) {
+  if (gain.automatic && !std::isfinite(gain.lower)) gain.lower = gain.physical_lower = 0;
+}
+
 /// `gain` or `offset`: absent means `fit: auto`, a nuisance every real image has.
 ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::string& key, double start) {
   const bool given = block.find(key) != nullptr;
@@ -114,8 +119,7 @@ ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::st
   if (!given) make_automatic(reader, ref);
   Parameter& parameter = reader.table[ref];
   if (!std::isfinite(parameter.value)) parameter.value = start;
-  // A negative gain would pass off dark fringes as bright ones, half an order away.
-  if (key == "gain" && parameter.automatic && !std::isfinite(parameter.lower)) parameter.lower = parameter.physical_lower = 0;
+  if (key == "gain") keep_positive(parameter);
   return ref;
 }
 
@@ -497,6 +501,7 @@ Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item&
     const ParameterRef own = reader.number_at(*node, list + "[" + std::to_string(index) + "]." + path, spec->second);
     if (spec->second.linear && !std::isfinite(reader.table[own].value))
       reader.table[own].value = reader.table[shared_refs.at(path)].value;
+    if (path == "micrograph.gain") keep_positive(reader.table[own]);
     replace_ref(micrograph, shared_refs.at(path), own);
   }
   // The names of this image's parameters are no paths for the next image's `set:`.
@@ -781,7 +786,6 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
   std::vector<Micrograph> micrographs;
   if (!signals.empty()) {
     if (image) reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `signal:`");
-    if (settings.image) reader.problems.add(settings.image_where, "micrograph.image is given beside signal", "give one of the two");
     if (!std::holds_alternative<Cell>(shared.scene.sample) && reader.problems.empty())
       reader.problems.add(signals[0].where, "signal is for cells: every row sees the same light");
     set_view(reader, settings, 1, 1, 0, "the signal", shared.scene);

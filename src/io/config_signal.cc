@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "io/table.h"
 
@@ -89,6 +90,12 @@ std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
   for (const char* other : {"micrographs", "calibration", "image_size_px"})
     if (const YamlNode* found = root.find(other))
       reader.problems.add(found->where, std::string(other) + " is given beside signal", "give one of the two");
+  // What belongs to images would be dropped without a word.
+  if (const YamlNode* micrograph = root.find("micrograph"))
+    for (const char* key : {"image", "page", "channel", "transfer", "roi_px", "mask", "saturation_counts", "noise", "calibration"})
+      if (const YamlNode* found = micrograph->find(key))
+        reader.problems.add(found->where, std::string("micrograph.") + key + " is of images, this config has signal",
+                            std::string(key) == "noise" ? "signal has its own noise" : "leave it out");
   return items;
 }
 
@@ -145,7 +152,12 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   NoiseModel noise;  // of the whole table; one pixel cannot tell its own
   noise.read_counts = item.noise ? *item.noise : std::max(noise_of(curve), 1e-6 * largest);
   SignalTable table{std::filesystem::path(file).filename().string(), micrographs.size(), item.columns[0].first, {}};
-  for (std::size_t r = 0; r < rows.size(); r += static_cast<std::size_t>(item.every)) {
+  // In the order of the first column: what neighbouring rows share is told from their order.
+  std::vector<std::size_t> order(rows.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return curve[a].first < curve[b].first; });
+  for (std::size_t k = 0; k < order.size(); k += static_cast<std::size_t>(item.every)) {
+    const std::size_t r = order[k];
     Micrograph micrograph = base;
     micrograph.name = table.name + ":" + std::to_string(placed.lines[r]);
     micrograph.values = Image(1, 1, rows[r][static_cast<std::size_t>(value_column)]);

@@ -45,15 +45,15 @@ inline std::string format_percent(double fraction) {
                          : fmt::format("{:.2g} %", percent);
 }
 
-/// "sample.droplet.diameter_um" is "diameter_um"; "micrographs[1].gain" keeps its frame: "gain [1]".
+/// "sample.droplet.diameter_um" is "diameter_um"; "micrographs[1].gain" keeps its frame, and that of signal[1] its table: "gain [1]".
 inline std::string short_name(const std::string& name) {
   std::size_t dot = name.rfind('.');
   // A lone "x" says nothing: "center_px.x".
   if (dot != std::string::npos && dot > 0 && name.size() - dot <= 3) dot = name.rfind('.', dot - 1);
   std::string text = name.substr(dot == std::string::npos ? 0 : dot + 1);
-  if (name.rfind("micrographs[", 0) == 0) {
+  for (const std::string& list : {std::string("micrographs"), std::string("signal")}) {
     const std::size_t end = name.find(']');
-    if (end != std::string::npos) text += " " + name.substr(11, end - 10);
+    if (name.rfind(list + "[", 0) == 0 && end != std::string::npos) text += " " + name.substr(list.size(), end + 1 - list.size());
   }
   return text;
 }

@@ -379,6 +379,7 @@ TEST_F(Config, MakesEveryRowOfASignalAMicrographOfOnePixel) {
   // The first table has the shared gain, the second its own, one for all its rows.
   EXPECT_NE(config.job.micrographs[0].gain.index, config.job.micrographs[4].gain.index);
   EXPECT_EQ(config.job.micrographs[4].gain.index, config.job.micrographs[6].gain.index);
+  for (const std::size_t row : {0u, 4u}) EXPECT_EQ(config.job.parameters[config.job.micrographs[row].gain].lower, 0);
   // Without images: the scene of the first row.
   EXPECT_EQ(load(kSignal).scene.view.width, 1);
 }
@@ -390,6 +391,7 @@ TEST_F(Config, SaysWhereASignalIsWrong) {
             "config.yaml:3:12: b.csv has no column out; did you mean aut?\n"
             "a.csv:3:1: volts = -1 is outside [0, 100000], the range of sample.cell.director.freedericksz.voltage_v");
   EXPECT_NE(mistakes(replaced(kSignal, "voltage_v: volts", "voltage: volts"), ConfigUse::fit).find("did you mean"), std::string::npos);
+  EXPECT_NE(mistakes("micrograph: {roi_px: [0, 0, 3, 3]}\n" + kSignal, ConfigUse::fit).find("1:22: micrograph.roi_px is of images"), std::string::npos);
   EXPECT_NE(mistakes("image_size_px: [3, 3]\n" + kSignal, ConfigUse::fit).find("image_size_px is given beside signal"), std::string::npos);
   EXPECT_NE(mistakes(replaced(kSignal, "columns: {sample.cell.director.freedericksz.voltage_v: volts}, set", "set"), ConfigUse::fit)
                 .find("columns"),
