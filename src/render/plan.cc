@@ -577,7 +577,9 @@ RenderPlan plan_disc(const Scene& scene, const Values<double>& value) {
                                      *std::max_element(plan.samples.begin(), plan.samples.end())));
   if (fastest > 2 * kPi)
     plan.warnings.push_back(fmt::format("Fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um leaves these out.", fastest));
-  note_illumination(scene, value, largest_phase, plan);
+  Scene one_colour = scene;  // the bandwidth is part of a disc's model
+  one_colour.microscope.bandwidth_nm = 0;
+  note_illumination(one_colour, value, largest_phase, plan);
   plan.cost_seconds = 4e-8 * scene.view.width * scene.view.height;
   return plan;
 }

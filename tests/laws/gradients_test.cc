@@ -263,6 +263,9 @@ std::vector<Case> cases() {
     c.scene.sample = disc;
     c.scene.microscope.quarter_wave = circular;
     all.push_back(c);
+    c.name += ", broad line";
+    c.scene.microscope.bandwidth_nm = 60;
+    all.push_back(c);
   }
   return all;
 }
