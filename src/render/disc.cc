@@ -18,6 +18,8 @@ DiscOptics<S>::DiscOptics(const Scene& scene, const Values<S>& value) {
   residual_phase = k0 * optic * value(disc.thickness_um) * 1e-6;
   for (ParameterRef ref : disc.residual_normal_mpa) residual_normal.push_back(value(ref));
   for (ParameterRef ref : disc.residual_shear_mpa) residual_shear.push_back(value(ref));
+  if (!disc.illumination.empty()) illumination.push_back(S(1.0));
+  for (ParameterRef ref : disc.illumination) illumination.push_back(value(ref));
 }
 
 DiscMargins disc_margins(const StressedDisc& disc, double radius_um) {
@@ -68,9 +70,15 @@ class DiscModel final : public PixelModel<S> {
       cos_cos = 1.0 - d_sq * sinc_sinc;
     }
     const S along = pair.normal * cos_sum_ + pair.shear * sin_sum_;
-    const S light = cos_between_ * cos_between_ * cos_cos;
-    if (!circular_) return light + along * along * sinc_sinc;
-    return light + 2.0 * cos_between_ * sin_between_ * along * cos_sinc + sin_between_ * sin_between_ * d_sq * sinc_sinc;
+    S light;
+    if (!circular_) {
+      light = cos_between_ * cos_between_ * cos_cos + along * along * sinc_sinc;
+    } else {
+      light = cos_between_ * cos_between_ * cos_cos + 2.0 * cos_between_ * sin_between_ * along * cos_sinc + sin_between_ * sin_between_ * d_sq * sinc_sinc;
+    }
+    if (optics_.illumination.empty()) return light;
+    const S east = (column - optics_.center_x_px) * optics_.px_per_radius_inverse, north = (optics_.center_y_px - row) * optics_.px_per_radius_inverse;
+    return light * plane_polynomial<S>(optics_.illumination, east, north);
   }
 
  private:

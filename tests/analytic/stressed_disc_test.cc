@@ -218,5 +218,21 @@ TEST(StressedDisc, BandwidthIsTheMeanOverTheLine) {
     }
 }
 
+TEST(StressedDisc, UnevenLightIsAFactor) {
+  testing::IndependentDisc d;
+  d.um_per_px = 10;  // a pixel is a point: the factor changes by 1/1000 in it
+  d.center_x_px = d.center_y_px = 15.5;
+  DiscScene even = scene_of(d, 32, 90), uneven = scene_of(d, 32, 90);
+  StressedDisc& disc = std::get<StressedDisc>(uneven.scene.sample);
+  disc.illumination = {uneven.t.fixed("x", 40), uneven.t.fixed("y", -10), uneven.t.fixed("xx", 300)};
+  const RenderPlan p = plan(even.scene, even.t.table.values());
+  const Image a = render(even.scene, p, even.t.table.values()).intensity, b = render(uneven.scene, p, uneven.t.table.values()).intensity;
+  for (int row = 0; row < 32; ++row)
+    for (int column = 0; column < 32; ++column) {
+      const double x = (column - 15.5) * 10 / d.radius_um, y = (15.5 - row) * 10 / d.radius_um;
+      EXPECT_NEAR(b(column, row), a(column, row) * (1 + 40 * x - 10 * y + 300 * x * x), 1e-3 * a(column, row));
+    }
+}
+
 }  // namespace
 }  // namespace birefit
