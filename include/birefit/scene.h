@@ -189,7 +189,12 @@ struct Plate {
   ParameterRef thickness_um;
   UniformDirector director;
   std::variant<std::monostate, HeatStep> heat;
-  ParameterRef half_angle_deg;  ///< in the outside medium, (0, 80]
+  ParameterRef half_angle_deg;  ///< in the outside medium, (0, 80]; none: a table of rings, below
+  /// Instead of a picture, radii of dark rings measured on a screen: "pixel" i of the one row is the radius (cm) of ring number
+  /// ring_numbers[i], where the retardance is 2 pi (ring_numbers[i] + ring_offset). Plates cut normal to the axis only.
+  std::vector<double> ring_numbers;
+  ParameterRef screen_distance_um;  ///< from the middle of the plate
+  ParameterRef ring_offset;         ///< of the numbering; not given: 0
 };
 
 /// Cubic crystal bar made birefringent by a transverse field. Retardance of a pixel = pi E d / half_wave_voltage_v with
@@ -232,6 +237,9 @@ struct StressedDisc {
   /// Residual stress sxx - syy and 2 sxy in MPa, in the frame of the load (y along it): coefficients of 1, X, Y, X^2, XY,
   /// Y^2, X^3, .. with X, Y in units of the radius; empty = none.
   std::vector<ParameterRef> residual_normal_mpa, residual_shear_mpa;
+  /// Uneven light: the brightness is 1 + c1 X + c2 Y + c3 X^2 + c4 XY + .., X right and Y up in the image, from the disc's
+  /// centre in units of its radius; empty = even.
+  std::vector<ParameterRef> illumination;
 };
 
 using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab, StressedDisc>;
@@ -250,7 +258,7 @@ struct Microscope {
   ParameterRef analyzer_deg;
   /// A lossless retarder between sample and analyser, its axis at compensator_azimuth_deg; not given: none. Cells only.
   ParameterRef compensator_phase_deg, compensator_azimuth_deg;
-  double bandwidth_nm = 0;   ///< FWHM, 0 = not stated; not modelled: enters the model error
+  double bandwidth_nm = 0;   ///< FWHM, 0 = not stated; modelled by discs (a Gaussian), else it enters the model error
   double condenser_na = 0;   ///< 0 = not stated; not modelled: enters the model error
   double objective_na = 0;   ///< 0 = not stated. Droplet rays leaving steeper than this are lost.
   bool aplanatic = false;    ///< imaging: focal_plane (default) or aplanatic, docs/conventions.md

@@ -10,6 +10,7 @@
 
 #include "birefit/io.h"
 #include "io/config_disc.h"
+#include "io/config_rings.h"
 #include "io/config_pixels.h"
 #include "io/config_reader.h"
 #include "io/config_scene.h"
@@ -113,10 +114,10 @@ void keep_positive(Parameter& gain) {
 }
 
 /// `gain` or `offset`: absent means `fit: auto`, a nuisance every real image has.
-ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::string& key, double start) {
+ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::string& key, double start, bool automatic) {
   const bool given = block.find(key) != nullptr;
   const ParameterRef ref = reader.number(block, key, linear_spec(), start);
-  if (!given) make_automatic(reader, ref);
+  if (!given && automatic) make_automatic(reader, ref);
   Parameter& parameter = reader.table[ref];
   if (!std::isfinite(parameter.value)) parameter.value = start;
   if (key == "gain") keep_positive(parameter);
@@ -203,8 +204,8 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
       settings.transfer.kind = Transfer::Kind::srgb;
     }
   }
-  settings.gain = read_linear(reader, block, "gain", 1);
-  settings.offset = read_linear(reader, block, "offset", 0);
+  settings.gain = read_linear(reader, block, "gain", 1, !has_ring_table(scene));  // radii come in cm
+  settings.offset = read_linear(reader, block, "offset", 0, !has_ring_table(scene));
   settings.offset_automatic = reader.table[settings.offset].automatic;
   read_center(reader, block, scene, settings);
   NumberSpec angle;
@@ -834,7 +835,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
     } else if (image || item.image) {
       const ImageRequest request{image ? *image : reader.resolve(*item.image), item.page, settings.channel,
                                  image ? Where{image->string()} : item.image_where};
-      if (const std::optional<LoadedImage> loaded = try_load(reader, request)) {
+      if (const std::optional<LoadedImage> loaded = has_ring_table(scene) ? load_ring_table(reader, request.path, request.where, scene) : try_load(reader, request)) {
         set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
         demand_pixel_size(scene);
         if (reader.problems.empty()) {
@@ -881,7 +882,8 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       const std::filesystem::path file = replaced ? *image : reader.resolve(*item.image);
       const Where where = replaced ? Where{file.string()} : item.image_where;
       micrograph.name = file.filename().string();
-      std::optional<LoadedImage> loaded = try_load(reader, {file, item.page, settings.channel, where});
+      std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene) ? load_ring_table(reader, file, where, micrograph.scene)
+                                                                          : try_load(reader, {file, item.page, settings.channel, where});
       if (!loaded) continue;
       for (const std::string& note : loaded->notes) reader.warnings.push_back(micrograph.name + ": " + note);
       if (size && (loaded->values.width() != (*size)[0] || loaded->values.height() != (*size)[1]))

@@ -19,19 +19,15 @@ NumberSpec positive(double upper, std::string unit) {
   return spec;
 }
 
-std::vector<ParameterRef> read_polynomial(ConfigReader& reader, const Block& block, const std::string& key) {
+std::vector<ParameterRef> read_polynomial(ConfigReader& reader, const Block& block, const std::string& key, const std::string& terms, const NumberSpec& spec) {
   std::vector<ParameterRef> refs;
   const YamlNode* list = block.find(key);
   if (!list) return refs;
   if (!list->is_sequence() || list->items.empty() || list->items.size() > 36) {
-    reader.problems.add(list->where, key + " must be a list of 1 to 36 coefficients of 1, X, Y, X^2, XY, Y^2, .., found " +
+    reader.problems.add(list->where, key + " must be a list of 1 to 36 coefficients of " + terms + ", found " +
                                          (list->is_sequence() ? std::to_string(list->items.size()) + " items" : list->describe()));
     return refs;
   }
-  NumberSpec spec;
-  spec.lower = -1e6;
-  spec.upper = 1e6;
-  spec.unit = "MPa";
   for (std::size_t i = 0; i < list->items.size(); ++i)
     refs.push_back(reader.number_at(list->items[i], block.path_of(key) + "[" + std::to_string(i + 1) + "]", spec));
   return refs;
@@ -43,7 +39,7 @@ StressedDisc read_stressed_disc(ConfigReader& reader, const Block& parent) {
   StressedDisc disc;
   const Block block = reader.block(parent, "disc",
                                    {"diameter_um", "thickness_um", "load_n", "stress_optic_brewster", "load_azimuth_deg", "contact_radius_um",
-                                    "rim_um", "residual"},
+                                    "rim_um", "residual", "illumination"},
                                    true);
   disc.diameter_um = reader.number(block, "diameter_um", positive(1e7, "um"));
   NumberSpec load = positive(1e7, "N");
@@ -64,11 +60,20 @@ StressedDisc read_stressed_disc(ConfigReader& reader, const Block& parent) {
   const bool residual = block.find("residual");
   if (residual) {
     const Block stress = reader.block(block, "residual", {"normal_mpa", "shear_mpa"}, true);
-    disc.residual_normal_mpa = read_polynomial(reader, stress, "normal_mpa");
-    disc.residual_shear_mpa = read_polynomial(reader, stress, "shear_mpa");
+    NumberSpec mpa;
+    mpa.lower = -1e6;
+    mpa.upper = 1e6;
+    mpa.unit = "MPa";
+    const std::string terms = "1, X, Y, X^2, XY, Y^2, ..";
+    disc.residual_normal_mpa = read_polynomial(reader, stress, "normal_mpa", terms, mpa);
+    disc.residual_shear_mpa = read_polynomial(reader, stress, "shear_mpa", terms, mpa);
     if (stress.node && !stress.find("normal_mpa") && !stress.find("shear_mpa"))
       reader.missing(stress, "normal_mpa or shear_mpa", "coefficients of sxx - syy and 2 sxy");
   }
+  NumberSpec share;
+  share.lower = -100;
+  share.upper = 100;
+  disc.illumination = read_polynomial(reader, block, "illumination", "X, Y, X^2, XY, Y^2, ..", share);
   // The load's retardance does not depend on the thickness; the residual stress's does.
   disc.thickness_um = residual ? reader.number(block, "thickness_um", positive(1e7, "um"))
                                : reader.number(block, "thickness_um", positive(1e7, "um"), 1000);

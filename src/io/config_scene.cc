@@ -7,6 +7,7 @@
 
 #include "io/config_disc.h"
 #include "io/config_director.h"
+#include "io/config_rings.h"
 #include "io/config_material.h"
 #include "io/table.h"
 #include "transport/method.h"
@@ -312,7 +313,20 @@ Plate read_plate(ConfigReader& reader, const Block& parent) {
     step.hot_k = reader.number(heat, "hot_k", kelvin());
     plate.heat = step;
   }
-  plate.half_angle_deg = read_half_angle(reader, reader.block(block, "view", {"half_angle_deg"}, true));
+  const Block view = reader.block(block, "view", {"half_angle_deg", "screen_distance_um", "ring_offset"}, true);
+  if (!view.find("screen_distance_um")) {
+    if (const YamlNode* node = view.find("ring_offset")) reader.problems.add(node->where, "ring_offset belongs to a table of rings", "give screen_distance_um too, or leave it out");
+    plate.half_angle_deg = read_half_angle(reader, view);
+    return plate;
+  }
+  if (const YamlNode* node = view.find("half_angle_deg"))
+    reader.problems.add(node->where, "view has half_angle_deg (a picture) and screen_distance_um (a table of ring radii)", "give one of the two");
+  read_ring_view(reader, view, plate);
+  const ParameterRef* axis = plate.director.axis.data();
+  const auto upright = [&](ParameterRef ref, double value) { return !reader.table[ref].free && reader.table[ref].value == value; };
+  if (axis[0] ? !(upright(axis[0], 0) && upright(axis[1], 0)) : plate.director.tilt_deg && !upright(plate.director.tilt_deg, 90))
+    reader.problems.add(director.where, "a table of ring radii needs a plate cut normal to its axis", "uniform: {axis: [0, 0, 1]}");
+  if (const YamlNode* node = block.find("heat")) reader.problems.add(node->where, "a table of ring radii does not go with heat", "leave it out");
   return plate;
 }
 

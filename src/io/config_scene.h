@@ -55,6 +55,8 @@ void for_each_ref(Scene& scene, F&& f) {
       for (ParameterRef* ref : {&heat->time_s, &heat->diffusivity_mm2_s, &heat->cold_k, &heat->hot_k, &heat->initial_k}) f(*ref);
     }
     f(plate->half_angle_deg);
+    f(plate->screen_distance_um);
+    f(plate->ring_offset);
   } else if (auto* crystal = std::get_if<Crystal>(&scene.sample)) {
     f(crystal->half_wave_voltage_v);
     f(crystal->bias_v);
@@ -69,6 +71,7 @@ void for_each_ref(Scene& scene, F&& f) {
       f(*ref);
     for (ParameterRef& coefficient : disc->residual_normal_mpa) f(coefficient);
     for (ParameterRef& coefficient : disc->residual_shear_mpa) f(coefficient);
+    for (ParameterRef& coefficient : disc->illumination) f(coefficient);
   }
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material)) {
     f(constant->ordinary);

@@ -15,6 +15,7 @@ struct DiscOptics {
   S load_phase;          ///< rad per P/(t R)
   S residual_phase;      ///< rad per MPa
   std::vector<S> residual_normal, residual_shear;
+  std::vector<S> illumination;  ///< 1, then the coefficients; empty = even light
 
   DiscOptics(const Scene& scene, const Values<S>& value);
   /// Place in the load's frame, units of the radius: y along the line of the forces.

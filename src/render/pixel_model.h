@@ -97,6 +97,13 @@ std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene&, const RenderPlan
 template <class S>
 std::unique_ptr<PixelModel<S>> make_disc_model(const Scene&, const RenderPlan&, const Values<S>&);
 template <class S>
+std::unique_ptr<PixelModel<S>> make_ring_model(const Scene&, const Values<S>&);
+/// The scene is a table of ring radii.
+inline bool is_ring_table(const Scene& scene) {
+  const auto* plate = std::get_if<Plate>(&scene.sample);
+  return plate && plate->screen_distance_um;
+}
+template <class S>
 std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene&, const RenderPlan&, const Values<S>&);
 
 /// The same image as render(), one thread, one ray at a time in plain doubles: what lanes are measured against.

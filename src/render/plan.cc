@@ -672,7 +672,9 @@ RenderPlan plan_disc(const Scene& scene, const Values<double>& value) {
                                      *std::max_element(plan.samples.begin(), plan.samples.end())));
   if (fastest > 2 * kPi)
     plan.warnings.push_back(fmt::format("Fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um leaves these out.", fastest));
-  note_illumination(scene, value, largest_phase, plan);
+  Scene one_colour = scene;  // the bandwidth is part of a disc's model
+  one_colour.microscope.bandwidth_nm = 0;
+  note_illumination(one_colour, value, largest_phase, plan);
   plan.cost_seconds = 4e-8 * scene.view.width * scene.view.height;
   return plan;
 }
@@ -700,6 +702,8 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
       const StressPair<double> p = o.phases(x, y);
       result.insert(result.end(), {p.normal, p.shear});
     }
+  } else if (is_ring_table(scene)) {
+    result.push_back(0);  // radii grow steadily with everything: no fringe order to lose
   } else {
     const PlanarOptics<double> o = planar_optics(scene, value);
     for (const auto& [tx, ty] : pilot_directions(scene, value)) result.push_back(planar_phase(o, tx, ty));
@@ -751,6 +755,14 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     note_illumination(scene, value, std::abs(kPi * value(crystal.bias_v) / value(crystal.half_wave_voltage_v)), result);
   } else if (std::holds_alternative<StressedDisc>(scene.sample)) {
     result = plan_disc(scene, value);
+  } else if (is_ring_table(scene)) {
+    if (scene.method != "auto" && scene.method != "diagonal")
+      throw UserError(Where{}, fmt::format("transport method '{}' does not apply to a table of rings", scene.method), "leave transport.method at auto");
+    if (std::get<Plate>(scene.sample).ring_numbers.empty())
+      throw UserError(Where{}, "a plate with screen_distance_um needs a table of ring radii", "micrograph: {image: rings.csv}");
+    result.method = "closed_form";
+    result.reasons.push_back("the rings of a plate cut normal to its axis lie where the retardance is a whole number of waves: radii in closed form");
+    result.cost_seconds = 1e-7 * scene.view.width;
   } else {
     result = plan_planar(scene, value);
   }

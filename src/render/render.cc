@@ -19,6 +19,7 @@ std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const Render
   if (std::holds_alternative<Droplet>(scene.sample)) return make_droplet_model(scene, plan, value);
   if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
   if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
+  if (is_ring_table(scene)) return make_ring_model(scene, value);
   return make_planar_model(scene, plan, value);
 }
 
@@ -390,6 +391,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
     row.pp = element(p, p);
     rows.push_back(row);
   };
+  if (is_ring_table(scene)) throw UserError(Where{}, "a table of rings has no Jones matrices", "give the plate view: {half_angle_deg} instead");
   const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
   if (std::holds_alternative<Slab>(scene.sample) && !half_angle) {
     const PlanarOptics<double> optics = planar_optics(scene, value);

@@ -178,5 +178,61 @@ TEST(StressedDisc, AnyAnalyserBehindTheQuarterWavePlates) {
     }
 }
 
+// A retardance goes as 1/wavelength: a line of Gaussian shape in 1/wavelength of relative width s is a Gaussian of loads of the
+// same relative width. 81 trapezoids out to 6 widths of a Gaussian are exact to rounding (its spectrum ends long before theirs).
+TEST(StressedDisc, BandwidthIsTheMeanOverTheLine) {
+  for (bool circular : {false, true})
+    for (double analyzer_deg : {110.0, 65.0}) {
+      testing::IndependentDisc d;
+      d.circular = circular;
+      d.polarizer_deg = 20;
+      d.um_per_px = 1000;
+      d.center_x_px = d.center_y_px = 5.5;
+      const double width = 0.05;
+      const auto image = [&](double load, double bandwidth_nm) {
+        testing::IndependentDisc one = d;
+        one.load_n = load;
+        DiscScene s = scene_of(one, 12, analyzer_deg);
+        s.scene.microscope.bandwidth_nm = bandwidth_nm;
+        testing::IndependentDisc heavy = d;  // one plan for all loads: the same points within a pixel
+        heavy.load_n = 1.3 * d.load_n;
+        const DiscScene most = scene_of(heavy, 12, analyzer_deg);
+        return render(s.scene, plan(most.scene, most.t.table.values()), s.t.table.values()).intensity;
+      };
+      const Image broad = image(d.load_n, width * 2.3548200450309493 * d.wavelength_nm);
+      std::vector<double> mean(broad.size(), 0);
+      double sum = 0;
+      for (int i = -40; i <= 40; ++i) {
+        const double g = 6.0 * i / 40, w = std::exp(-0.5 * g * g);
+        const Image one = image(d.load_n * (1 + width * g), 0);
+        for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += w * one.values()[k];
+        sum += w;
+      }
+      double change = 0;
+      const Image narrow = image(d.load_n, 0);
+      for (std::size_t k = 0; k < mean.size(); ++k) {
+        EXPECT_NEAR(broad.values()[k], mean[k] / sum, 1e-8) << circular << " " << analyzer_deg << " pixel " << k;
+        change = std::max(change, std::abs(broad.values()[k] - narrow.values()[k]));
+      }
+      EXPECT_GT(change, 0.05);
+    }
+}
+
+TEST(StressedDisc, UnevenLightIsAFactor) {
+  testing::IndependentDisc d;
+  d.um_per_px = 10;  // a pixel is a point: the factor changes by 1/1000 in it
+  d.center_x_px = d.center_y_px = 15.5;
+  DiscScene even = scene_of(d, 32, 90), uneven = scene_of(d, 32, 90);
+  StressedDisc& disc = std::get<StressedDisc>(uneven.scene.sample);
+  disc.illumination = {uneven.t.fixed("x", 40), uneven.t.fixed("y", -10), uneven.t.fixed("xx", 300)};
+  const RenderPlan p = plan(even.scene, even.t.table.values());
+  const Image a = render(even.scene, p, even.t.table.values()).intensity, b = render(uneven.scene, p, uneven.t.table.values()).intensity;
+  for (int row = 0; row < 32; ++row)
+    for (int column = 0; column < 32; ++column) {
+      const double x = (column - 15.5) * 10 / d.radius_um, y = (15.5 - row) * 10 / d.radius_um;
+      EXPECT_NEAR(b(column, row), a(column, row) * (1 + 40 * x - 10 * y + 300 * x * x), 1e-3 * a(column, row));
+    }
+}
+
 }  // namespace
 }  // namespace birefit

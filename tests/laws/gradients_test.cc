@@ -360,6 +360,23 @@ std::vector<Case> cases() {
     c.scene.sample = disc;
     c.scene.microscope.quarter_wave = circular;
     all.push_back(c);
+    c.name += ", broad and uneven light";
+    disc.illumination = {c.t.fixed("light_x", 0.4), c.t.fixed("light_y", -0.2), c.t.fixed("light_xx", 0.3)};
+    c.scene.sample = disc;
+    c.scene.microscope.bandwidth_nm = 60;
+    all.push_back(c);
+  }
+  {
+    Case c = base("ring radii on a screen");
+    Plate plate;
+    plate.thickness_um = c.t.fixed("thickness_um", 26000);
+    plate.director.axis = {c.t.fixed("ax", 0), c.t.fixed("ay", 0), c.t.fixed("az", 1)};
+    plate.screen_distance_um = c.t.fixed("screen_distance_um", 7e5);
+    plate.ring_offset = c.t.fixed("ring_offset", -0.2);
+    for (int i = 0; i < c.scene.view.width; ++i) plate.ring_numbers.push_back(i + 1);
+    c.scene.sample = plate;
+    c.scene.view.height = 1;
+    all.push_back(c);
   }
   return all;
 }
