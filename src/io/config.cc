@@ -921,6 +921,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
                               "the image.");
 
   if (!reader.problems.empty()) throw_sorted(reader);
+  config.job.options.choose_rays = reader.choose_rays;
   config.job.parameters = std::move(reader.table);
   config.job.warnings = std::move(reader.warnings);
   return config;

@@ -66,6 +66,8 @@ class ConfigReader {
   std::set<std::string> misspelt;
   /// Paths that every micrograph sets for itself: the shared blocks need not give them.
   std::vector<std::string> set_everywhere;
+  /// `physics: {rays: auto}`: the fit chooses.
+  bool choose_rays = true;
 
   /// The block at a key, its keys checked against `known`.
   Block block(const Block& parent, const std::string& key, const std::vector<std::string>& known, bool required);

@@ -665,9 +665,11 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   if (const YamlNode* rays = physics.find("rays")) {
     const auto* droplet = std::get_if<Droplet>(&scene.sample);
     const auto* radial = droplet ? std::get_if<RadialDirector>(&droplet->director) : nullptr;
-    scene.rays = reader.choice(physics, "rays", {"straight", "eikonal"}).value_or("straight") == "eikonal" ? Rays::eikonal : Rays::straight;
-    if (scene.rays == Rays::eikonal && (!radial || radial->twist_deg))
-      reader.problems.add(rays->where, "rays: eikonal is for radial droplets without twist", "use straight");
+    const std::string which = reader.choice(physics, "rays", {"straight", "eikonal", "auto"}).value_or("straight");
+    scene.rays = which == "eikonal" ? Rays::eikonal : Rays::straight;
+    reader.choose_rays = which == "auto";  // what a fit does without the key, too
+    if (which != "straight" && (!radial || radial->twist_deg))
+      reader.problems.add(rays->where, "rays: " + which + " is for radial droplets without twist", "use straight");
   }
   const YamlNode* ceiling = physics.find("ceiling");
   const Slab* slab = std::get_if<Slab>(&scene.sample);

@@ -84,8 +84,9 @@ Indices<S> material_indices(const Material& material, const V& value, const S& w
 
 template <class S, class V>
 Vec3<S> uniform_axis(const UniformDirector& director, const V& value) {
+  // 1e-14: a wave exactly along the axis has no two modes of its own. (Angles are never that exact.)
   if (director.axis[0])
-    return normalized(Vec3<S>{value(director.axis[0]), value(director.axis[1]), value(director.axis[2])});
+    return normalized(Vec3<S>{value(director.axis[0]) + 1e-14, value(director.axis[1]), value(director.axis[2])});
   return axis_from_angles<S>(value.radians(director.tilt_deg), value.radians(director.azimuth_deg));
 }
 

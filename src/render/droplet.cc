@@ -187,7 +187,8 @@ EikonalRay<S> eikonal_ray(const DropletOptics<S>& o, bool extraordinary, const S
   // Value and derivatives by one Newton step each: d psi = (d rho wanted - d rho(psi; parameters)) / slope.
   S psi(start);
   for (int i = 0; i < 2; ++i) {
-    const S change = (rho_um - geometry(S(plain(psi)))) * inverse(S(plain(slope)));
+    const S here = geometry(S(plain(psi)));  // sets the slope
+    const S change = (rho_um - here) * inverse(S(plain(slope)));
     psi = S(plain(psi)) + select(arrives, change, S(0.0));
   }
   geometry(psi);

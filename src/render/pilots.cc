@@ -211,6 +211,7 @@ Effort cheapest_effort(const Pilots& pilots, double target, const std::string& o
     }
     if (effort.error < best.error) best = effort;
   }
+  if (!best.method) return efforts.empty() ? best : efforts.back();  // none of them has an answer
   // Errors were cut short at the first ray beyond the target.
   best.error = pilots.error(*best.method, pilots.mesh(best.steps));
   return best;

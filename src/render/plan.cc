@@ -200,7 +200,12 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
   const double worst_reflection = std::max(reflectance(o.n_e, o.n_host), reflectance(o.n_o, o.n_host));
   plan.model_error = 2 * worst_reflection;
   const double size = 2 * o.radius_um * o.n_host / value(scene.microscope.wavelength_nm) * 1000;
-  if (size < 400)
+  if (size < 400 && scene.rays == Rays::eikonal)
+    plan.warnings.push_back(fmt::format(
+        "The droplet is {:.3g} wavelengths across: rays, curved as they are, leave out diffraction. An image of beam propagation (23 wavelengths, "
+        "birefringence 0.22) is met to 2 % of its range, its birefringence to 0.1 % and its diameter to 0.3 %; the error bars do not contain this.",
+        size));
+  else if (size < 400)
     plan.warnings.push_back(fmt::format(
         "The droplet is {:.3g} wavelengths across: straight rays leave out diffraction and walk-off. Measured on exact "
         "solutions of 5 to 20 um droplets of birefringence 0.22, ray images differ by 25 to 60 % RMS and a fitted "

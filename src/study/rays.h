@@ -88,7 +88,7 @@ std::unique_ptr<Column<S>> ray_column(const std::string& name, const S& shift) {
   if (name == "twisted_droplet") return make(droplet(2.0, 60 * kDeg));
   if (name == "near_defect") return make(droplet(0.025, 60 * kDeg));
   if (name == "e44_plate")
-    return make(HeatedLaw<S>{{S(-0.35355339059327373), S(0.35355339059327373), S(-0.8660254037844386)}, S(0.1), S(278.0), S(368.0), S(800.0)});
+    return make(HeatedLaw<S>{{S(-0.35355339059327373), S(0.35355339059327373), S(-0.8660254037844386)}, {S(0.1), S(278.0), S(368.0), S(278.0), true}, S(800.0)});
   if (name == "evaluation_slab") {
     auto column = std::make_unique<LawColumn<S, EvaluationSlabLaw<S>>>(EvaluationSlabLaw<S>{shift, 450});
     column->absorbing = true;

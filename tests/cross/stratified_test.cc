@@ -126,7 +126,7 @@ TEST(HeatedPlate, ConoscopicPhaseAgrees) {
     const bool first = table.text(row, "director").starts_with("A");
     const Vec3<double> axis = first ? Vec3<double>{-a, a, -std::sqrt(3.0) / 2}
                                     : Vec3<double>{-a, std::sqrt(2.0) / 2, -std::sqrt(6.0) / 4};
-    const HeatedLaw<double> law{axis, table.number(row, "Fo"), 278, 368, 800};
+    const HeatedLaw<double> law{axis, {table.number(row, "Fo"), 278, 368, 278, true}, 800};
     const LawColumn<double, HeatedLaw<double>> column(law);
     const double kappa = std::sin(table.number(row, "theta_inc_deg") * kDeg), az = table.number(row, "azimuth_deg") * kDeg;
     const double k0 = 2 * std::numbers::pi / 0.64;

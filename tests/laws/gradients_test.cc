@@ -162,10 +162,10 @@ std::vector<Case> cases() {
     }
     if (kind >= 2) {
       ShellDirector shell;
-      shell.wall_um = c.t.fixed("wall_um", kind == 2 ? 1.43 : 4.1);
-      // The core's edge, where derivatives jump, crosses no sampled point: beyond the picture, or small.
+      shell.wall_um = c.t.fixed("wall_um", 1.43);
+      // The core's edge, where the derivative of the square root is infinite, is beyond the picture.
       if (kind == 3)
-        shell.offset_um = {c.t.fixed("offset_x", 0.7), c.t.fixed("offset_y", -0.4), c.t.fixed("offset_z", 0.5)};
+        shell.offset_um = {c.t.fixed("offset_x", 0.3), c.t.fixed("offset_y", -0.2), c.t.fixed("offset_z", 0.25)};
       d.director = shell;
     }
     c.scene.sample = d;
@@ -332,7 +332,7 @@ std::vector<Case> cases() {
     plate.thickness_um = c.t.fixed("thickness_um", 60);
     plate.director.azimuth_deg = c.t.fixed("azimuth_deg", 40);
     plate.director.tilt_deg = c.t.fixed("tilt_deg", 35);
-    plate.heat = HeatStep{c.t.fixed("fourier_number", 0.07), c.t.fixed("cold_k", 290), c.t.fixed("hot_k", 304)};
+    plate.heat = HeatStep{.fourier_number = c.t.fixed("fourier_number", 0.07), .cold_k = c.t.fixed("cold_k", 290), .hot_k = c.t.fixed("hot_k", 304)};
     plate.half_angle_deg = c.t.fixed("half_angle_deg", 15);
     c.scene.sample = plate;
     LawIndices m;

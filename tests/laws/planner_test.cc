@@ -111,12 +111,43 @@ void expect_kept(unsigned long first, unsigned long last) {
 }
 
 TEST(Planner, PicturesAreWithinTheAccuracyAsked) { expect_kept(1, 40); }
+
+// A plate cut exactly normal to its axis: in the middle both waves are one, and nothing divides by their difference. Between crossed
+// polarizers along x and y a black cross and, on the diagonal, sin^2 of half the phase k0 d (q_o - q_e), q_e = (n_o/n_e) sqrt(n_e^2 - kappa^2),
+// but for the faces' transmissions.
+TEST(Planner, PlateCutNormalToItsAxisHasItsCross) {
+  testing::TableBuilder b;
+  Scene scene;
+  Plate plate;
+  plate.thickness_um = b.fixed("thickness_um", 300);
+  plate.director.axis = {b.fixed("x", 0), b.fixed("y", 0), b.fixed("z", 1)};
+  plate.half_angle_deg = b.fixed("half_angle_deg", 10);
+  scene.sample = plate;
+  scene.material = ConstantIndices{b.fixed("ordinary", 1.53), b.fixed("birefringence", 0.1)};
+  scene.surround_index = b.fixed("index", 1.53);
+  scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 640);
+  scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+  scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+  scene.view.width = scene.view.height = 65;
+  scene.view.center_x_px = b.fixed("center_x", 32);
+  scene.view.center_y_px = b.fixed("center_y", 32);
+  scene.view.rotation_deg = b.fixed("rotation_deg", 0);
+  const Theta theta = b.table.values();
+  const Image image = render(scene, plan(scene, theta), theta, {}, 1).intensity;
+  for (int i = 0; i < 65; ++i) {
+    EXPECT_LT(image(i, 32), 5e-3) << i;  // a pixel's mean beside an exact zero: a sixty-fifth of the diagonal's, squared
+    const double tangent = std::tan(10 * std::numbers::pi / 180) * std::abs(i - 32) * std::sqrt(2.0) / 32.5, kappa = 1.53 * tangent / std::sqrt(1 + tangent * tangent);
+    const double phase = 2 * std::numbers::pi / 0.64 * 300 * (std::sqrt(1.53 * 1.53 - kappa * kappa) - 1.53 / 1.63 * std::sqrt(1.63 * 1.63 - kappa * kappa));
+    // The fringe turns by up to 0.35 rad within a pixel: its mean is 0.35^2/12 of its contrast off; the faces' transmissions 0.2 %.
+    EXPECT_NEAR(image(i, i), std::pow(std::sin(phase / 2), 2), 0.015) << i;
+  }
+}
 TEST(LongPlanner, PicturesAreWithinTheAccuracyAsked) { expect_kept(41, 340); }
 
 /// Samples of the medium a ray, as planned, over those of the cheapest registered method and effort that holds the accuracy on
 /// the same pilot rays. Efforts as on the chart, twice as many each time, from one on; 0 where there is no choice.
 double planned_over_cheapest(const Scene& scene, const Theta& theta, const RenderPlan& planned) {
-  if (std::holds_alternative<Crystal>(scene.sample) || scene.ceiling == Ceiling::reflections) return 0;
+  if (planned.method == "closed_form" || scene.ceiling == Ceiling::reflections) return 0;
   const Values<double> value(theta, {});
   const Pilots pilots(scene, value);
   int cheapest = 1 << 30;

@@ -1,0 +1,195 @@
+// Scatter of estimates against the bound of Cramer and Rao, for many scenes: truths drawn at random, pictures by the model itself
+// (its physics is held by tests/cross), 1 % of Gaussian noise. With constant weights the bound at the truth is the standard error that a
+// fit states, so errors in units of it must scatter by one.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <random>
+
+#include "birefit/fit.h"
+#include "birefit/render.h"
+#include "scene_builder.h"
+
+namespace birefit {
+namespace {
+using namespace testing;
+
+constexpr double kGain = 1000, kNoise = 10;
+
+/// One drawn scene: `table` holds the truth, every free parameter with its bounds.
+struct Draw {
+  TableBuilder b;
+  Scene scene;
+  std::mt19937_64 random;
+  double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
+  /// Free, its truth drawn from [low, high]; bounds `margin` beyond the draw, on both sides.
+  ParameterRef drawn(const std::string& name, double low, double high, double margin) {
+    const double truth = between(low, high);
+    return b.fitted(name, truth, truth - margin * between(0.3, 1), truth + margin * between(0.3, 1));
+  }
+};
+
+void microscope(Draw& d, int size, double pixel_um, double half_field_um) {
+  Scene& s = d.scene;
+  s.microscope.wavelength_nm = d.b.fixed("wavelength_nm", 590);
+  s.microscope.polarizer_deg = d.b.fixed("polarizer_deg", 0);
+  s.microscope.analyzer_deg = d.b.fixed("analyzer_deg", 90);
+  s.view.width = s.view.height = size;
+  s.view.pixel_size_um = pixel_um;
+  const double middle = 0.5 * (size - 1);
+  s.view.center_x_px = half_field_um > 0 ? d.drawn("center_x", middle - 1, middle + 1, 1) : d.b.fixed("center_x", middle);
+  s.view.center_y_px = half_field_um > 0 ? d.drawn("center_y", middle - 1, middle + 1, 1) : d.b.fixed("center_y", middle);
+  s.view.rotation_deg = d.b.fixed("rotation_deg", 0);
+}
+
+void droplet(Draw& d, const std::function<void(Draw&, Droplet&)>& director) {
+  microscope(d, 48, 0.21, 5);
+  Droplet sample;
+  sample.diameter_um = d.drawn("diameter_um", 8, 9, 0.3);
+  director(d, sample);
+  d.scene.sample = sample;
+  d.scene.material = ConstantIndices{d.b.fixed("ordinary", 1.52), d.b.fixed("birefringence", 0.22)};
+  d.scene.surround_index = d.b.fixed("surround", 1.5);
+}
+
+struct Scatter {
+  std::map<std::string, Spread> by_name;
+  int inside = 0, all = 0, refused = 0;
+};
+
+/// Fits of `draws` pictures. Where a start of another order could win (starts are drawn within the bounds), the scan decides.
+Scatter scatter(int draws, const std::function<void(Draw&)>& make, const std::string& of) {
+  Scatter result;
+  for (int i = 1; i <= draws; ++i) {
+    Draw d;
+    d.random.seed(static_cast<unsigned long>(i) * 7919);
+    make(d);
+    const Theta truth = d.b.table.values();
+    const Image exact = render(d.scene, plan(d.scene, truth), truth, {}, 2).intensity;
+    std::vector<double> counts;
+    std::normal_distribution<double> noise(0, kNoise);
+    for (double value : exact.values()) counts.push_back(kGain * value + noise(d.random));
+    FitJob job;
+    const ParameterRef gain = d.b.linear("gain", 900), offset = d.b.linear("offset", 5);
+    for (int k = 0; k < d.b.table.size(); ++k) {
+      Parameter& p = d.b.table[k];
+      if (p.free && !p.linear) p.value = d.between(p.lower, p.upper);
+    }
+    job.micrographs.push_back(micrograph_of(of, d.scene, counts, gain, offset, {kNoise, 0}));
+    job.parameters = d.b.table;
+    const FitResult r = fit(job);
+    if (!r.has_answer()) {
+      ++result.refused;
+      continue;
+    }
+    for (const ParameterEstimate& p : r.parameters) {
+      if (p.linear || p.at_bound || !p.limit.empty()) continue;
+      const double error = p.value - truth[static_cast<std::size_t>(d.b.table.find(p.name).index)];
+      result.by_name[p.name].add(error, p.stderr_);
+      result.all += 1;
+      result.inside += std::abs(error) < 1.96 * p.stderr_;
+    }
+  }
+  for (const auto& [name, s] : result.by_name)
+    std::printf("  %s, %s: spread/bound %.3f, bias %.2f, worst %.2f of %zu\n", of.c_str(), name.c_str(), s.ratio(), s.bias(), s.worst(), s.error.size());
+  std::printf("  %s: %d of %d inside their 95 %% intervals, %d refused\n", of.c_str(), result.inside, result.all, result.refused);
+  return result;
+}
+
+void hedgehog_in_a_field(Draw& d) {
+  droplet(d, [](Draw& draw, Droplet& sample) {
+    AxialDirector axial;
+    axial.reduced_field = draw.drawn("reduced_field", 3, 30, 2);
+    sample.director = axial;
+  });
+}
+void ring_in_a_field(Draw& d) {
+  droplet(d, [](Draw& draw, Droplet& sample) {
+    AxialDirector axial;
+    axial.reduced_field = draw.drawn("reduced_field", 6, 30, 2);
+    // Around where rings are stable: 0.7 to 0.9 coherence lengths from the sphere.
+    const double e = draw.b.table[axial.reduced_field].value, ring = 1 - draw.between(0.75, 1.1) / e;
+    axial.ring_radius = draw.b.fitted("ring_radius", ring, ring - 0.03, std::min(0.99, ring + 0.03));
+    sample.director = axial;
+  });
+}
+void shell(Draw& d) {
+  droplet(d, [](Draw& draw, Droplet& sample) {
+    ShellDirector s;
+    s.wall_um = draw.drawn("wall_um", 0.8, 1.6, 0.3);
+    sample.director = s;
+  });
+}
+void eccentric_shell(Draw& d) {
+  droplet(d, [](Draw& draw, Droplet& sample) {
+    ShellDirector s;
+    s.wall_um = draw.drawn("wall_um", 1.2, 1.6, 0.2);
+    s.offset_um = {draw.drawn("offset_x", -0.5, 0.5, 0.3), draw.drawn("offset_y", -0.5, 0.5, 0.3), draw.b.fixed("offset_z", 0)};
+    sample.director = s;
+  });
+}
+void bipolar(Draw& d) {
+  droplet(d, [](Draw& draw, Droplet& sample) { sample.director = BipolarDirector{draw.drawn("azimuth_deg", 10, 80, 8), draw.b.fixed("tilt_deg", 0), draw.drawn("pole_distance", 1.1, 1.5, 0.08)}; });
+}
+void heated_plate(Draw& d) {
+  microscope(d, 64, 0, 0);
+  Plate plate;
+  plate.thickness_um = d.b.fixed("thickness_um", 800);
+  plate.director.axis = {d.b.fixed("axis.x", -0.353553), d.b.fixed("axis.y", 0.353553), d.b.fixed("axis.z", -0.866025)};
+  HeatStep heat;
+  // Drawn evenly in its logarithm.
+  const double fourier = std::exp(d.between(std::log(0.005), std::log(0.3)));
+  heat.fourier_number = d.b.fitted("fourier_number", fourier, 0.6 * fourier, 1.5 * fourier);
+  heat.cold_k = d.b.fixed("cold_k", 278);
+  heat.hot_k = d.b.fixed("hot_k", 368);
+  plate.heat = heat;
+  plate.half_angle_deg = d.b.fixed("half_angle_deg", 8);
+  d.scene.sample = plate;
+  d.scene.material = E44Steinberg2020{d.b.fixed("temperature_k", 298)};
+  d.scene.surround_index = d.b.fixed("surround", 1.0);
+  d.scene.microscope.wavelength_nm = d.b.fixed("wavelength_640", 640);
+}
+
+const std::vector<std::pair<std::string, void (*)(Draw&)>> kScenes = {
+    {"hedgehog in a field", hedgehog_in_a_field}, {"ring in a field", ring_in_a_field}, {"shell", shell}, {"eccentric shell", eccentric_shell},
+    {"bipolar droplet", bipolar},                 {"heated plate", heated_plate}};
+
+class ScenesRecovery : public ::testing::TestWithParam<std::size_t> {};
+class LongScenesRecovery : public ScenesRecovery {};
+
+// Four pictures a scene: no estimate far outside its error.
+TEST_P(ScenesRecovery, EstimatesAreWithinTheirErrors) {
+  const auto& [name, make] = kScenes[GetParam()];
+  const Scatter s = scatter(4, make, name);
+  EXPECT_EQ(s.refused, 0);
+  for (const auto& [parameter, spread] : s.by_name) EXPECT_LT(spread.worst(), 5) << parameter;
+}
+
+// 300 pictures a scene: the spread of 300 numbers is known to 4 %, of a handful of parameters the largest to 10 %.
+TEST_P(LongScenesRecovery, SpreadIsThatOfTheCramerRaoBound) {
+  const auto& [name, make] = kScenes[GetParam()];
+  const Scatter s = scatter(300, make, name);
+  EXPECT_LE(s.refused, 3);
+  for (const auto& [parameter, spread] : s.by_name) {
+    EXPECT_LT(spread.ratio(), 1.1) << parameter;
+    EXPECT_GT(spread.ratio(), 0.9) << parameter;
+  }
+  // 95 % of some 1000 to 2000 intervals.
+  EXPECT_NEAR(static_cast<double>(s.inside) / s.all, 0.95, 0.025);
+}
+
+std::string scene_name(const ::testing::TestParamInfo<std::size_t>& info) {
+  std::string name = kScenes[info.param].first;
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
+}
+// One ray a radius: seconds. The others take minutes.
+INSTANTIATE_TEST_SUITE_P(All, ScenesRecovery, ::testing::Values(0, 2, 5), scene_name);
+INSTANTIATE_TEST_SUITE_P(All, LongScenesRecovery, ::testing::Range<std::size_t>(0, 6), scene_name);
+
+}  // namespace
+}  // namespace birefit
