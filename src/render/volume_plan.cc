@@ -67,6 +67,7 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
   const double view = std::hypot(std::max(o.center_x_px, w - 1 - o.center_x_px), std::max(o.center_y_px, h - 1 - o.center_y_px));
   const double most = std::max(1.0, std::min(box, view));
   if (most > 100000) throw UserError(Where{}, "the volume is more than 200000 pixels across", "check the spacing, scale and pixel_size_um");
+  const double near_edge = 0.5 * std::min((grid.nx - 1) / o.nodes_per_px_x, (grid.ny - 1) / o.nodes_per_px_y);
   PixelMeans means(scene, plan, value);
   const auto within = [&](double column, double row) {
     double x, y;
@@ -102,7 +103,7 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
   for (int bin = 0; bin < static_cast<int>(std::ceil(most)) + 1; ++bin) {
     // With its neighbours: few pixels stand for a ring.
     const int ring = std::min(rings - 1, static_cast<int>((bin + 0.5) / most * rings));
-    int n = 1;
+    int n = bin + 2 > near_edge ? 2 : 1;  // the correction of single points looks a pixel further, beside the box
     for (int i = std::max(0, ring - 1); i <= std::min(rings - 1, ring + 1); ++i) n = std::max(n, needed[static_cast<std::size_t>(i)]);
     plan.samples.push_back(n);
   }

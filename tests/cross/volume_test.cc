@@ -88,6 +88,8 @@ TEST(Volume, BesideTheBoxTheFieldIsOpen) {
   const Image image = render(s.scene, p, s.theta()).intensity;
   EXPECT_NEAR(image(0, 0), 0.75, 1e-12);
   EXPECT_NEAR(image(39, 20), 0.75, 1e-12);
+  // Pixels 17 to 22 lie in the box whole; not one of them knows its edge.
+  for (int i = 17; i <= 22; ++i) EXPECT_NEAR(image(i, 17), image(19, 19), 1e-12) << i;
 }
 
 // Ninety degrees of twist between crossed polarizers (Gooch & Tarry, J. Phys. D 8, 1575 (1975)), which is exact for a transport
