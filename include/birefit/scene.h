@@ -4,6 +4,7 @@
 // Frames, signs and units: docs/conventions.md. Sources: docs/methods.md.
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -242,7 +243,15 @@ struct StressedDisc {
   std::vector<ParameterRef> illumination;
 };
 
-using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab, StressedDisc>;
+struct VolumeGrid;  // birefit/volume.h
+/// A director field known at the nodes of a box, seen along its z: straight parallel rays, no refraction, nothing reflected.
+/// n_e - n_o is the material's times the field's relative order. The middle of the box is seen at View::center_x_px, center_y_px.
+struct SampledVolume {
+  std::shared_ptr<const VolumeGrid> grid;  ///< never null where a scene is planned or rendered
+  ParameterRef scale;                      ///< of the box, all three sides, > 0; not given: 1
+};
+
+using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab, StressedDisc, SampledVolume>;
 
 // ---- microscope -----------------------------------------------------------------------------------------------------
 

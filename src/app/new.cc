@@ -182,18 +182,42 @@ microscope:
   objective_na: 0.6
 )";
 
+const char* const kVolume = R"(# A director field from a simulation, sampled on a box of nodes, seen along its z.
+micrograph:
+  image: field.tif
+  pixel_size_um: 0.1
+  gain: {fit: auto}
+  offset: {fit: auto}
+  # center_px: [{value: 127.5, fit: [120, 135]}, {value: 127.5, fit: [120, 135]}]   # of the box; the image's middle when left out
+  # rotation_deg: {value: 0, fit: [-10, 10]}
+sample:
+  volume:
+    file: field.npy            # NumPy: [z, y, x, component]; or .vti (VTK image data) with n or Q, perhaps S and domain_mask
+    spacing_um: [0.2, 0.2, 0.2]  # dx, dy, dz between nodes, of .npy files; a .vti says it itself
+    # axes: xyz                # array[x, y, z, component]
+    # scale: {value: 1, fit: [0.9, 1.1]}   # of the whole box
+    # bulk_order: 0.53         # the S that the birefringence below belongs to; the file's largest when left out
+  material:
+    ordinary: 1.52
+    birefringence: {value: 0.1, fit: [0.05, 0.15]}
+microscope:
+  light: {wavelength_nm: 590}
+  polarizer_deg: 0
+  analyzer_deg: 90
+)";
+
 }  // namespace
 
 Command add_new_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("new", "print a commented config to start from");
   auto kind = std::make_shared<std::string>();
-  command->add_option("KIND", *kind, "droplet, shell, cell, freedericksz, plate, crystal, slab or disc")->required();
+  command->add_option("KIND", *kind, "droplet, shell, cell, freedericksz, plate, crystal, slab, disc or volume")->required();
   return {command, [kind] {
             const std::map<std::string, const char*> templates = {
-                {"droplet", kDroplet}, {"shell", kShell}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}};
+                {"droplet", kDroplet}, {"shell", kShell}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}, {"volume", kVolume}};
             const auto found = templates.find(*kind);
             if (found == templates.end())
-              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, shell, cell, freedericksz, plate, crystal, slab, disc");
+              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, shell, cell, freedericksz, plate, crystal, slab, disc, volume");
             std::cout << found->second;
             return kExitDone;
           }};

@@ -128,7 +128,7 @@ void read_center(ConfigReader& reader, const Block& block, const Scene& scene, M
   const bool droplet = std::holds_alternative<Droplet>(scene.sample);
   const Slab* slab = std::get_if<Slab>(&scene.sample);
   const bool disc = std::holds_alternative<StressedDisc>(scene.sample);
-  const bool cone = disc || std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
+  const bool cone = disc || std::holds_alternative<SampledVolume>(scene.sample) || std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
   const YamlNode* node = block.find("center_px");
   const std::string path = "micrograph.center_px";
   if (node && node->is_sequence() && node->items.size() == 2) {
@@ -813,7 +813,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       if (!used.count(i)) reader.table[i].free = false;
   }
 
-  const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample) || std::holds_alternative<StressedDisc>(shared.scene.sample);
+  const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample) || std::holds_alternative<StressedDisc>(shared.scene.sample) || std::holds_alternative<SampledVolume>(shared.scene.sample);
   const auto demand_pixel_size = [&](const Scene& scene) {
     if (needs_pixel_size && !(scene.view.pixel_size_um > 0) && reader.problems.empty())
       reader.problems.add(settings.where.line > 0 ? settings.where : Where{reader.file},

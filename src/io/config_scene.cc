@@ -9,13 +9,14 @@
 #include "io/config_director.h"
 #include "io/config_rings.h"
 #include "io/config_material.h"
+#include "io/config_volume.h"
 #include "io/table.h"
 #include "transport/method.h"
 
 namespace birefit {
 namespace {
 
-const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate", "crystal", "slab", "disc"};
+const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate", "crystal", "slab", "disc", "volume"};
 
 NumberSpec open_length(double upper_um) {
   NumberSpec spec;
@@ -546,6 +547,7 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   if (*kind == "crystal") scene.sample = read_crystal(reader, block);
   if (*kind == "slab") scene.sample = read_slab(reader, block);
   if (*kind == "disc") scene.sample = read_stressed_disc(reader, block);
+  if (*kind == "volume") scene.sample = read_sampled_volume(reader, block);
 
   const bool own_indices = *kind == "crystal" || *kind == "slab" || *kind == "disc";
   if (own_indices) {
@@ -557,7 +559,7 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   } else {
     scene.material = read_material(reader, block, scene.sample);
   }
-  if (*kind == "crystal" || *kind == "disc") {
+  if (*kind == "crystal" || *kind == "disc" || *kind == "volume") {
     if (const YamlNode* node = block.find("surround"))
       reader.problems.add(node->where, "unknown key surround: a " + *kind + " needs none");
     scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);

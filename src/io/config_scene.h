@@ -72,6 +72,8 @@ void for_each_ref(Scene& scene, F&& f) {
     for (ParameterRef& coefficient : disc->residual_normal_mpa) f(coefficient);
     for (ParameterRef& coefficient : disc->residual_shear_mpa) f(coefficient);
     for (ParameterRef& coefficient : disc->illumination) f(coefficient);
+  } else if (auto* volume = std::get_if<SampledVolume>(&scene.sample)) {
+    f(volume->scale);
   }
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material)) {
     f(constant->ordinary);

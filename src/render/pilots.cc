@@ -7,6 +7,7 @@
 #include "medium/families/radial.h"
 #include "render/ball.h"
 #include "render/planar.h"
+#include "render/volume.h"
 
 namespace birefit {
 namespace {
@@ -62,6 +63,8 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
 Pilots::Pilots(const Scene& scene, const Values<double>& value) {
   if (const auto* droplet = std::get_if<Droplet>(&scene.sample))
     looks_round(*droplet) ? add_droplet(scene, value) : add_ball(scene, value);
+  else if (std::holds_alternative<SampledVolume>(scene.sample))
+    add_volume(scene, value);
   else
     add_planar(scene, value);
 }
@@ -131,6 +134,28 @@ void Pilots::add_ball(const Scene& scene, const Values<double>& value) {
       return 1000000;
     }
   };
+}
+
+void Pilots::add_volume(const Scene& scene, const Values<double>& value) {
+  const auto o = std::make_shared<const VolumeOptics<double>>(scene, value);
+  breaks_ = o->breaks;
+  const Mesh fine = uniform_mesh(8 * (o->grid->nz - 1), breaks_), finer = uniform_mesh(16 * (o->grid->nz - 1), breaks_);
+  constexpr int kMost = 48;
+  for (int i = 0; i < kMost && rays_.size() < 16; ++i) {
+    const auto [x, y] = volume_place(*o->grid, i);
+    const Su2<double> exact = volume_retarder<double>(*o, x, y, transport_method<double>("magnus4"), finer);
+    // Through a defect the axis between two nodes is anybody's guess, and turns as fast as it likes: no measure of a method.
+    const double unsure = intensity_distance(exact, volume_retarder<double>(*o, x, y, transport_method<double>("magnus4"), fine));
+    if (unsure > 0.1 * scene.intensity_accuracy && i < kMost - 4) continue;
+    rays_.push_back([=, x = x, y = y](const TransportMethod<double>& method, const Mesh& mesh) {
+      try {
+        return checked(intensity_distance(exact, volume_retarder(*o, x, y, method, mesh)));
+      } catch (const std::logic_error&) {  // a method that asks for more than this column knows
+        return 1e300;
+      }
+    });
+  }
+  samples_ = [=](const TransportMethod<double>& method, const Mesh& mesh) { return volume_samples(*o, method, mesh); };
 }
 
 void Pilots::add_planar(const Scene& scene, const Values<double>& value) {

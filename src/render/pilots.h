@@ -15,7 +15,7 @@ double intensity_distance(const Mat2<double>& a, const Mat2<double>& b);
 
 class Pilots {
  public:
-  /// Droplets, cells, plates and slabs; the truth is converged to far below the scene's accuracy.
+  /// Droplets, cells, plates, slabs and volumes; the truth is converged to far below the scene's accuracy.
   Pilots(const Scene& scene, const Values<double>& value);
   std::size_t size() const { return rays_.size(); }
   /// Largest change of any polarizer-analyser intensity (slabs: of the matrix with its phase) on any pilot; stops at the
@@ -30,6 +30,7 @@ class Pilots {
   void add_droplet(const Scene& scene, const Values<double>& value);
   void add_ball(const Scene& scene, const Values<double>& value);
   void add_planar(const Scene& scene, const Values<double>& value);
+  void add_volume(const Scene& scene, const Values<double>& value);
   std::vector<std::function<double(const TransportMethod<double>&, const Mesh&)>> rays_;
   std::function<int(const TransportMethod<double>&, const Mesh&)> samples_;
   std::vector<double> breaks_;

@@ -97,6 +97,8 @@ std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene&, const RenderPlan
 template <class S>
 std::unique_ptr<PixelModel<S>> make_disc_model(const Scene&, const RenderPlan&, const Values<S>&);
 template <class S>
+std::unique_ptr<PixelModel<S>> make_volume_model(const Scene&, const RenderPlan&, const Values<S>&);
+template <class S>
 std::unique_ptr<PixelModel<S>> make_ring_model(const Scene&, const Values<S>&);
 /// The scene is a table of ring radii.
 inline bool is_ring_table(const Scene& scene) {

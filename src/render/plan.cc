@@ -17,6 +17,7 @@
 #include "render/pilots.h"
 #include "render/planar.h"
 #include "render/sampling.h"
+#include "render/volume.h"
 #include "transport/methods.h"
 
 namespace birefit {
@@ -50,7 +51,7 @@ void check_method(const Scene& scene) {
   if ((scene.method == "berreman") != (scene.ceiling == Ceiling::reflections))
     throw UserError(Where{}, fmt::format("transport method '{}' and this physics.ceiling exclude each other", scene.method),
                     "berreman computes all reflections and belongs to ceiling: reflections; leave transport.method at auto");
-  if (scene.method == "modal" && std::holds_alternative<Droplet>(scene.sample))
+  if (scene.method == "modal" && (std::holds_alternative<Droplet>(scene.sample) || std::holds_alternative<SampledVolume>(scene.sample)))
     throw UserError(Where{}, "transport method 'modal' is for cells, slabs and plates: in a droplet the axis passes every ray's wavevector",
                     "leave transport.method at auto");
 }
@@ -707,6 +708,8 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
       const StressPair<double> p = o.phases(x, y);
       result.insert(result.end(), {p.normal, p.shear});
     }
+  } else if (std::holds_alternative<SampledVolume>(scene.sample)) {
+    result = volume_phases(VolumeOptics<double>(scene, value), 24);
   } else if (is_ring_table(scene)) {
     result.push_back(0);  // radii grow steadily with everything: no fringe order to lose
   } else {
@@ -760,6 +763,10 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     note_illumination(scene, value, std::abs(kPi * value(crystal.bias_v) / value(crystal.half_wave_voltage_v)), result);
   } else if (std::holds_alternative<StressedDisc>(scene.sample)) {
     result = plan_disc(scene, value);
+  } else if (std::holds_alternative<SampledVolume>(scene.sample)) {
+    result = plan_volume(scene, value);
+    const std::vector<double> retardances = phases(scene, theta);
+    note_illumination(scene, value, *std::max_element(retardances.begin(), retardances.end(), [](double a, double b) { return std::abs(a) < std::abs(b); }), result);
   } else if (is_ring_table(scene)) {
     if (scene.method != "auto" && scene.method != "diagonal")
       throw UserError(Where{}, fmt::format("transport method '{}' does not apply to a table of rings", scene.method), "leave transport.method at auto");

@@ -11,6 +11,7 @@
 #include "render/pixel_model.h"
 #include "render/planar.h"
 #include "render/sampling.h"
+#include "render/volume.h"
 
 namespace birefit {
 
@@ -19,6 +20,7 @@ std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const Render
   if (std::holds_alternative<Droplet>(scene.sample)) return make_droplet_model(scene, plan, value);
   if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
   if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
+  if (std::holds_alternative<SampledVolume>(scene.sample)) return make_volume_model(scene, plan, value);
   if (is_ring_table(scene)) return make_ring_model(scene, value);
   return make_planar_model(scene, plan, value);
 }
@@ -438,6 +440,13 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
         const Mat2<double> turn{{ca, 0}, {-sa, 0}, {sa, 0}, {ca, 0}}, back{{ca, 0}, {sa, 0}, {-sa, 0}, {ca, 0}};
         add(turn * local * back, 0, row);
       }
+    return rows;
+  }
+  if (std::holds_alternative<SampledVolume>(scene.sample)) {
+    const VolumeOptics<double> optics(scene, value);
+    const Mesh layers = plan.mesh.empty() ? uniform_mesh(plan.steps, optics.breaks) : plan.mesh;
+    for (int r = 0; r < h; ++r)
+      for (int c = 0; c < w; ++c) add(volume_jones(optics, c, r, transport_method<double>(plan.method), layers), 0, {.theta_deg = 0, .azimuth_deg = 0, .row = r, .column = c});
     return rows;
   }
   if (std::holds_alternative<Crystal>(scene.sample))

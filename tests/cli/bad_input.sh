@@ -255,13 +255,13 @@ for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml 
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 2 ] && [ -s stderr.txt ] || fail "arguments: $arguments"
 done
-for arguments in '--help' '--version' 'fit --help' 'new droplet' 'new cell' 'new plate' 'new crystal' 'new slab'; do
+for arguments in '--help' '--version' 'fit --help' 'new droplet' 'new cell' 'new plate' 'new crystal' 'new slab' 'new volume'; do
   checks=$((checks + 1))
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 0 ] && [ -s stdout.txt ] || fail "arguments: $arguments"
 done
 # What `new` prints has no mistake but the files it cannot know.
-for kind in droplet cell plate crystal slab; do
+for kind in droplet cell plate crystal slab volume; do
   checks=$((checks + 1))
   "$birefit" new $kind > new.yaml
   "$birefit" explain new.yaml > stdout.txt 2> stderr.txt

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "birefit/render.h"
+#include "birefit/volume.h"
 #include "medium/families/planar.h"
 #include "medium/families/radial.h"
 #include "scene_builder.h"
@@ -364,6 +365,23 @@ std::vector<Case> cases() {
     disc.illumination = {c.t.fixed("light_x", 0.4), c.t.fixed("light_y", -0.2), c.t.fixed("light_xx", 0.3)};
     c.scene.sample = disc;
     c.scene.microscope.bandwidth_nm = 60;
+    all.push_back(c);
+  }
+  for (bool e_only : {false, true}) {
+    Case c = base(e_only ? "sampled field, E alone" : "sampled field");
+    // One cell across, larger than the picture: no face, where trilinear interpolation has a kink, is crossed by a difference.
+    auto grid = std::make_shared<VolumeGrid>();
+    grid->nx = grid->ny = 2, grid->nz = 6;
+    grid->spacing_um = {14, 15, 0.8};
+    for (int i = 0; i < 24; ++i) {
+      const double tilt = 0.4 * std::sin(1.1 * i), azimuth = 0.5 * std::cos(0.7 * i) + 0.04 * i, s = 0.8 + 0.2 * std::sin(2.3 * i);
+      grid->nodes.push_back(director_tensor(std::cos(tilt) * std::cos(azimuth), std::cos(tilt) * std::sin(azimuth), std::sin(tilt), s));
+    }
+    SampledVolume volume;
+    volume.grid = grid;
+    volume.scale = c.t.fixed("scale", 1.1);
+    c.scene.sample = volume;
+    if (e_only) c.scene.ceiling = Ceiling::e_only;
     all.push_back(c);
   }
   {
