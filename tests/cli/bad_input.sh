@@ -137,6 +137,25 @@ expect_one 'animated image' bad.yaml:2:10: 'animat|frames|images|pages'
 config 's/good.tif/bad.yaml/'
 expect_one 'image that is a text' bad.yaml:2:10: 'image|format'
 
+# Director fields outside their range, or of two kinds at once.
+director() { config "s/director: {radial: {}}/director: {$1}/"; }
+director 'axial: {reduced_field: 80}'
+expect_one 'field outside the family' bad.yaml:10: 'reduced_field'
+director 'axial: {reduced_field: 5, field_v_per_um: 1}'
+expect 'field given twice' bad.yaml:10: 'reduced field and an applied'
+director 'axial: {reduced_field: 5, ring_radius: 0.9, branch: hedgehog}'
+expect_one 'ring of a hedgehog' bad.yaml:10: 'no ring_radius'
+director 'axial: {field_v_per_um: 2}'
+expect 'field without what reduces it' bad.yaml:10: 'coherence_voltage_v'
+director 'bipolar: {pole_distance: 0.5}'
+expect_one 'poles inside' bad.yaml:10: 'pole_distance'
+config 's/  droplet:/  shell:/; s/director: {radial: {}}/wall_um: 6/'
+expect_one 'wall thicker than the radius' bad.yaml:10: 'no core'
+config 's/  droplet:/  shell:/; s/director: {radial: {}}/wall_um: 1\n    core_offset_um: [0.9, 0.9, 0]/'
+expect_one 'core outside the shell' bad.yaml:11: 'leave the wall'
+config '$aphysics: {rays: eikonal}' 's/radial: {}/radial: {twist_deg: 40}/'
+expect_one 'curved rays through a twist' bad.yaml: 'without twist'
+
 config '/pixel_size_um/d'
 expect_one 'missing pixel size' bad.yaml:1:1: 'pixel_size_um'
 config 's/gain: .*/gain: {fit: auto/'
@@ -250,7 +269,7 @@ fi
 
 # ---- command line ----------------------------------------------------------------------------------------------------
 
-for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml --nonsense' 'new shell' 'new' ''; do
+for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml --nonsense' 'new teapot' 'new' ''; do
   checks=$((checks + 1))
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 2 ] && [ -s stderr.txt ] || fail "arguments: $arguments"
