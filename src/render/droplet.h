@@ -79,23 +79,16 @@ S rim_edge(const RimTable& rim, const S& ratio, const S& n_host) {
 /// The ray whose backward extension meets the mid plane at image radius rho_um < rim.rho_max() R.
 template <class S>
 DropletRay<S> trace(const DropletOptics<S>& optics, const RimTable& rim, const S& rho_um);
-/// Field of one mode at image radius rho_um in the mid plane when every mode runs on its own ray through the radial droplet:
-/// amplitude (surface transmissions and ray tube included, 0 where no ray arrives) and phase (rad, common part left out).
-template <class S>
-struct EikonalRay {
-  S amplitude, phase_rad, cos_turn;  ///< cosine of the angle between ray and view behind the droplet
-};
-/// Satiro & Moraes' cone for the extraordinary ray: in the meridional plane r sin(angle to r) is conserved and the polar angle
-/// turns n_o/n_e times as fast, so that a ray of tangential wavevector kappa = n_host sin(psi) sweeps (pi - 2 psi_0) n_o/n_e,
-/// sin psi_0 = kappa / n_e, on an optical path 2 n_o R cos psi_0; the ordinary one sweeps pi - 2 psi_0, sin psi_0 = kappa / n_o.
-template <class S>
-EikonalRay<S> eikonal_ray(const DropletOptics<S>&, bool extraordinary, const S& rho_um, double objective_na);
 /// Retarder on (p, s) = (radial, azimuthal) of the ray's frame inside, common phase left out.
 template <class S>
 Su2<S> droplet_retarder(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&);
 /// The same with the surface's transmissions at both ends.
 template <class S>
 Mat2<S> droplet_jones(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&);
+// Large, and needed by few: axial_column.cc has them, so that droplet.cc stays small enough to be inlined well.
+#define BIREFIT_EXTERN(S) extern template class AxialColumn<S>;
+BIREFIT_FOR_EACH_SCALAR(BIREFIT_EXTERN)
+#undef BIREFIT_EXTERN
 /// Calls f(column) with the medium along the ray.
 template <class S, class F>
 auto with_droplet_column(const DropletOptics<S>& o, const DropletRay<S>& r, const F& f) {

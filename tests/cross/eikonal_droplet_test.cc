@@ -8,7 +8,7 @@
 #include "birefit/fit.h"
 #include "independent_droplet.h"
 #include "reference_table.h"
-#include "render/droplet.h"
+#include "render/eikonal.h"
 #include "scene_builder.h"
 
 namespace birefit {
