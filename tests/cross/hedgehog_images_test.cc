@@ -73,7 +73,7 @@ Scene scene_of_beam_propagation(TableBuilder& b, Rays rays, int size, double dia
 
 /// Diameter, birefringence and gain of the beam-propagation image (wide-angle, 200 slices, NA 0.8, focused on the mid plane), by one ray
 /// model. Its own errors are 1 to 5 % of Maxwell's; 2 % stands for the noise.
-FitResult fit_of_beam_propagation(Rays rays) {
+FitResult fit_of_beam_propagation(Rays rays, bool choose = false) {
   const Image image = read_pfm(data_path("peers/images/droplet_n152_bpm_nz200_centreNA0.8_I45.pfm"));
   TableBuilder b;
   const Scene scene = scene_of_beam_propagation(b, rays, image.width(), 9.1, 0.21);
@@ -81,6 +81,7 @@ FitResult fit_of_beam_propagation(Rays rays) {
   const ParameterRef gain = b.linear("gain", 1), offset = b.fixed("offset", 0);
   job.micrographs.push_back(micrograph_of("bpm", scene, image.values(), gain, offset, {0.02, 0}));
   job.parameters = b.table;
+  job.options.choose_rays = choose;
   return fit(job);
 }
 
@@ -114,6 +115,24 @@ TEST(PeerHedgehog, CurvedRaysFindWhatBeamPropagationWasGiven) {
   EXPECT_LT(curved.chi_square, 0.25 * straight.chi_square);
   // The straight fit says so.
   EXPECT_TRUE(std::any_of(straight.warnings.begin(), straight.warnings.end(), [](const std::string& w) { return w.find("Curved") != std::string::npos; }));
+}
+
+// `rays: auto`: curved rays are taken where they describe the image better, and left where they do not.
+TEST(PeerHedgehog, AFitGoesOverToCurvedRaysOnlyWhereTheyAreNoWorse) {
+  const FitResult chosen = fit_of_beam_propagation(Rays::straight, true), curved = fit_of_beam_propagation(Rays::eikonal);
+  EXPECT_NEAR(find_estimate(chosen, "birefringence")->value, find_estimate(curved, "birefringence")->value, 0.01 * curved.parameters[0].stderr_);
+  TableBuilder b;
+  const Scene scene = scene_of_beam_propagation(b, Rays::straight, 128, 9, 0.22);
+  FitJob job;
+  const ParameterRef gain = b.linear("gain", 1), offset = b.fixed("offset", 0);
+  const Theta theta = b.table.values();
+  const Image image = render(scene, plan(scene, theta), theta, {}, 1).intensity;
+  job.micrographs.push_back(micrograph_of("straight", scene, image.values(), gain, offset, {0.02, 0}));
+  job.parameters = b.table;
+  job.options.choose_rays = true;
+  const FitResult straight = fit(job);
+  EXPECT_NEAR(find_estimate(straight, "birefringence")->value, 0.22, 1e-4);
+  EXPECT_FALSE(std::any_of(straight.warnings.begin(), straight.warnings.end(), [](const std::string& w) { return w.find("Curved") != std::string::npos; }));
 }
 
 }  // namespace

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <map>
 
+#include "birefit/render.h"
 #include "profiles.h"
 #include "reference_table.h"
+#include "scene_builder.h"
 
 namespace birefit {
 namespace {
@@ -144,6 +146,82 @@ TEST(HeatedPlate, ConoscopicPhaseAgrees) {
     const double slow = std::abs(phase(1.0 / 4096)) * 4096;  // absolute, to 1e-10 relative rounding
     EXPECT_NEAR(slow, std::abs(expected), 3e-6) << table.text(row, "director") << " Fo " << table.number(row, "Fo");
   }
+}
+
+// Both faces stepped from a temperature between theirs, by eigenfunctions: u = x + sum 2/(n pi) [(-1)^n + u_i (1 - (-1)^n)] exp(-n^2 pi^2 Fo)
+// sin(n pi x), u_i = (T_i - T_c)/(T_h - T_c) (Carslaw & Jaeger 3.4). 60 terms are exact to rounding for Fo > 0.01.
+TEST(HeatedPlate, StepsOfBothFacesSuperpose) {
+  for (const auto& [cold, hot, initial] : {std::array{280.0, 360.0, 300.0}, {350.0, 290.0, 320.0}, {360.0, 360.0, 280.0}})
+    for (double fourier : {0.02, 0.09, 0.11, 0.6}) {
+      const HeatProfile<double> profile{fourier, cold, hot, initial, false};
+      for (double x : {0.03, 0.3, 0.5, 0.9}) {
+        double t = cold + (hot - cold) * x;
+        for (int n = 1; n <= 60; ++n) {
+          const double sign = n % 2 ? -1 : 1;
+          t += 2 / (n * M_PI) * (sign * (hot - cold) + (initial - cold) * (1 - sign)) * std::exp(-n * n * M_PI * M_PI * fourier) * std::sin(n * M_PI * x);
+        }
+        EXPECT_NEAR(profile.at(x), t, 1e-9) << "Fo " << fourier << " x " << x;
+      }
+    }
+}
+
+// Fourier number = diffusivity time / thickness^2: 0.1 mm^2/s, 2.5 ms, 60 um make 0.0694.
+TEST(HeatedPlate, TimeAndDiffusivityMakeTheFourierNumber) {
+  TableBuilder b;
+  Scene scene;
+  Plate plate;
+  plate.thickness_um = b.fixed("thickness_um", 60);
+  plate.director.axis = {b.fixed("x", 1), b.fixed("y", 1), b.fixed("z", 1)};
+  plate.half_angle_deg = b.fixed("half_angle_deg", 10);
+  HeatStep heat;
+  heat.cold_k = b.fixed("cold_k", 280);
+  heat.hot_k = b.fixed("hot_k", 360);
+  heat.time_s = b.fixed("time_s", 2.5e-3);
+  heat.diffusivity_mm2_s = b.fixed("diffusivity_mm2_s", 0.1);
+  plate.heat = heat;
+  scene.sample = plate;
+  scene.material = E44Steinberg2020{};
+  scene.surround_index = b.fixed("index", 1.0);
+  scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 640);
+  scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+  scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+  scene.view.width = scene.view.height = 12;
+  const ParameterRef fourier = b.fixed("fourier_number", 0.1 * 2.5e-3 / (0.06 * 0.06));
+  const Theta theta = b.table.values();
+  const RenderPlan planned = plan(scene, theta);
+  const Image by_time = render(scene, planned, theta, {}, 1).intensity;
+  heat.time_s = heat.diffusivity_mm2_s = {};
+  heat.fourier_number = fourier;
+  std::get<Plate>(scene.sample).heat = heat;
+  const Image by_number = render(scene, planned, theta, {}, 1).intensity;
+  for (std::size_t i = 0; i < by_time.size(); ++i) EXPECT_NEAR(by_time.values()[i], by_number.values()[i], 1e-9);
+}
+
+// The plate of the source paper's figure 7: degrees of incidence from fringe to fringe in the middle of the picture, from the slope of
+// the phase (design note: 0.337 to 0.403, printed with three digits, +19 %).
+TEST(HeatedPlate, FringesSpreadWhileThePlateWarms) {
+  const Vec3<double> axis{-0.35355339, 0.35355339, -0.8660254};
+  const auto phase = [&](double fourier, double kx, double ky) {
+    const HeatedLaw<double> law{axis, {fourier, 278, 368, 278, true}, 800};
+    double sum = 0;
+    constexpr int kNodes = 2000;
+    for (int i = 0; i < kNodes; ++i) {
+      const OpticalPoint<double> p = law.at((i + 0.5) / kNodes);
+      const double eo = p.ordinary, de = p.extraordinary - eo, ak = axis.x * kx + axis.y * ky, kk = kx * kx + ky * ky;
+      const double a = eo + de * axis.z * axis.z, half_b = de * axis.z * ak, c = eo * kk + de * ak * ak - eo * p.extraordinary;
+      sum += ((std::sqrt(half_b * half_b - a * c) - half_b) / a - std::sqrt(eo - kk)) * 800.0 / kNodes;
+    }
+    return 2 * M_PI / 0.64 * sum;
+  };
+  const auto spacing_deg = [&](double fourier) {
+    const double h = 1e-4;
+    const double gx = (phase(fourier, h, 0) - phase(fourier, -h, 0)) / (2 * h), gy = (phase(fourier, 0, h) - phase(fourier, 0, -h)) / (2 * h);
+    return 360 / std::hypot(gx, gy);  // d kappa = d incidence in the middle
+  };
+  for (double fourier : {0.002, 0.01, 0.03, 0.1, 1.0}) std::printf("  Fo %-5g %.3f degrees\n", fourier, spacing_deg(fourier));
+  EXPECT_NEAR(spacing_deg(0.002), 0.337, 0.002);
+  EXPECT_NEAR(spacing_deg(1.0), 0.403, 0.002);
+  EXPECT_NEAR(spacing_deg(1.0) / spacing_deg(0.002), 1.19, 0.01);
 }
 
 }  // namespace
