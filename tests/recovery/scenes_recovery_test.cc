@@ -158,6 +158,44 @@ const std::vector<std::pair<std::string, void (*)(Draw&)>> kScenes = {
     {"hedgehog in a field", hedgehog_in_a_field}, {"ring in a field", ring_in_a_field}, {"shell", shell}, {"eccentric shell", eccentric_shell},
     {"bipolar droplet", bipolar},                 {"heated plate", heated_plate}};
 
+// A hedgehog and a ring at the same field, each fitted as both: the branch that made the picture has all the odds.
+TEST(BranchRecovery, TheBranchThatMadeThePictureIsReported) {
+  for (const bool ring : {false, true}) {
+    Draw d;
+    d.random.seed(5);
+    microscope(d, 48, 0.21, 5);
+    AxialDirector axial;
+    axial.reduced_field = d.b.fitted("reduced_field", 10, 9, 11);
+    axial.ring_radius = d.b.fitted("ring_radius", 0.9, 0.87, 0.93);
+    Droplet sample, hedgehog;
+    sample.diameter_um = d.b.fitted("diameter_um", 8.5, 8.3, 8.7);
+    sample.director = axial;
+    hedgehog = sample;
+    axial.ring_radius = {};
+    hedgehog.director = axial;
+    d.scene.material = ConstantIndices{d.b.fixed("ordinary", 1.52), d.b.fixed("birefringence", 0.22)};
+    d.scene.surround_index = d.b.fixed("surround", 1.5);
+    d.scene.sample = ring ? sample : hedgehog;
+    const Theta truth = d.b.table.values();
+    std::vector<double> counts;
+    std::normal_distribution<double> noise(0, kNoise);
+    const Image exact = render(d.scene, plan(d.scene, truth), truth, {}, 2).intensity;
+    for (double value : exact.values()) counts.push_back(kGain * value + noise(d.random));
+    FitJob job;
+    const ParameterRef gain = d.b.linear("gain", 900), offset = d.b.linear("offset", 5);
+    job.micrographs.push_back(micrograph_of("branch", d.scene, counts, gain, offset, {kNoise, 0}));
+    job.parameters = d.b.table;
+    job.branches = {{"hedgehog", {hedgehog}, {d.b.table.find("ring_radius").index}}, {"ring", {sample}, {}}};
+    const FitResult r = fit(job);
+    EXPECT_TRUE(r.has_answer()) << r.verdict;
+    ASSERT_EQ(r.branches.size(), 2u);
+    EXPECT_EQ(r.branches[0].reported, !ring);
+    EXPECT_EQ(r.branches[1].reported, ring);
+    EXPECT_LT(r.branches[ring ? 0 : 1].odds, 1e-6);
+    EXPECT_LT(std::abs(find_estimate(r, "reduced_field")->value - 10), 5 * find_estimate(r, "reduced_field")->stderr_);
+  }
+}
+
 class ScenesRecovery : public ::testing::TestWithParam<std::size_t> {};
 class LongScenesRecovery : public ScenesRecovery {};
 
