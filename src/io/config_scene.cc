@@ -137,7 +137,7 @@ UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
   return director;
 }
 
-/// Under a field along the view: the reduced field, or the applied one with the two numbers that reduce it.
+/// The reduced field, or the applied one with the two numbers that reduce it.
 AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
   AxialDirector axial;
   const Block block = reader.block(parent, "axial", {"reduced_field", "field_v_per_um", "coherence_voltage_v", "local_field_factor", "ring_radius", "branch", "field_azimuth_deg"}, true);
@@ -670,8 +670,8 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
     const std::string which = reader.choice(physics, "rays", {"straight", "eikonal", "auto"}).value_or("straight");
     scene.rays = which == "eikonal" ? Rays::eikonal : Rays::straight;
     reader.choose_rays = which == "auto";  // what a fit does without the key, too
-    if (which != "straight" && (!radial || radial->twist_deg))
-      reader.problems.add(rays->where, "rays: " + which + " is for radial droplets without twist", "use straight");
+    if (which == "eikonal" && (!radial || radial->twist_deg))
+      reader.problems.add(rays->where, "rays: eikonal is for radial droplets without twist", "use straight or auto");
   }
   const YamlNode* ceiling = physics.find("ceiling");
   const Slab* slab = std::get_if<Slab>(&scene.sample);

@@ -271,7 +271,11 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   if (scene.ceiling == Ceiling::reflections)
     throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
-  if (!looks_round(std::get<Droplet>(scene.sample))) return plan_ball(scene, value);
+  const Droplet& droplet = std::get<Droplet>(scene.sample);
+  const auto* radial = std::get_if<RadialDirector>(&droplet.director);
+  if (scene.rays == Rays::eikonal && (!radial || radial->twist_deg))
+    throw UserError(Where{}, "physics.rays: eikonal knows the radial droplet only", "use straight");
+  if (!looks_round(droplet)) return plan_ball(scene, value);
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
   const bool twisted = o.coupled(), axial = o.axial != nullptr, shell = o.director == DropletOptics<double>::Director::shell;
@@ -296,11 +300,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
                                      pilots.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
-  if (scene.rays == Rays::eikonal) {
-    if (o.coupled() || axial || shell)
-      throw UserError(Where{}, "physics.rays: eikonal knows the radial droplet only", "use straight");
-    plan.reasons.push_back("each mode on its own curved ray, in closed form: the method above is not used");
-  }
+  if (scene.rays == Rays::eikonal) plan.reasons.push_back("each mode on its own curved ray, in closed form: the method above is not used");
   if (shell)
     plan.reasons.push_back("retardance has a kink at the core's edge, which no table over the radius follows: one ray a point");
   else

@@ -107,6 +107,9 @@ TEST(PeerHedgehog, CurvedRaysAreFourTimesNearerToBeamPropagation) {
 TEST(PeerHedgehog, CurvedRaysFindWhatBeamPropagationWasGiven) {
   const FitResult straight = fit_of_beam_propagation(Rays::straight), curved = fit_of_beam_propagation(Rays::eikonal);
   const auto off = [](const FitResult& r, const char* name, double truth) { return find_estimate(r, name)->value / truth - 1; };
+  for (const auto& [name, r] : {std::pair{"straight", &straight}, {"curved", &curved}})
+    std::printf("  %s rays: diameter %.3f um, birefringence %.4f, gain %.3f, reduced chi-square %.2f\n", name, find_estimate(*r, "diameter_um")->value,
+                find_estimate(*r, "birefringence")->value, find_estimate(*r, "gain")->value, r->reduced_chi_square);
   EXPECT_LT(off(straight, "birefringence", 0.22), -0.05);
   // Diffraction remains, and 1 to 5 % of the image's own errors.
   EXPECT_NEAR(off(curved, "birefringence", 0.22), 0, 0.005);
