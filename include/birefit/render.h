@@ -4,6 +4,7 @@
 #include <array>
 #include <complex>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,10 +15,12 @@
 
 namespace birefit {
 
+struct WavePlan;  // grids of wave optics, render/wave.h
+
 /// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth.
 struct RenderPlan {
   std::string method;               ///< transport method by name
-  std::string physics;              ///< "one_way" or "e_only"
+  std::string physics;              ///< the ceiling's name
   std::vector<std::string> reasons; ///< one sentence for every rung: why it stopped or went on
   double numerical_error = 0;       ///< expected, intensity fraction of the incident
   double model_error = 0;           ///< of what the ceiling leaves out, same unit
@@ -40,6 +43,7 @@ struct RenderPlan {
   std::vector<int> samples;
   double sampling_bin_px = 1;
   double sampling_center_x_px = 0, sampling_center_y_px = 0;
+  std::shared_ptr<const WavePlan> wave;  ///< set: the whole picture at once by wave optics, and nothing of the above but the words
 };
 
 /// Rays that the kernels carry side by side: doubles in a SIMD register of the machine they were compiled for.

@@ -269,7 +269,8 @@ struct Microscope {
   ParameterRef compensator_phase_deg, compensator_azimuth_deg;
   double bandwidth_nm = 0;   ///< FWHM, 0 = not stated; modelled by discs (a Gaussian), else it enters the model error
   double condenser_na = 0;   ///< 0 = not stated; not modelled: enters the model error
-  double objective_na = 0;   ///< 0 = not stated. Droplet rays leaving steeper than this are lost.
+  double objective_na = 0;   ///< 0 = not stated. Waves: the objective's band limit; droplet rays leaving steeper than this are lost.
+  ParameterRef focus_um;     ///< focal plane, from the middle of the sample along the light; not given: 0. Ceiling::wave only
   bool aplanatic = false;    ///< imaging: focal_plane (default) or aplanatic, docs/conventions.md
   std::vector<Direction> directions;  ///< slab scenes
   bool quarter_wave = false;  ///< circular polariscope: quarter-wave plates at 45 degrees from the polarizer, crossed; discs
@@ -289,6 +290,7 @@ enum class Ceiling {
   one_way,  ///< E and H continuous, backward waves dropped (default)
   e_only,   ///< only tangential E continuous: the source paper's
   reflections,  ///< all of Maxwell's equations in the layers, both faces included; cells and slabs
+  wave,     ///< wave optics, reflections left out: droplets and shells. Needs Microscope::objective_na
 };
 
 /// How light runs through a droplet: both modes on the refracted straight chord, or each on its own ray (geometrical optics of

@@ -11,6 +11,22 @@
 
 namespace birefit {
 
+/// The hedgehog, turned about the light's axis by twist (1 - r): RadialDirector.
+template <class S>
+struct RadialField {
+  bool twisted;
+  S twist_rad;
+  template <class T>
+  Vec3<T> at(const Vec3<T>& r) const {
+    const T square = r.x * r.x + r.y * r.y + r.z * r.z + 1e-18, inverse_r = inverse_root(square);
+    const Vec3<T> n{inverse_r * r.x, inverse_r * r.y, inverse_r * r.z};
+    if (!twisted) return n;
+    T s, c;
+    sin_cos(T(twist_rad) * (1.0 - square * inverse_r), s, c);
+    return {c * n.x - s * n.y, s * n.x + c * n.y, n.z};
+  }
+};
+
 /// Tangential anchoring, poles at +-pole_distance on `axis`: along the circles through both poles (Williams, J. Phys. A 19, 3211
 /// (1986)). Pole distance 1: boojums on the surface; far away: uniform. Not a solution of the elastic equations.
 template <class S>

@@ -1,0 +1,125 @@
+#include "render/wave.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "medium/build.h"
+#include "render/ball.h"
+
+namespace birefit {
+namespace {
+
+template <class S>
+SphereOptics<S> sphere_optics(const Scene& scene, const Values<S>& value) {
+  const Droplet& droplet = std::get<Droplet>(scene.sample);
+  SphereOptics<S> o;
+  const auto take = [&](const DropletOptics<S>& d) { o.radius_um = d.radius_um, o.n_o = d.n_o, o.n_e = d.n_e, o.n_host = d.n_host; };
+  if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) {
+    take(droplet_optics(scene, value));
+    o.field = RadialField<S>{static_cast<bool>(radial->twist_deg), value.radians(radial->twist_deg)};
+    return o;
+  }
+  if (const auto* axial = std::get_if<AxialDirector>(&droplet.director); axial && !axial->field_azimuth_deg) {
+    const DropletOptics<S> d = droplet_optics(scene, value);
+    take(d);
+    o.field = TiltedAxialField<S>{{S(0.0), S(0.0), S(1.0)}, d.axial};
+    return o;
+  }
+  if (const auto* shell = std::get_if<ShellDirector>(&droplet.director)) {
+    o.has_core = true;
+    const DropletOptics<S> d = droplet_optics(scene, value);
+    o.core_um = d.radius_um - value(shell->wall_um);
+    o.core_index = shell->core_index ? value(shell->core_index) : d.n_host;
+    if (!shell->offset_um[0]) {
+      take(d);
+      o.field = RadialField<S>{false, S(0.0)};
+      return o;
+    }
+  }
+  const BallOptics<S> ball = ball_optics(scene, value);
+  take(ball.sphere);
+  std::visit([&](const auto& field) { o.field = field; }, ball.field);
+  if (const auto* nested = std::get_if<NestedField<S>>(&ball.field))
+    o.core_offset_um = {o.radius_um * nested->offset.x, o.radius_um * nested->offset.y, o.radius_um * nested->offset.z};
+  return o;
+}
+
+}  // namespace
+
+RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
+  if (!std::holds_alternative<Droplet>(scene.sample))
+    throw UserError(Where{}, "ceiling: wave is for droplets and shells", "use one_way or, for cells and slabs, reflections");
+  const SphereOptics<double> o = sphere_optics(scene, value);
+  const double na = scene.microscope.objective_na;
+  if (!(na > 0))
+    throw UserError(Where{}, "ceiling: wave needs microscope.objective_na", "the number engraved on the objective; without it use ceiling: one_way");
+  if (na > o.n_host)
+    throw UserError(Where{}, fmt::format("microscope.objective_na {:g} is above the surround's index {:g}: no light leaves it so steeply", na, o.n_host),
+                    "check objective_na and sample.surround");
+  const double k0 = wavenumber_per_um(scene, value), wavelength = 2 * std::numbers::pi / k0;
+  auto wave = std::make_shared<WavePlan>();
+  wave->radius_um = o.radius_um;
+  WaveGrid& g = wave->grid;
+  // Measured against the exact series (docs/methods.md, "Waves"): steps of a third of the wavelength, slabs of half of it and a margin of
+  // host that grows with the aperture leave 0.01 to 0.03 of the image's RMS, of which a third is discretisation.
+  const double margin = 1.5 + 3 * na, step = 0.339 * wavelength, slab = 0.53 * wavelength;
+  const double box = 2 * (o.radius_um + margin);
+  const double points = box / step;
+  if (points > 2000)
+    throw UserError(Where{}, fmt::format("wave optics of a sphere of {:.3g} um would need {:.0f} x {:.0f} points in {:.0f} slabs, about {:.1f} GB and {:.0f} min an image",
+                                         2 * o.radius_um, points, points, 2 * o.radius_um / slab, points * points * 4e-7, points * points * o.radius_um / slab * 3e-6 / 60),
+                    "use ceiling: one_way, which becomes better with size only for weak birefringence, or check diameter_um");
+  g.nx = g.ny = fast_fft_size(static_cast<int>(std::ceil(points)));
+  g.step_um = box / g.nx;
+  wave->ramp_um = g.step_um;
+  // 5 % more: the diameter may be fitted.
+  g.exit_um = 1.05 * o.radius_um + g.step_um;
+  g.entry_um = -g.exit_um;
+  g.slabs = 2 * static_cast<int>(std::ceil((g.exit_um - g.entry_um) / slab / 2));
+  g.layers = 4;
+  g.n_ref = o.n_host;
+  g.cut_per_um = std::min({1.2, 0.5 * (na + o.n_host) + 0.2, 0.97 * o.n_host}) * k0;
+  g.frame_um = 0.4 * margin;
+  const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px), px = scene.view.pixel_size_um;
+  const double reach_x = px * (std::max(std::abs(cx), std::abs(scene.view.width - 1 - cx)) + 1), reach_y = px * (std::max(std::abs(cy), std::abs(scene.view.height - 1 - cy)) + 1);
+  wave->imaging = plan_imaging(g, k0, na, reach_x, reach_y);
+  RenderPlan plan;
+  plan.method = "split_step";
+  plan.physics = "wave";
+  plan.steps = g.slabs;
+  plan.reasons.push_back(fmt::format("the sphere is {:.3g} wavelengths across: rays of any kind are not its image", 2 * o.radius_um * o.n_host / wavelength));
+  plan.reasons.push_back(fmt::format("one-way wave optics on {} x {} points {:.3g} um apart, {} slabs of {:.3g} um, {} layers of the medium each", g.nx, g.ny, g.step_um,
+                                     g.slabs, (g.exit_um - g.entry_um) / g.slabs, g.layers));
+  plan.numerical_error = 0.01;
+  plan.model_error = 0.005 + 0.03 * na * na;
+  plan.reasons.push_back("errors are relative RMS of the image under ceiling: wave; what is left out are reflections and the third order in the wave's slope");
+  plan.cost_seconds = static_cast<double>(g.nx) * g.ny * g.slabs * 2.5e-7;
+  plan.wave = std::move(wave);
+  return plan;
+}
+
+template <class S>
+void render_wave(const Scene& scene, const WavePlan& plan, const Values<S>& value, int threads, const std::vector<Image*>& images) {
+  const SphereMedium<S> medium(sphere_optics(scene, value), plan.ramp_um);
+  const Polarizers<S> p = polarizers(scene, value);
+  const WaveLight<S> light{wavenumber_per_um(scene, value), host_index(scene, value), p.px, p.py};
+  WaveMicroscope<S> m;
+  m.objective_na = scene.microscope.objective_na;
+  m.aplanatic = scene.microscope.aplanatic;
+  m.focus_um = value.get(scene.microscope.focus_um, 0.0);
+  m.ax = p.ax, m.ay = p.ay;
+  m.center_x_px = value(scene.view.center_x_px), m.center_y_px = value(scene.view.center_y_px);
+  m.pixel_um = scene.view.pixel_size_um;
+  m.width = scene.view.width, m.height = scene.view.height;
+  form_image(plan.grid, plan.imaging, light, m, propagate(plan.grid, light, medium, threads), threads, images);
+}
+
+#define BIREFIT_INSTANTIATE(S) template void render_wave<S>(const Scene&, const WavePlan&, const Values<S>&, int, const std::vector<Image*>&);
+BIREFIT_INSTANTIATE(Pack)
+BIREFIT_INSTANTIATE(Dual1)
+BIREFIT_INSTANTIATE(Dual2)
+BIREFIT_INSTANTIATE(Dual4)
+
+}  // namespace birefit

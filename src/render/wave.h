@@ -1,0 +1,25 @@
+#pragma once
+// Pictures by wave optics: droplets and shells, Ceiling::wave.
+
+#include "render/pixel_model.h"
+#include "wave/imaging.h"
+#include "wave/sphere.h"
+
+namespace birefit {
+
+struct WavePlan {
+  WaveGrid grid;
+  WaveImaging imaging;
+  double radius_um = 0;  ///< of the sphere it was made for
+  double ramp_um = 0;    ///< of its surfaces
+};
+
+/// The plan of one picture. Throws UserError when the scene is no sphere, the numerical aperture is missing or above the host's index,
+/// or the propagation would need more memory than there should be.
+RenderPlan plan_wave(const Scene& scene, const Values<double>& value);
+
+/// The whole picture and its derivatives: 1 + derivatives images. S = Pack or a dual of packs.
+template <class S>
+void render_wave(const Scene& scene, const WavePlan& plan, const Values<S>& value, int threads, const std::vector<Image*>& images);
+
+}  // namespace birefit

@@ -1,0 +1,453 @@
+#include "wave/split_step.h"
+
+#include <algorithm>
+#include <array>
+#include <barrier>
+#include <cmath>
+#include <numbers>
+
+#include "core/threads.h"
+#include "transport/method.h"
+
+namespace birefit {
+namespace {
+
+using Z = std::complex<double>;
+
+// One slab of thickness h takes the field through
+//   a <- D^(1/2) S D^(1/2) exp(i h k0 V') a,
+// D free propagation in n_ref, S the screen: the ordered product over thin layers of exp(i k0 dz (N - n_ref)), N the exact 2 x 2
+// operator of normal incidence (N_e along the transverse director t, N_o along s), and V' what transverse wavevectors
+// kappa = k / k0 add to the second order:
+//   V' a = -1/2 [kappa (v . a) + v (kappa . a)] - 1/2 kappa (sd (kappa . a)) - 1/2 kappa' (sc (kappa' . a)) + kappa_i (D_ij (kappa_j a)).
+// It follows from the Riccati equation of the one-way Maxwell system, h = Y e; the order of wavevector and coefficient counts. v walks
+// extraordinary light off sideways; sd, sc and D are what diffraction in the medium has beyond that in n_ref.
+
+/// Of a slab at one point, h and k0 taken in: h v, (h / k0) of the others; the screen is the product over the layers.
+template <class S>
+struct SlabPoint {
+  Complex<S> screen[2][2];
+  S v[2];
+  S sd, sc;
+  S d[3][3];  ///< D_ij^ab: ij, ab = xx, xy, yy
+};
+constexpr int kScreen = 0, kWalk = 8, kSd = 10, kSc = 11, kD = 12, kQuantities = 21;
+
+template <class S>
+void clear(SlabPoint<S>& p) {
+  p.screen[0][0] = p.screen[1][1] = Complex<S>(S(1.0));
+  p.screen[0][1] = p.screen[1][0] = Complex<S>();
+  p.v[0] = p.v[1] = p.sd = p.sc = S(0.0);
+  for (auto& row : p.d)
+    for (S& x : row) x = S(0.0);
+}
+
+/// One more layer behind those in p.
+template <class S>
+void add_layer(SlabPoint<S>& p, const OpticalPoint<S>& medium, const S& k0, double n_ref, double thickness) {
+  const S eo = medium.ordinary, de = medium.extraordinary - eo;
+  const Vec3<S>& n = medium.axis;
+  const S t2 = n.x * n.x + n.y * n.y, eta = inverse(S(eo + de * n.z * n.z));
+  const S no = root(eo), ne = root(eo * medium.extraordinary * eta), sum = no + ne, over = inverse(sum);
+  const S g = eo * de * eta * over;  // (ne - no) / t2, finite for an axis along z
+  // exp(i k0 dz (N - n_ref)) = exp(i mean) (cos + i sin (2 t t^T - 1)), N = no + g n_t n_t^T.
+  const S phase = k0 * thickness, half = 0.5 * phase * g;
+  const CosSinc<S> turn = cos_sinc_sq(S(square(half * t2)));
+  S sm, cm;
+  sin_cos(phase * (0.5 * sum - n_ref), sm, cm);
+  const S s = half * turn.sinc_sq, along = s * (n.x * n.x - n.y * n.y), across = 2.0 * s * n.x * n.y;
+  // i along on the diagonal (+, -), i across off it, cos on both; times exp(i mean).
+  const Complex<S> a{cm * turn.cos_sq - sm * along, sm * turn.cos_sq + cm * along}, d{cm * turn.cos_sq + sm * along, sm * turn.cos_sq - cm * along};
+  const Complex<S> b{S(0.0) - sm * across, cm * across};
+  for (int c = 0; c < 2; ++c) {
+    const Complex<S> top = p.screen[0][c], bottom = p.screen[1][c];
+    p.screen[0][c] = a * top + b * bottom;
+    p.screen[1][c] = b * top + d * bottom;
+  }
+  const S walk = thickness * de * n.z * eta;
+  p.v[0] = p.v[0] + walk * n.x;
+  p.v[1] = p.v[1] + walk * n.y;
+  const S scale = inverse(k0) * thickness, mean = 0.5 * sum, over_mean = 2.0 * over;
+  p.sd = p.sd + scale * (eta * mean - 1.0 / n_ref);
+  p.sc = p.sc + scale * (over_mean - 1.0 / n_ref);
+  const S w = de * n.z * eta, w2 = w * w * t2, c = no * over, w2c = w2 * c, w2c2 = w2c * c, inverse_ne = inverse(ne), inverse_no = inverse(no);
+  // Per kt^2 on (tt, ss), per ks^2, and per kt ks on ts: S less the parts of sd and sc.
+  const S tt_tt = 0.25 * eta * (no - ne), tt_ss = 0.5 * (over_mean - inverse_no);
+  const S ss_tt = 0.5 * (over_mean - inverse_ne) + (w2c2 - 2.0 * w2c) * 0.5 * inverse_ne, ss_ss = 0.25 * eta * (ne - no) + 0.5 * w2c2 * inverse_no;
+  const S ts_ts = (1.0 + eta * ne * no + w2c) * over - eta * root(ne * no) + 0.5 * (eta * mean - over_mean);
+  const S inverse_t2 = inverse(S(t2 + 1e-24));
+  const S t[3] = {n.x * n.x * inverse_t2, n.x * n.y * inverse_t2, n.y * n.y * inverse_t2};  // t t^T
+  const S o[3] = {t[2], S(0.0) - t[1], t[0]};                                               // s s^T
+  const S m[3] = {S(0.0) - 2.0 * t[1], t[0] - t[2], 2.0 * t[1]};                            // t s^T + s t^T
+  for (int ij = 0; ij < 3; ++ij) {
+    const S on_t = scale * (tt_tt * t[ij] + ss_tt * o[ij]), on_s = scale * (tt_ss * t[ij] + ss_ss * o[ij]), mixed = 0.5 * scale * ts_ts * m[ij];
+    for (int ab = 0; ab < 3; ++ab) p.d[ij][ab] = p.d[ij][ab] + on_t * t[ab] + on_s * o[ab] + mixed * m[ab];
+  }
+}
+
+/// The walk of a worker through work that all share: phases end at a barrier.
+struct Crew {
+  std::barrier<>& barrier;
+  int worker, workers;
+  template <class F>
+  void each(int n, const F& f) const {
+    for (int i = worker; i < n; i += workers) f(i);
+    barrier.arrive_and_wait();
+  }
+};
+
+template <class S>
+class Propagation {
+ public:
+  static constexpr int kFields = 1 + ScalarTraits<S>::derivatives;
+  Propagation(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium)
+      : g_(grid), light_(light), medium_(medium), fft_(grid.nx, grid.ny), n_(fft_.size()), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
+    for (auto& field : fields_)
+      for (Plane* plane : {&field.a[0], &field.a[1], &field.term[0], &field.term[1]}) plane->resize(n_);
+    for (auto& field : fields_)
+      for (Plane& plane : field.work) plane.resize(n_);
+    table_.resize(n_ * kQuantities * kFields);
+    const auto wavenumbers = [&](int n, double tilt) {
+      std::vector<double> k(static_cast<std::size_t>(n));
+      for (int m = 0; m < n; ++m) k[static_cast<std::size_t>(m)] = tilt + (n == 1 ? 0.0 : 2 * std::numbers::pi / (n * g_.step_um) * (m < n - m ? m : m - n));
+      return k;
+    };
+    kx_ = wavenumbers(g_.nx, light.kx_per_um);
+    ky_ = wavenumbers(g_.ny, light.ky_per_um);
+    const double k0 = first(light.k0_per_um);
+    half_step_.resize(n_);
+    half_step_slope_.resize(n_);
+    const double kn = k0 * g_.n_ref;
+    for (std::size_t i = 0; i < n_; ++i) {
+      const double k2 = square(kx_[i % kx_.size()]) + square(ky_[i / kx_.size()]);
+      if (k2 > square(g_.cut_per_um)) continue;  // zero: cut
+      const double q = std::sqrt(kn * kn - k2), phase = 0.5 * h_ * (q - kn);
+      half_step_[i] = std::polar(1.0, phase);
+      half_step_slope_[i] = 0.5 * h_ * (k0 * square(g_.n_ref) / q - g_.n_ref);
+    }
+    frame_x_ = frame(g_.nx), frame_y_ = frame(g_.ny);
+    incident_[0] = Complex<S>(light.ex), incident_[1] = Complex<S>(light.ey);
+    const S kh = light.k0_per_um * light.n_host;
+    tilt2_ = square(light.kx_per_um) + square(light.ky_per_um);
+    host_q_ = root(kh * kh - tilt2_) * inverse(light.k0_per_um);
+    // a = Y^(1/2) e, in units of n_host^(1/2): q / n_host for s, its inverse for p.
+    to_flux(incident_, true);
+    host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
+    clear(host_slab_);
+    for (int l = 0; l < g_.layers; ++l) add_layer(host_slab_, host_, light.k0_per_um, g_.n_ref, h_ / g_.layers);
+    for (int a = 0; a < 2; ++a)
+      for (int f = 0; f < kFields; ++f) {
+        std::fill(fields_[f].a[a].begin(), fields_[f].a[a].end(), Z(0));
+        fields_[f].a[a][0] = part(incident_[a], f) * static_cast<double>(n_);  // of the transform
+      }
+  }
+
+  std::vector<WaveField> run(int threads) {
+    std::barrier barrier(threads);
+    parallel_for(threads, threads, [&](int t) {
+      const Crew crew{barrier, t, threads};
+      for (int slab = 0; slab < g_.slabs; ++slab) {
+        const double from = g_.entry_um + slab * h_;
+        crew.each(g_.ny, [&](int row) { sample_row(from, row); });
+        // The oblique terms before the screen in one slab, behind it in the next: symmetric over two, so of second order.
+        const bool before = slab % 2 == 0;
+        for (int order = 1; before && order <= g_.order; ++order) oblique(crew, order);
+        pass_screen(crew, before);
+        for (int order = 1; !before && order <= g_.order; ++order) oblique(crew, order);
+        if (t == 0) pass_incident(before);
+      }
+      crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+    });
+    return scattered();
+  }
+
+ private:
+  struct Field {
+    Plane a[2];      ///< spectrum
+    Plane term[2];   ///< of the Taylor series
+    Plane work[6];
+  };
+
+  static double first(const S& x) { return lane(plain(x), 0); }
+  /// Value (f = 0) or derivative f - 1.
+  static double part(const S& x, int f) {
+    if constexpr (kFields > 1)
+      if (f > 0) return lane(x.d[static_cast<std::size_t>(f - 1)], 0);
+    (void)f;
+    return first(x);
+  }
+  static Z part(const Complex<S>& x, int f) { return {part(x.re, f), part(x.im, f)}; }
+  static const PlainOf<S>& lanes(const S& x, int f) {
+    if constexpr (kFields > 1) {
+      return f == 0 ? x.value : x.d[static_cast<std::size_t>(f - 1)];
+    } else {
+      return x;
+    }
+  }
+  /// The tilted wave's s and p in flux units, or back.
+  void to_flux(Complex<S>* e, bool there) const {
+    if (tilt2_ == 0) return;
+    const double f = 1 / std::sqrt(tilt2_);
+    const S px(f * light_.kx_per_um), py(f * light_.ky_per_um);
+    const S ratio = host_q_ * inverse(light_.n_host), s_up = root(ratio), p_up = inverse(s_up);
+    const Complex<S> p = px * e[0] + py * e[1], s = px * e[1] - py * e[0];
+    const Complex<S> p2 = (there ? p_up : s_up) * p, s2 = (there ? s_up : p_up) * s;
+    e[0] = px * p2 - py * s2;
+    e[1] = py * p2 + px * s2;
+  }
+  /// Attenuation of the scattered field in one slab.
+  std::vector<double> frame(int n) const {
+    std::vector<double> r(static_cast<std::size_t>(n), 1.0);
+    if (g_.frame_um <= 0 || n == 1) return r;
+    for (int i = 0; i < n; ++i) {
+      const double edge = 0.5 * n * g_.step_um, x = std::abs((i + 0.5 - 0.5 * n) * g_.step_um), inside = (x - (edge - g_.frame_um)) / g_.frame_um;
+      if (inside > 0) r[static_cast<std::size_t>(i)] = std::exp(-kAbsorption * h_ * square(inside));
+    }
+    return r;
+  }
+  static constexpr double kAbsorption = 1.5;  ///< 1/um at the outer edge: strong enough over a frame, weak enough not to reflect
+
+  double* table(int quantity, int field) { return table_.data() + (static_cast<std::size_t>(quantity) * kFields + static_cast<std::size_t>(field)) * n_; }
+  const double* table(int quantity, int field) const { return const_cast<Propagation*>(this)->table(quantity, field); }
+
+  void sample_row(double from_um, int row) {
+    alignas(64) double x[kLanes];
+    const double dz = h_ / g_.layers;
+    for (int i = 0; i < g_.nx; i += kLanes) {
+      const int count = std::min(kLanes, g_.nx - i);
+      for (int k = 0; k < kLanes; ++k) x[k] = g_.x_um(i + std::min(k, count - 1));
+      const Pack place = Pack::load_aligned(x);
+      const std::size_t to = static_cast<std::size_t>(row) * static_cast<std::size_t>(g_.nx) + static_cast<std::size_t>(i);
+      SlabPoint<S> p;
+      clear(p);
+      bool host = true;
+      for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz);
+      if (host) {
+        store(host_slab_, to, count);
+        continue;
+      }
+      for (int l = 0; l < g_.layers; ++l) add_layer(p, medium_.at(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz), light_.k0_per_um, g_.n_ref, dz);
+      store(p, to, count);
+    }
+  }
+  void store(const SlabPoint<S>& p, std::size_t to, int count) {
+    const auto put = [&](int quantity, const S& x) {
+      for (int f = 0; f < kFields; ++f) {
+        double* out = table(quantity, f) + to;
+        if (count == kLanes) {
+          lanes(x, f).store_unaligned(out);
+        } else {
+          for (int k = 0; k < count; ++k) out[k] = lanes(x, f).get(static_cast<std::size_t>(k));
+        }
+      }
+    };
+    for (int a = 0; a < 2; ++a)
+      for (int b = 0; b < 2; ++b) {
+        put(kScreen + 4 * a + 2 * b, p.screen[a][b].re);
+        put(kScreen + 4 * a + 2 * b + 1, p.screen[a][b].im);
+      }
+    put(kWalk, p.v[0]), put(kWalk + 1, p.v[1]), put(kSd, p.sd), put(kSc, p.sc);
+    for (int ij = 0; ij < 3; ++ij)
+      for (int ab = 0; ab < 3; ++ab) put(kD + 3 * ij + ab, p.d[ij][ab]);
+  }
+
+  /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the coefficients of plane f: adds what
+  /// stays as it is (out 0, 1) and what kx, ky will be applied to (out 2 .. 5, the same order).
+  struct Coefficients {
+    const double* c[kQuantities - kWalk];
+    double operator()(int quantity, std::size_t i) const { return c[quantity - kWalk][i]; }
+  };
+  BIREFIT_INLINE static void oblique_at(const Coefficients& c, std::size_t i, const Z* in, Z* out) {
+    const Z div = in[2] + in[5], curl = in[3] - in[4];  // kappa . a, kappa' . a
+    const double vx = -0.5 * c(kWalk, i), vy = -0.5 * c(kWalk + 1, i);
+    out[0] += vx * div;
+    out[1] += vy * div;
+    const Z walked = vx * in[0] + vy * in[1] - (0.5 * c(kSd, i)) * div, turned = (-0.5 * c(kSc, i)) * curl;
+    const auto d = [&](int ij, int ab) { return c(kD + 3 * ij + ab, i); };
+    out[2] += walked + d(0, 0) * in[2] + d(1, 0) * in[3] + d(0, 1) * in[4] + d(1, 1) * in[5];
+    out[3] += turned + d(1, 0) * in[2] + d(2, 0) * in[3] + d(1, 1) * in[4] + d(2, 1) * in[5];
+    out[4] += -turned + d(0, 1) * in[2] + d(1, 1) * in[3] + d(0, 2) * in[4] + d(1, 2) * in[5];
+    out[5] += walked + d(1, 1) * in[2] + d(2, 1) * in[3] + d(1, 2) * in[4] + d(2, 2) * in[5];
+  }
+
+  /// term <- (i / order) V' term (of order 1: of a itself), a <- a + term.
+  void oblique(const Crew& crew, int order) {
+    const std::size_t nx = static_cast<std::size_t>(g_.nx);
+    crew.each(6 * kFields, [&](int job) {
+      Field& field = fields_[static_cast<std::size_t>(job / 6)];
+      const int which = job % 6;
+      const int component = which < 2 ? which : (which - 2) / 2;
+      const Plane& from = order == 1 ? field.a[component] : field.term[component];
+      Plane& to = field.work[which];
+      for (std::size_t i = 0; i < n_; ++i) to[i] = which < 2 ? from[i] : (which % 2 == 0 ? kx_[i % nx] : ky_[i / nx]) * from[i];
+      fft_.inverse(to);
+    });
+    crew.each(g_.ny, [&](int row) {
+      Coefficients c[kFields];
+      for (int f = 0; f < kFields; ++f)
+        for (int q = kWalk; q < kQuantities; ++q) c[f].c[q - kWalk] = table(q, f);
+      for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
+        Z in[6];
+        for (int q = 0; q < 6; ++q) in[q] = fields_[0].work[q][i];
+        for (int f = kFields - 1; f >= 0; --f) {
+          Z own[6], out[6] = {};
+          for (int q = 0; q < 6; ++q) own[q] = fields_[static_cast<std::size_t>(f)].work[q][i];
+          oblique_at(c[0], i, own, out);
+          if (f > 0) oblique_at(c[f], i, in, out);
+          for (int q = 0; q < 6; ++q) fields_[static_cast<std::size_t>(f)].work[q][i] = out[q];
+        }
+      }
+    });
+    crew.each(6 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]); });
+    const Z factor(0, 1.0 / (order * static_cast<double>(n_)));
+    crew.each(g_.ny, [&](int row) {
+      for (Field& field : fields_)
+        for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
+          const bool kept = half_step_[i] != Z(0);
+          const double kx = kx_[i % nx], ky = ky_[i / nx];
+          for (int a = 0; a < 2; ++a) {
+            const Z v = field.work[a][i] + kx * field.work[2 + 2 * a][i] + ky * field.work[3 + 2 * a][i];
+            const Z t = kept ? Z(-factor.imag() * v.imag(), factor.imag() * v.real()) : Z(0);
+            field.term[a][i] = t;
+            field.a[a][i] += t;
+          }
+        }
+    });
+  }
+
+  BIREFIT_INLINE static Z times(const Z& a, const Z& b) {  // without the library's care for infinities
+    return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+  }
+
+  /// exp(i phase) over half a slab, with the derivative by the wavenumber.
+  void diffract(int f, int a) {
+    Plane& to = fields_[static_cast<std::size_t>(f)].a[a];
+    for (std::size_t i = 0; i < n_; ++i) to[i] = times(half_step_[i], to[i]);
+    const double by_k0 = part(light_.k0_per_um, f);
+    if (f == 0 || by_k0 == 0) return;
+    const Plane& base = fields_[0].a[a];  // diffracted before: d exp(i phase) a = i dphase (exp(i phase) a)
+    for (std::size_t i = 0; i < n_; ++i) to[i] += by_k0 * half_step_slope_[i] * Z(-base[i].imag(), base[i].real());
+  }
+
+  void pass_screen(const Crew& crew, bool oblique_before) {
+    const std::size_t nx = static_cast<std::size_t>(g_.nx);
+    const auto half_way = [&] {
+      crew.each(2, [&](int a) { diffract(0, a); });
+      if (kFields > 1) crew.each(2 * (kFields - 1), [&](int job) { diffract(1 + job / 2, job % 2); });
+    };
+    half_way();
+    crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+    Z inc[kFields][2];
+    Complex<S> at_screen[2] = {incident_[0], incident_[1]};
+    if (oblique_before) incident_oblique(at_screen);
+    incident_half_step(at_screen);
+    Complex<S> behind[2];
+    for (int a = 0; a < 2; ++a) behind[a] = host_slab_.screen[a][0] * at_screen[0] + host_slab_.screen[a][1] * at_screen[1];
+    for (int f = 0; f < kFields; ++f)
+      for (int a = 0; a < 2; ++a) inc[f][a] = part(behind[a], f);
+    const double over = 1.0 / static_cast<double>(n_);  // of the transform there and back
+    crew.each(g_.ny, [&](int row) {
+      for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
+        const double keep = frame_x_[i % nx] * frame_y_[static_cast<std::size_t>(row)];
+        const Z x = over * fields_[0].a[0][i], y = over * fields_[0].a[1][i];
+        for (int f = kFields - 1; f >= 0; --f) {
+          Field& field = fields_[static_cast<std::size_t>(f)];
+          const auto screen = [&](int a, int b, int plane) { return Z(table(kScreen + 4 * a + 2 * b, plane)[i], table(kScreen + 4 * a + 2 * b + 1, plane)[i]); };
+          const Z own_x = over * field.a[0][i], own_y = over * field.a[1][i];
+          for (int a = 0; a < 2; ++a) {
+            Z r = times(screen(a, 0, 0), own_x) + times(screen(a, 1, 0), own_y);
+            if (f > 0) r += times(screen(a, 0, f), x) + times(screen(a, 1, f), y);
+            field.a[a][i] = inc[f][a] + keep * (r - inc[f][a]);
+          }
+        }
+      }
+    });
+    crew.each(2 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+    half_way();
+  }
+
+  // The incident wave through one slab of the host, by the same steps.
+  void incident_oblique(Complex<S>* a) const {
+    if (tilt2_ == 0) return;
+    const S kx(light_.kx_per_um), ky(light_.ky_per_um);
+    Complex<S> term[2] = {a[0], a[1]};
+    for (int order = 1; order <= g_.order; ++order) {
+      const Complex<S> div = S(-0.5 * host_slab_.sd) * (kx * term[0] + ky * term[1]), curl = S(-0.5 * host_slab_.sc) * (ky * term[0] - kx * term[1]);
+      const Complex<S> x = kx * div + ky * curl, y = ky * div - kx * curl;
+      const S f(1.0 / order);
+      term[0] = Complex<S>(S(0.0) - f * x.im, f * x.re);
+      term[1] = Complex<S>(S(0.0) - f * y.im, f * y.re);
+      for (int c = 0; c < 2; ++c) a[c] = a[c] + term[c];
+    }
+  }
+  void incident_half_step(Complex<S>* a) const {
+    if (tilt2_ == 0) return;
+    const S kn = g_.n_ref * light_.k0_per_um;
+    S s, c;
+    sin_cos(0.5 * h_ * (root(kn * kn - tilt2_) - kn), s, c);
+    for (int i = 0; i < 2; ++i) a[i] = Complex<S>(c, s) * a[i];
+  }
+  void pass_incident(bool oblique_before) {
+    if (oblique_before) incident_oblique(incident_);
+    incident_half_step(incident_);
+    const Complex<S> x = host_slab_.screen[0][0] * incident_[0] + host_slab_.screen[0][1] * incident_[1];
+    incident_[1] = host_slab_.screen[1][0] * incident_[0] + host_slab_.screen[1][1] * incident_[1];
+    incident_[0] = x;
+    incident_half_step(incident_);
+    if (!oblique_before) incident_oblique(incident_);
+  }
+
+  /// Less the incident wave, in units of its phase.
+  std::vector<WaveField> scattered() {
+    const S phase = light_.k0_per_um * (host_q_ - g_.n_ref) * (g_.exit_um - g_.entry_um);
+    S s, c;
+    sin_cos(phase, s, c);
+    const Complex<S> back(c, S(0.0) - s);
+    const double over = 1.0 / static_cast<double>(n_);
+    std::vector<WaveField> out(static_cast<std::size_t>(kFields));
+    for (int f = kFields - 1; f >= 0; --f)
+      for (int a = 0; a < 2; ++a) {
+        Plane& to = out[static_cast<std::size_t>(f)].a[a];
+        to = std::move(fields_[static_cast<std::size_t>(f)].a[a]);
+        const Z inc = part(incident_[a], f), turn = part(back, 0);
+        for (Z& x : to) x = times(turn, over * x - inc);
+        if (f == 0)
+          for (int g = 1; g < kFields; ++g)  // base of the rest: i dphase of what has been turned back
+            for (std::size_t i = 0; i < n_; ++i) out[static_cast<std::size_t>(g)].a[a][i] -= part(phase, g) * Z(-to[i].imag(), to[i].real());
+      }
+    return out;
+  }
+
+  const WaveGrid& g_;
+  const WaveLight<S>& light_;
+  const WaveMedium<S>& medium_;
+  Fft2 fft_;
+  std::size_t n_;
+  double h_;
+  std::array<Field, static_cast<std::size_t>(kFields)> fields_;
+  std::vector<double> table_;  ///< [quantity][value or derivative][point]
+  std::vector<double> kx_, ky_;
+  Plane half_step_;
+  std::vector<double> half_step_slope_;
+  std::vector<double> frame_x_, frame_y_;
+  Complex<S> incident_[2];
+  double tilt2_ = 0;
+  S host_q_;
+  OpticalPoint<S> host_;
+  SlabPoint<S> host_slab_;
+};
+
+}  // namespace
+
+template <class S>
+std::vector<WaveField> propagate(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium, int threads) {
+  // A phase of work is a few hundred microseconds: more threads than a dozen would wait for each other.
+  return Propagation<S>(grid, light, medium).run(std::min(thread_count(threads), 12));
+}
+
+template std::vector<WaveField> propagate<Pack>(const WaveGrid&, const WaveLight<Pack>&, const WaveMedium<Pack>&, int);
+template std::vector<WaveField> propagate<Dual1>(const WaveGrid&, const WaveLight<Dual1>&, const WaveMedium<Dual1>&, int);
+template std::vector<WaveField> propagate<Dual2>(const WaveGrid&, const WaveLight<Dual2>&, const WaveMedium<Dual2>&, int);
+template std::vector<WaveField> propagate<Dual4>(const WaveGrid&, const WaveLight<Dual4>&, const WaveMedium<Dual4>&, int);
+
+}  // namespace birefit
