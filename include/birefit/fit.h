@@ -41,6 +41,8 @@ struct FitOptions {
   int max_iterations = 100;
   int scan_pixels = 4000;      ///< of the coarse scan, spread over all micrographs
   int scan_candidates = 4;     ///< starts polished after the scan
+  bool choose_waves = false;   ///< Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
+  double max_seconds = 60;
   bool choose_rays = false;    ///< straight or curved rays (Scene::rays) by what curved ones would change
   std::function<void(const std::string&)> progress;  ///< called with one line now and then; may be empty
   const std::atomic<bool>* interrupted = nullptr;    ///< set by Ctrl-C: end with the best state so far

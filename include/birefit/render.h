@@ -43,6 +43,7 @@ struct RenderPlan {
   std::vector<int> samples;
   double sampling_bin_px = 1;
   double sampling_center_x_px = 0, sampling_center_y_px = 0;
+  double series_reach_um = 0;       ///< > 0: the exact series, tabulated out to this image radius
   std::shared_ptr<const WavePlan> wave;  ///< set: the whole picture at once by wave optics, and nothing of the above but the words
 };
 
@@ -52,6 +53,17 @@ int rays_side_by_side();
 /// Chooses the cheapest method that holds scene.intensity_accuracy within scene.ceiling, at the values of theta.
 /// Throws UserError when a forced method cannot do the scene.
 RenderPlan plan(const Scene& scene, const Theta& theta);
+
+/// The grids of `before` no longer hold what `now` was made for (wave optics).
+bool outgrown(const RenderPlan& now, const RenderPlan& before);
+
+/// What Ceiling::wave would cost where it is not yet chosen.
+struct WaveChoice {
+  double seconds_an_image = 0;  ///< without derivatives, one thread; infinite where wave optics cannot do the scene
+  bool series = false;          ///< by the exact series
+  std::string words;            ///< a sentence: how long, or why not
+};
+WaveChoice wave_choice(const Scene& scene, const Theta& theta);
 
 struct Rendering {
   Image intensity;                ///< flux behind the analyser over flux behind the polarizer, per pixel

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <set>
 
@@ -70,6 +71,7 @@ bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
       now.radial_panels > before.radial_panels || now.centre_panels > before.centre_panels ||
       (before.fringe_means && !now.fringe_means))
     return true;
+  if (outgrown(now, before)) return true;
   const double moved = std::hypot(now.sampling_center_x_px - before.sampling_center_x_px,
                                   now.sampling_center_y_px - before.sampling_center_y_px);
   if (now.samples != before.samples && moved > before.sampling_bin_px) return true;
@@ -101,6 +103,9 @@ class Fit {
   /// where they describe the image clearly worse.
   double change_by_curved_rays() const { return by_curved_rays_; }
 
+  /// The same for wave optics: what fitting rays to a wave image of these parameters would return; NaN where none was made.
+  double change_by_waves() const { return by_waves_; }
+
   /// The rest. What another branch has beaten is reported where the search left it.
   FitResult finish(bool beaten) {
     const auto begin = std::chrono::steady_clock::now();
@@ -124,6 +129,7 @@ class Fit {
 
   void prepare();
   double look_for_minima(double hopeless_above);
+  void look_near_rays();
   void find_minima();
   void settle_weights();
   void settle_plans();
@@ -152,6 +158,7 @@ class Fit {
   void report_micrographs();
   void collect_warnings();
   void foretell_curved_rays();
+  void foretell_waves();
   std::string covariance_words() const;
 
   const FitJob& job_;
@@ -172,6 +179,7 @@ class Fit {
   double sample_rows_ = 0;  ///< pixels that the scan looked at
   bool beaten_ = false;
   double by_curved_rays_ = 0;
+  double by_waves_ = std::numeric_limits<double>::quiet_NaN();
   bool stopped_ = false;
 
   // What settle_misfit() found.
@@ -253,7 +261,54 @@ std::vector<Misfit> Fit::prior_misfit() const {
   return misfit;
 }
 
+/// Wave pictures are too dear for a grid. Rays know the fringe orders to within a few: from their minima, and from the neighbouring
+/// orders of every parameter that forms fringes, with the wave model.
+void Fit::look_near_rays() {
+  FitJob by_rays = job_;
+  by_rays.branches.clear();
+  for (Micrograph& m : by_rays.micrographs) m.scene.ceiling = Ceiling::one_way, m.scene.method = "auto", m.scene.microscope.focus_um = {};
+  Fit rays(by_rays);
+  rays.search(std::numeric_limits<double>::infinity());
+  if (!rays.stopped_) rays.find_minima();
+  evaluations_ += rays.evaluations_ + (rays.problem_ ? rays.problem_->evaluations() : 0);
+  result_.scans = std::move(rays.found_.traces);
+  scan_points_ = rays.scan_points_;
+  std::vector<Eigen::VectorXd> minima{rays.best_}, starts;
+  minima.insert(minima.end(), rays.rivals_.begin(), rays.rivals_.end());
+  starts = minima;
+  starts.push_back(start_);
+  for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
+    const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
+    double rate = 0;
+    for (const Micrograph& m : by_rays.micrographs) rate = std::max(rate, std::abs(fringe_phase_per_unit(m.scene, rays.theta_, unknowns_.searched[j])));
+    if (!(rate * (parameter.upper - parameter.lower) > std::numbers::pi)) continue;
+    for (const double orders : {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0}) {
+      Eigen::VectorXd x = rays.best_;
+      const auto at = static_cast<Eigen::Index>(j);
+      x[at] += orders * 2 * std::numbers::pi / rate;
+      if (x[at] > parameter.lower && x[at] < parameter.upper) starts.push_back(std::move(x));
+    }
+  }
+  say("neighbouring fringe orders by wave optics");
+  std::vector<PixelSet> sets;
+  for (int g = 0; g < frames_; ++g) sets.push_back(pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]));
+  LeastSquares all(job_, unknowns_, plans_, std::move(sets));
+  all.set_misfit(prior_misfit());
+  found_ = polish(all, job_, std::move(starts), 3);
+  found_.traces = std::move(result_.scans);
+  found_.points += scan_points_;
+  evaluations_ += all.evaluations();
+  stopped_ = stopped_ || rays.stopped_ || found_.interrupted;
+  sample_rows_ = static_cast<double>(all.pixel_rows());
+}
+
 double Fit::look_for_minima(double hopeless_above) {
+  if (std::any_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) {
+    look_near_rays();
+    result_.scans = std::move(found_.traces);
+    scan_points_ = found_.points;
+    return found_.candidates.front().objective;
+  }
   std::vector<double> phase(unknowns_.searched.size(), 0.0);
   for (std::size_t j = 0; j < phase.size(); ++j) {
     const int index = unknowns_.searched[j];
@@ -864,6 +919,54 @@ void Fit::foretell_curved_rays() {
       most->name, there, 100 * (there / most->value - 1), by_curved_rays_, ratio));
 }
 
+/// Rays of any kind shift what they estimate in droplets of a few wavelengths, and with a free gain the residual need not show it: fitted
+/// to a wave image of the parameters found, they return something else. The difference is the bias to expect.
+void Fit::foretell_waves() {
+  const auto has_waves = [](const Micrograph& m) {
+    return std::holds_alternative<Droplet>(m.scene.sample) && m.scene.ceiling == Ceiling::one_way && m.scene.microscope.objective_na > 0;
+  };
+  if (stopped_ || unknowns_.searched.empty() || !std::all_of(job_.micrographs.begin(), job_.micrographs.end(), has_waves)) return;
+  constexpr double kMostSeconds = 10;  // for a warning
+  std::vector<PixelSet> sets;
+  for (int g = 0; g < frames_; ++g) {
+    Scene waves = job_.micrographs[g].scene;
+    waves.ceiling = Ceiling::wave;
+    waves.method = "auto";
+    waves.rays = Rays::straight;
+    const WaveChoice choice = wave_choice(waves, theta_);
+    if (choice.seconds_an_image > (job_.options.choose_waves ? job_.options.max_seconds : kMostSeconds)) return;
+    const Image image = render(waves, plan(waves, theta_), theta_, {}, job_.options.threads).intensity;
+    PixelSet set = pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]);
+    for (std::size_t i = 0; i < set.pixels.size(); ++i)
+      set.value[static_cast<Eigen::Index>(i)] = gain_of(g) * image(set.pixels[i][0], set.pixels[i][1]) + offset_of(g);
+    sets.push_back(std::move(set));
+  }
+  LeastSquares problem(job_, unknowns_, plans_, std::move(sets));
+  problem.set_misfit(problem_->misfit());
+  SolveOptions few;
+  few.max_iterations = 12;
+  few.interrupted = job_.options.interrupted;
+  Eigen::VectorXd searched = best_;
+  problem.solve(searched, few);
+  by_waves_ = 0;
+  const ParameterEstimate* most = nullptr;
+  double bias = 0;
+  for (const int index : unknowns_.searched)
+    for (const ParameterEstimate& p : result_.parameters) {
+      if (p.name != job_.parameters[index].name || p.name.find("center_px") != std::string::npos || !(p.stderr_ > 0)) continue;
+      const double change = problem.theta()[static_cast<std::size_t>(index)] - theta_[static_cast<std::size_t>(index)];
+      if (std::abs(change) / p.stderr_ <= by_waves_) continue;
+      by_waves_ = std::abs(change) / p.stderr_;
+      most = &p;
+      bias = change;
+    }
+  if (!most || by_waves_ < 0.3) return;
+  result_.warnings.push_back(fmt::format(
+      "Rays are not the image of this sample: fitted to a wave-optical image of the parameters found here, rays return {} off by {:+.2g} ({:+.2g} %, "
+      "{:.3g} standard errors). The error bars do not contain this; physics.ceiling: wave does away with it.",
+      most->name, bias, 100 * bias / most->value, by_waves_));
+}
+
 void Fit::report() {
   const Eigen::MatrixXd factor = problem_->factor();
   const Inverse inverse = invert_normal_equations(factor);
@@ -901,6 +1004,7 @@ void Fit::report() {
   report_micrographs();
   collect_warnings();
   foretell_curved_rays();
+  foretell_waves();
   if (unknowns_.size() == 0) result_.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
   result_.evaluations = evaluations_ + problem_->evaluations();
   result_.verdict = verdict(result_, signal);
@@ -955,6 +1059,46 @@ FitResult best_branch(const FitJob& job, std::vector<FitResult> results) {
 
 FitResult fit(const FitJob& job) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
+  if (job.options.choose_waves) {
+    FitJob chosen = job;
+    chosen.options.choose_waves = false;
+    const Theta theta = job.parameters.values();
+    // What a fit takes, from what one image does: some 15 evaluations with derivatives, each as dear as one image a parameter and one more,
+    // and as many again for the neighbouring orders, on all threads.
+    double seconds = 0;
+    std::string words;
+    bool series = true;
+    for (const Micrograph& m : job.micrographs) {
+      const WaveChoice choice = wave_choice(m.scene, theta);
+      seconds += choice.seconds_an_image;
+      words = choice.words;
+      series = series && choice.series;
+    }
+    int searched = 1;
+    for (int i = 0; i < job.parameters.size(); ++i) searched += job.parameters[i].free && !job.parameters[i].linear;
+    const double whole = 15.0 * (series ? 20 : 1) * seconds * searched;
+    if (whole > job.options.max_seconds) {
+      chosen.warnings.push_back(fmt::format("{} A fit would take about {:.2g} s, more than physics.max_seconds: {:g}; rays are taken instead.", words, whole, job.options.max_seconds));
+      return fit(chosen);
+    }
+    FitResult by_rays;
+    if (!series) {  // the series costs no more than rays do
+      chosen.options.choose_rays = false;
+      Fit rays(chosen);
+      rays.search(kNever);
+      by_rays = rays.finish(false);
+      if (by_rays.interrupted || rays.change_by_waves() < 0.3) {
+        for (MicrographResult& m : by_rays.micrographs)
+          m.plan.reasons.push_back(fmt::format("rays suffice: wave optics would shift no parameter by more than {:.2g} standard errors", rays.change_by_waves()));
+        return by_rays;
+      }
+    }
+    for (Micrograph& m : chosen.micrographs) m.scene.ceiling = Ceiling::wave;
+    FitResult better = fit(chosen);
+    better.seconds += by_rays.seconds;
+    better.evaluations += by_rays.evaluations;
+    return better;
+  }
   if (job.branches.size() < 2) {
     Fit only(job);
     only.search(kNever);

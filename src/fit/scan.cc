@@ -39,6 +39,55 @@ std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std
   return axes;
 }
 
+/// Solves from every start and keeps the distinct minima, best first, at least one.
+void polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options, std::vector<std::pair<double, Eigen::VectorXd>>& starts, int steps,
+                 double hopeless_above) {
+  const Eigen::VectorXd start = starts.back().second;
+  // A few steps for everyone, the rest for those that may still be the best: a wrong order stays many times worse.
+  constexpr double kHopeless = 4;
+  SolveOptions polish;
+  polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
+  polish.interrupted = options.interrupted;
+  double best = std::numeric_limits<double>::infinity();
+  for (auto& [objective, x] : starts) {
+    polish.max_iterations = steps;
+    result.interrupted = problem.solve(x, polish).interrupted || result.interrupted;
+    objective = std::isfinite(problem.objective()) ? problem.objective() : std::numeric_limits<double>::infinity();
+    best = std::min(best, objective);
+  }
+  const bool beaten = best > hopeless_above;
+  for (const auto& [objective, from] : starts) {
+    if (!(objective <= (beaten ? 1 : kHopeless) * best) || !std::isfinite(objective)) continue;
+    if (beaten) {
+      problem.evaluate(from, true);
+      result.candidates.push_back({from, problem.objective(), projected_information(problem)});
+      break;
+    }
+    Candidate candidate;
+    candidate.searched = from;
+    polish.max_iterations = 20;
+    result.interrupted = problem.solve(candidate.searched, polish).interrupted || result.interrupted;
+    candidate.objective = problem.objective();
+    candidate.information = projected_information(problem);
+    if (std::isfinite(candidate.objective)) result.candidates.push_back(std::move(candidate));
+    if (result.interrupted && !result.candidates.empty()) break;
+  }
+  if (result.candidates.empty()) {
+    problem.evaluate(start, true);
+    result.candidates.push_back({start, problem.objective(), projected_information(problem)});
+  }
+  std::stable_sort(result.candidates.begin(), result.candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.objective < b.objective; });
+  std::vector<Candidate> distinct;
+  for (Candidate& candidate : result.candidates) {
+    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Candidate& other) {
+      return separation(other, candidate.searched) < 5 || separation(candidate, other.searched) < 5;
+    });
+    if (!known) distinct.push_back(std::move(candidate));
+  }
+  result.candidates = std::move(distinct);
+}
+
 }  // namespace
 
 double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
@@ -152,49 +201,22 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   if (static_cast<int>(starts.size()) > options.scan_candidates) starts.resize(std::max(1, options.scan_candidates));
   starts.emplace_back(0, start);  // the user's, whatever the grid says
 
-  // A few steps for everyone, the rest for those that may still be the best: a wrong order stays many times worse.
-  constexpr double kHopeless = 4;
-  SolveOptions polish;
-  polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
-  polish.interrupted = options.interrupted;
-  double best = std::numeric_limits<double>::infinity();
-  for (auto& [objective, x] : starts) {
-    polish.max_iterations = 6;
-    result.interrupted = problem.solve(x, polish).interrupted || result.interrupted;
-    objective = std::isfinite(problem.objective()) ? problem.objective() : std::numeric_limits<double>::infinity();
-    best = std::min(best, objective);
+  polish_into(result, problem, options, starts, 6, hopeless_above);
+  return result;
+}
+
+ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> from, int steps) {
+  ScanResult result;
+  std::vector<std::pair<double, Eigen::VectorXd>> starts;
+  for (Eigen::VectorXd& x : from) {
+    ++result.points;
+    problem.evaluate(x, false);
+    if (std::isfinite(problem.objective())) starts.emplace_back(problem.objective(), std::move(x));
   }
-  const bool beaten = best > hopeless_above;
-  for (const auto& [objective, from] : starts) {
-    if (!(objective <= (beaten ? 1 : kHopeless) * best) || !std::isfinite(objective)) continue;
-    if (beaten) {
-      problem.evaluate(from, true);
-      result.candidates.push_back({from, problem.objective(), projected_information(problem)});
-      break;
-    }
-    Candidate candidate;
-    candidate.searched = from;
-    polish.max_iterations = 20;
-    result.interrupted = problem.solve(candidate.searched, polish).interrupted || result.interrupted;
-    candidate.objective = problem.objective();
-    candidate.information = projected_information(problem);
-    if (std::isfinite(candidate.objective)) result.candidates.push_back(std::move(candidate));
-    if (result.interrupted && !result.candidates.empty()) break;
-  }
-  if (result.candidates.empty()) {
-    problem.evaluate(start, true);
-    result.candidates.push_back({start, problem.objective(), projected_information(problem)});
-  }
-  std::stable_sort(result.candidates.begin(), result.candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.objective < b.objective; });
-  std::vector<Candidate> distinct;
-  for (Candidate& candidate : result.candidates) {
-    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Candidate& other) {
-      return separation(other, candidate.searched) < 5 || separation(candidate, other.searched) < 5;
-    });
-    if (!known) distinct.push_back(std::move(candidate));
-  }
-  result.candidates = std::move(distinct);
+  std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  const std::size_t most = static_cast<std::size_t>(std::max(1, job.options.scan_candidates));
+  if (starts.size() > most) starts.resize(most);
+  polish_into(result, problem, job.options, starts, steps, std::numeric_limits<double>::infinity());
   return result;
 }
 

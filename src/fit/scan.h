@@ -27,6 +27,10 @@ struct ScanResult {
 ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
                 const std::vector<double>& phase_per_unit, double hopeless_above);
 
+/// The same from given starts instead of a grid, best first, of which no more than options.scan_candidates are polished; `steps` of
+/// the solver for each before the worst are dropped.
+ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> starts, int steps);
+
 /// |R delta|: how many joint standard errors apart.
 double separation(const Candidate& minimum, const Eigen::VectorXd& other);
 /// R of the searched unknowns with the linear ones following, at the problem's last point.

@@ -918,10 +918,21 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
   }
   if (std::holds_alternative<Droplet>(config.scene.sample) && config.scene.microscope.objective_na == 0)
     reader.warnings.push_back("microscope.objective_na is not given: every ray that leaves the droplet is taken to reach "
-                              "the image.");
+                              "the image, and wave optics, which needs it, is left out.");
 
   if (!reader.problems.empty()) throw_sorted(reader);
   config.job.options.choose_rays = reader.choose_rays;
+  config.job.options.max_seconds = reader.max_seconds;
+  if (reader.choose_waves) {
+    const Theta theta = reader.table.values();
+    if (use == ConfigUse::fit) {
+      config.job.options.choose_waves = true;
+    } else if (const WaveChoice choice = wave_choice(config.scene, theta); choice.seconds_an_image <= reader.max_seconds) {
+      config.scene.ceiling = Ceiling::wave;
+    } else {
+      reader.warnings.push_back(choice.words + " Rays are taken instead: physics.max_seconds and ceiling: wave change that.");
+    }
+  }
   config.job.parameters = std::move(reader.table);
   config.job.warnings = std::move(reader.warnings);
   return config;

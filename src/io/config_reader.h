@@ -68,6 +68,9 @@ class ConfigReader {
   std::vector<std::string> set_everywhere;
   /// `physics: {rays: auto}`: the fit chooses.
   bool choose_rays = true;
+  /// `physics: {ceiling: auto}` on a sphere: waves where they pay, within the time given for a fit (s).
+  bool choose_waves = false;
+  double max_seconds = 60;
 
   /// The block at a key, its keys checked against `known`.
   Block block(const Block& parent, const std::string& key, const std::vector<std::string>& known, bool required);

@@ -629,9 +629,13 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   microscope.analyzer_deg = polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab);
   microscope.objective_na = reader.plain(block, "objective_na", aperture()).value_or(0);
   microscope.condenser_na = reader.plain(block, "condenser_na", aperture()).value_or(0);
-  if (const std::optional<double> focus = reader.plain(block, "focus_um", number_within(-1e4, 1e4)); focus && *focus != 0)
-    reader.problems.add(block.find("focus_um")->where, "focus_um = " + show(*focus) + ": defocus is not available yet",
-                        "0, the mid plane, is");
+  if (block.find("focus_um")) {
+    NumberSpec focus;
+    focus.unit = "um";
+    focus.lower = -1000;
+    focus.upper = 1000;
+    microscope.focus_um = reader.number(block, "focus_um", focus);
+  }
   microscope.aplanatic = reader.choice(block, "imaging", {"focal_plane", "aplanatic"}).value_or("") == "aplanatic";
 
   microscope.quarter_wave = reader.choice(block, "quarter_wave", {"true", "false"}).value_or("false") == "true";
@@ -676,22 +680,37 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   const YamlNode* ceiling = physics.find("ceiling");
   const Slab* slab = std::get_if<Slab>(&scene.sample);
   const bool layered = std::holds_alternative<Cell>(scene.sample) || (slab && !slab->half_angle_deg);
-  if (ceiling && ceiling->is_scalar() && ceiling->text == "wave") {
-    reader.problems.add(ceiling->where, "ceiling: wave is not available yet", "known: one_way, e_only, reflections and auto");
-  } else if (ceiling && ceiling->is_scalar() && ceiling->text == "reflections" && !layered) {
+  const bool sphere = std::holds_alternative<Droplet>(scene.sample);
+  const std::string name = reader.choice(physics, "ceiling", {"one_way", "e_only", "reflections", "wave", "auto"}).value_or("auto");
+  if (name == "reflections" && !layered)
     reader.problems.add(ceiling->where, "ceiling: reflections is for cells and slabs",
                         "use one_way: its model error says how large reflections are here");
-  } else {
-    const std::string name = reader.choice(physics, "ceiling", {"one_way", "e_only", "reflections", "auto"}).value_or("auto");
-    scene.ceiling = name == "e_only" ? Ceiling::e_only : name == "reflections" ? Ceiling::reflections : Ceiling::one_way;
+  if (name == "wave" && !sphere)
+    reader.problems.add(ceiling->where, "ceiling: wave is for droplets and shells", "use one_way or, for cells and slabs, reflections");
+  if (name == "wave" && sphere && scene.microscope.objective_na == 0)
+    reader.problems.add(ceiling->where, "ceiling: wave needs microscope.objective_na", "the number engraved on the objective; without it use one_way");
+  if (name == "wave" && physics.find("rays"))
+    reader.problems.add(physics.find("rays")->where, "rays has no meaning under ceiling: wave", "give one of the two");
+  scene.ceiling = name == "e_only" ? Ceiling::e_only : name == "reflections" ? Ceiling::reflections : name == "wave" ? Ceiling::wave : Ceiling::one_way;
+  if (physics.find("max_seconds")) {
+    NumberSpec seconds = number_within(0, 1e7);
+    seconds.unit = "s";
+    reader.max_seconds = reader.plain(physics, "max_seconds", seconds).value_or(60);
   }
-  if (const YamlNode* seconds = physics.find("max_seconds"))
-    reader.problems.add(seconds->where, "max_seconds belongs to ceiling: wave, which is not available yet", "leave it out");
 
   const Block transport = reader.block(root, "transport", {"method"}, false);
   std::vector<std::string> methods = {"auto"};
   methods.insert(methods.end(), transport_method_names().begin(), transport_method_names().end());
+  methods.insert(methods.end(), {"series", "split_step"});
   scene.method = reader.choice(transport, "method", methods).value_or("auto");
+  const bool wave_method = scene.method == "series" || scene.method == "split_step";
+  // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays.
+  reader.choose_waves = name == "auto" && sphere && scene.microscope.objective_na > 0 && !physics.find("rays") && (scene.method == "auto" || wave_method);
+  if (scene.microscope.focus_um && !(scene.ceiling == Ceiling::wave || reader.choose_waves)) {
+    const Parameter& focus = reader.table[scene.microscope.focus_um];
+    if (focus.free || focus.value != 0)
+      reader.problems.add(focus.where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics", "ceiling: wave, with objective_na, for droplets and shells");
+  }
 }
 
 }  // namespace

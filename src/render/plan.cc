@@ -17,7 +17,9 @@
 #include "render/pilots.h"
 #include "render/planar.h"
 #include "render/sampling.h"
+#include "render/series.h"
 #include "render/volume.h"
+#include "render/wave.h"
 #include "transport/methods.h"
 
 namespace birefit {
@@ -44,6 +46,14 @@ std::string effort_text(const std::string& method, int steps) {
 
 void check_method(const Scene& scene) {
   if (scene.method == "auto") return;
+  if (scene.ceiling == Ceiling::wave) {
+    if (scene.method == "split_step" || (scene.method == "series" && has_series(scene))) return;
+    if (scene.method == "series")
+      throw UserError(Where{}, "transport method 'series' is for radial droplets without twist and concentric shells", "use auto or split_step");
+    throw UserError(Where{}, fmt::format("transport method '{}' is for rays", scene.method), "ceiling: wave knows series and split_step; or leave transport.method at auto");
+  }
+  if (scene.method == "series" || scene.method == "split_step")
+    throw UserError(Where{}, fmt::format("transport method '{}' belongs to ceiling: wave", scene.method), "set physics.ceiling: wave, or leave transport.method at auto");
   const auto& names = transport_method_names();
   if (std::find(names.begin(), names.end(), scene.method) == names.end())
     throw UserError(Where{}, fmt::format("transport method '{}' does not exist", scene.method),
@@ -750,7 +760,12 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
   check_validity(scene, theta);
   const Values<double> value(theta, {});
   RenderPlan result;
-  if (std::holds_alternative<Droplet>(scene.sample)) {
+  if (scene.ceiling == Ceiling::wave) {
+    result = has_series(scene) && scene.method != "split_step" ? plan_series(scene, value) : plan_wave(scene, value);
+    double largest_phase = 0;
+    for (const double phase : phases(scene, theta)) largest_phase = std::max(largest_phase, std::abs(phase));
+    note_illumination(scene, value, largest_phase, result);
+  } else if (std::holds_alternative<Droplet>(scene.sample)) {
     result = plan_droplet(scene, value);
   } else if (std::holds_alternative<Crystal>(scene.sample)) {
     if (scene.method != "auto" && scene.method != "diagonal")
@@ -781,8 +796,22 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
   note_material(scene, theta, result);
   result.physics = scene.ceiling == Ceiling::e_only        ? "e_only"
                    : scene.ceiling == Ceiling::reflections ? "reflections"
+                   : scene.ceiling == Ceiling::wave        ? "wave"
                                                            : "one_way";
   return result;
+}
+
+WaveChoice wave_choice(const Scene& scene, const Theta& theta) {
+  Scene waves = scene;
+  waves.ceiling = Ceiling::wave;
+  waves.rays = Rays::straight;
+  try {
+    const RenderPlan by_waves = plan(waves, theta);
+    const double seconds = by_waves.cost_seconds;
+    return {seconds, !by_waves.wave, fmt::format("Wave optics of this scene takes about {:.2g} s an image.", seconds)};
+  } catch (const UserError& error) {
+    return {std::numeric_limits<double>::infinity(), false, fmt::format("Wave optics cannot do this scene: {}.", error.problems().front().what)};
+  }
 }
 
 double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index) {

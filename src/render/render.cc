@@ -11,12 +11,15 @@
 #include "render/pixel_model.h"
 #include "render/planar.h"
 #include "render/sampling.h"
+#include "render/series.h"
 #include "render/volume.h"
+#include "render/wave.h"
 
 namespace birefit {
 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+  if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
   if (std::holds_alternative<Droplet>(scene.sample)) return make_droplet_model(scene, plan, value);
   if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
   if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
@@ -332,13 +335,19 @@ void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, cons
             Rendering& into) {
   into.derivatives.resize(active.size());
   if (active.empty()) {
-    render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
+    if (plan.wave)
+      render_wave<Pack>(scene, *plan.wave, Values<Pack>(theta, {}), threads, {&into.intensity});
+    else
+      render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
     return;
   }
   in_chunks(active, [&]<class S>(const std::vector<int>& chunk, int first) {
     std::vector<Image*> images{&into.intensity};
     for (std::size_t j = 0; j < chunk.size(); ++j) images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
-    render_planes<S>(scene, plan, theta, chunk, threads, images);
+    if (plan.wave)
+      render_wave<S>(scene, *plan.wave, Values<S>(theta, chunk), threads, images);
+    else
+      render_planes<S>(scene, plan, theta, chunk, threads, images);
   });
 }
 
@@ -350,6 +359,7 @@ Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta,
 }
 
 Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
+  if (plan.wave) throw std::logic_error("wave optics has no rays to take one at a time");
   Image image;
   render_planes<double>(scene, plan, theta, {}, 1, {&image});
   return image;
@@ -362,6 +372,15 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
   out.intensity.resize(static_cast<long>(pixels.size()));
   out.derivatives.resize(static_cast<long>(pixels.size()), static_cast<long>(active.size()));
   if (pixels.empty()) return out;
+  if (plan.wave) {  // there is no part of such a picture
+    const Rendering all = render(scene, plan, theta, active, threads);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const auto [column, row] = pixels[i];
+      out.intensity[static_cast<long>(i)] = all.intensity(column, row);
+      for (std::size_t j = 0; j < active.size(); ++j) out.derivatives(static_cast<long>(i), static_cast<long>(j)) = all.derivatives[j](column, row);
+    }
+    return out;
+  }
   if (active.empty())
     render_list<Pack>(scene, plan, theta, pixels, {}, threads, out, 0);
   else
@@ -373,6 +392,8 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
 
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   const Values<double> value(theta, {});
+  if (scene.ceiling == Ceiling::wave)
+    throw UserError(Where{}, "under ceiling: wave a point of the image has no Jones matrix of its own ray", "use `render`, or ceiling: one_way");
   const double wavelength_nm = value(scene.microscope.wavelength_nm);
   std::vector<JonesRow> rows;
   // From the lab's x, y to the s, p pair of azimuth a: p = (cos a, sin a), s = (-sin a, cos a).

@@ -48,16 +48,21 @@ SphereOptics<S> sphere_optics(const Scene& scene, const Values<S>& value) {
 
 }  // namespace
 
+void check_objective(const Scene& scene, double n_host) {
+  const double na = scene.microscope.objective_na;
+  if (!(na > 0))
+    throw UserError(Where{}, "ceiling: wave needs microscope.objective_na", "the number engraved on the objective; without it use ceiling: one_way");
+  if (na > n_host)
+    throw UserError(Where{}, fmt::format("microscope.objective_na {:g} is above the surround's index {:g}: no light leaves it so steeply", na, n_host),
+                    "check objective_na and sample.surround");
+}
+
 RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   if (!std::holds_alternative<Droplet>(scene.sample))
     throw UserError(Where{}, "ceiling: wave is for droplets and shells", "use one_way or, for cells and slabs, reflections");
   const SphereOptics<double> o = sphere_optics(scene, value);
   const double na = scene.microscope.objective_na;
-  if (!(na > 0))
-    throw UserError(Where{}, "ceiling: wave needs microscope.objective_na", "the number engraved on the objective; without it use ceiling: one_way");
-  if (na > o.n_host)
-    throw UserError(Where{}, fmt::format("microscope.objective_na {:g} is above the surround's index {:g}: no light leaves it so steeply", na, o.n_host),
-                    "check objective_na and sample.surround");
+  check_objective(scene, o.n_host);
   const double k0 = wavenumber_per_um(scene, value), wavelength = 2 * std::numbers::pi / k0;
   auto wave = std::make_shared<WavePlan>();
   wave->radius_um = o.radius_um;
@@ -98,6 +103,12 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   plan.cost_seconds = static_cast<double>(g.nx) * g.ny * g.slabs * 2.5e-7;
   plan.wave = std::move(wave);
   return plan;
+}
+
+bool outgrown(const RenderPlan& now, const RenderPlan& before) {
+  if (!now.wave || !before.wave) return static_cast<bool>(now.wave) != static_cast<bool>(before.wave);
+  const double ratio = now.wave->radius_um / before.wave->radius_um;
+  return ratio > 1.04 || ratio < 0.8;
 }
 
 template <class S>

@@ -14,6 +14,9 @@ struct WavePlan {
   double ramp_um = 0;    ///< of its surfaces
 };
 
+/// Throws UserError where wave optics has no aperture to work with: none given, or one above the host's index.
+void check_objective(const Scene& scene, double n_host);
+
 /// The plan of one picture. Throws UserError when the scene is no sphere, the numerical aperture is missing or above the host's index,
 /// or the propagation would need more memory than there should be.
 RenderPlan plan_wave(const Scene& scene, const Values<double>& value);

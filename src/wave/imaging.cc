@@ -8,6 +8,7 @@
 
 #include "core/threads.h"
 #include "transport/method.h"
+#include "transport/quadrature.h"
 
 namespace birefit {
 namespace {
@@ -55,20 +56,8 @@ struct PixelWeights {
     const double per_pixel = pixel_um / spacing_um;
     // Gauss nodes that integrate the finest wave the points carry, pi px / spacing radians a pixel.
     const int n = 3 + static_cast<int>(std::ceil(1.6 * per_pixel));
-    std::vector<double> node(static_cast<std::size_t>(n)), weight(static_cast<std::size_t>(n));
-    for (int i = 0; i < n; ++i) {
-      double x = std::cos(kPi * (i + 0.75) / (n + 0.5)), slope = 1;
-      for (int k = 0; k < 40; ++k) {
-        double before = 1, here = x;
-        for (int l = 2; l <= n; ++l) before = std::exchange(here, ((2 * l - 1) * x * here - (l - 1) * before) / l);
-        slope = n * (x * here - before) / (x * x - 1);
-        const double change = here / slope;
-        x -= change;
-        if (std::abs(change) < 1e-15) break;
-      }
-      node[static_cast<std::size_t>(i)] = 0.5 * x;
-      weight[static_cast<std::size_t>(i)] = 1 / ((1 - x * x) * slope * slope);
-    }
+    std::vector<double> node, weight;
+    legendre_nodes(n, node, weight);
     rows.resize(static_cast<std::size_t>(pixels));
     for (int p = 0; p < pixels; ++p) {
       Row& row = rows[static_cast<std::size_t>(p)];
@@ -80,14 +69,14 @@ struct PixelWeights {
       row.weight.assign(static_cast<std::size_t>(high - low + 1), 0.0);
       row.slope = row.weight;
       for (int i = 0; i < n; ++i) {
-        const double at = middle + node[static_cast<std::size_t>(i)] * per_pixel;
+        const double at = middle + 0.5 * node[static_cast<std::size_t>(i)] * per_pixel, share = 0.5 * weight[static_cast<std::size_t>(i)];
         const int cell = static_cast<int>(std::floor(at));
         for (int j = std::max(low, cell - kTaps / 2 + 1); j <= std::min(high, cell + kTaps / 2); ++j) {
           Dual<double, 1> x(at - j);
           x.d[0] = per_pixel;
           const Dual<double, 1> v = kernel(x);
-          row.weight[static_cast<std::size_t>(j - low)] += weight[static_cast<std::size_t>(i)] * v.value;
-          row.slope[static_cast<std::size_t>(j - low)] += weight[static_cast<std::size_t>(i)] * v.d[0];
+          row.weight[static_cast<std::size_t>(j - low)] += share * v.value;
+          row.slope[static_cast<std::size_t>(j - low)] += share * v.d[0];
         }
       }
     }
@@ -155,7 +144,8 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
       const S edge = (m.objective_na * light.k0_per_um - S(k2 * f)) * (1 / plan.pupil_step_per_um) + 0.5;
       const S open = min_of(max_of(edge, S(0.0)), S(1.0));
       const S q = root(max_of(S(light.n_host * light.n_host - S(k2) * inverse_k0 * inverse_k0), S(1e-6)));
-      const S s_over = root(light.n_host * inverse(q)), p_over = m.aplanatic ? s_over : inverse(s_over);
+      // An aplanatic objective turns s and p into the plane and keeps their flux: a itself.
+      const S s_over = m.aplanatic ? S(1.0) : root(light.n_host * inverse(q)), p_over = m.aplanatic ? S(1.0) : inverse(s_over);
       S sn, cs;
       sin_cos(light.k0_per_um * (q - tilt_q) * depth, sn, cs);
       const S on_p = S(px) * m.ax + S(py) * m.ay, on_s = S(px) * m.ay - S(py) * m.ax;

@@ -274,8 +274,8 @@ RadialImage<S>::RadialImage(const RadialSeries<S>& series, double objective_na, 
 }
 
 template <class S>
-RadialField<S> RadialImage<S>::operator()(const S& rho_um) const {
-  RadialField<S> field;
+RadialAmplitudes<S> RadialImage<S>::operator()(const S& rho_um) const {
+  RadialAmplitudes<S> field;
   for (const Node& node : nodes_) {
     const S argument = node.q_per_um * rho_um;
     const double x = plain(argument);

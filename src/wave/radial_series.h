@@ -71,7 +71,7 @@ enum class Pupil {
 ///   E_along = 1 + A0 + A2 cos 2(phi - P),   E_across = A2 sin 2(phi - P)
 /// along P and 90 degrees counter-clockwise of it (C11).
 template <class S>
-struct RadialField {
+struct RadialAmplitudes {
   Complex<S> a0, a2;
 };
 
@@ -85,7 +85,7 @@ class RadialImage {
   RadialImage(const RadialSeries<S>& series, double objective_na, const S& defocus_um, double rho_max_um, Pupil pupil = Pupil::focal_plane,
               int nodes = 0);
   /// 0 <= rho_um <= rho_max_um.
-  RadialField<S> operator()(const S& rho_um) const;
+  RadialAmplitudes<S> operator()(const S& rho_um) const;
   int nodes() const { return static_cast<int>(nodes_.size()); }
 
  private:

@@ -268,7 +268,7 @@ TEST(RadialSeries, QuadratureIsLongEnough) {
         const RadialSeries<double> series = radial_series(ball);
         const RadialImage<double> image(series, na, defocus_um, 50), longer(series, na, defocus_um, 50, Pupil::focal_plane, 2 * image.nodes());
         for (double rho_um : {0.0, 0.7, 12.0, 50.0}) {
-          const RadialField<double> f = image(rho_um), g = longer(rho_um);
+          const RadialAmplitudes<double> f = image(rho_um), g = longer(rho_um);
           // Rounding: the integrand reaches x^2 / 2 (1e5 for the biggest), most of it in a narrow peak of width 1 / x.
           EXPECT_LT(std::abs(number(f.a0 - g.a0)) + std::abs(number(f.a2 - g.a2)), 2e-11)
               << series.radius_um << ' ' << na << ' ' << defocus_um << ' ' << rho_um;
@@ -305,7 +305,7 @@ TEST(RadialSeries, ImageIsTheSumOfItsSpectrum) {
       const double na = 0.8, defocus_um = 1.3;
       const RadialImage<double> image(series, na, defocus_um, 4.0, pupil);
       for (const auto& [rho_um, phi] : {std::pair(0.0, 0.0), std::pair(0.9, 0.4), std::pair(2.2, 2.0), std::pair(4.0, -1.0)}) {
-        const RadialField<double> f = image(rho_um);
+        const RadialAmplitudes<double> f = image(rho_um);
         const std::array<Cplx, 2> sum =
             image_of_spectrum(series, na, defocus_um, rho_um * std::cos(phi), rho_um * std::sin(phi), pupil);
         EXPECT_LT(std::abs(number(f.a0) + std::cos(2 * phi) * number(f.a2) - sum[0]), 1e-12) << rho_um;
@@ -401,7 +401,7 @@ std::array<S, 6> outputs(const std::array<S, 9>& v, bool shell) {
   ball.n_host = v[2];
   ball.k0 = 2 * kPi * inverse(v[3]);
   const RadialSeries<S> series = radial_series(ball, 90);
-  const RadialField<S> f = RadialImage<S>(series, 0.7, v[6], 4.0)(v[7]);
+  const RadialAmplitudes<S> f = RadialImage<S>(series, 0.7, v[6], 4.0)(v[7]);
   return {f.a0.re, f.a0.im, f.a2.re, f.a2.im, extinction_efficiency(series), scattering_efficiency(series)};
 }
 
@@ -447,11 +447,11 @@ TEST(RadialSeries, DerivativesSurviveDegenerateInputs) {
     return RadialImage<S>(radial_series(ball, 60), 0.8, S(0.3), 3.0)(S(rho_um));
   };
   for (const double rho_um : {0.0, 1.0}) {
-    const RadialField<D> f = field(thickness, birefringence, rho_um);
+    const RadialAmplitudes<D> f = field(thickness, birefringence, rho_um);
     // One-sided in the thickness (second order), central in the birefringence: errors h^2 x (third derivatives of about 1e3).
     const double h = 1e-5, e = 1e-5;
-    const RadialField<double> f0 = field(0.0, 0.0, rho_um), f1 = field(h, 0.0, rho_um), f2 = field(2 * h, 0.0, rho_um);
-    const RadialField<double> up = field(0.0, e, rho_um), down = field(0.0, -e, rho_um);
+    const RadialAmplitudes<double> f0 = field(0.0, 0.0, rho_um), f1 = field(h, 0.0, rho_um), f2 = field(2 * h, 0.0, rho_um);
+    const RadialAmplitudes<double> up = field(0.0, e, rho_um), down = field(0.0, -e, rho_um);
     EXPECT_NEAR(f.a0.re.d[0], (4 * f1.a0.re - f2.a0.re - 3 * f0.a0.re) / (2 * h), 1e-6);
     EXPECT_NEAR(f.a2.im.d[0], (4 * f1.a2.im - f2.a2.im - 3 * f0.a2.im) / (2 * h), 1e-6);
     EXPECT_NEAR(f.a0.im.d[1], (up.a0.im - down.a0.im) / (2 * e), 1e-6);
@@ -470,7 +470,7 @@ TEST(RadialSeries, BigBallsAreFinite) {
     double flux = 0;
     const double step_um = 0.02;
     for (double rho_um = 0.5 * step_um; rho_um < reach_um; rho_um += step_um) {
-      const RadialField<double> f = image(rho_um);
+      const RadialAmplitudes<double> f = image(rho_um);
       ASSERT_TRUE(std::isfinite(norm(f.a0)) && std::isfinite(norm(f.a2)));
       flux += 2 * kPi * rho_um * step_um * (norm(f.a0) + norm(f.a2));
     }
