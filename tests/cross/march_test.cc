@@ -40,7 +40,8 @@ std::array<double, 6> uniaxial(double n_o, double n_e, double polar, double azim
 /// A smooth medium without any symmetry, periodic in the box of 8 um: a director that bends and twists, an index that varies.
 std::array<double, 6> smooth_medium(double x, double y, double z) {
   const double u = kPi * x / 4, v = kPi * y / 4;
-  return uniaxial(1.5 + 0.02 * std::cos(u - v) * std::sin(z), 1.65, 1.1 + 0.4 * std::sin(u) + 0.3 * std::cos(v + 0.5 * z), 0.5 + 0.8 * z + 0.5 * std::sin(u + 2 * v));
+  const double polar = 1.1 + 0.4 * std::sin(u) + 0.3 * std::cos(v + 0.5 * z), azimuth = 0.5 + 0.8 * z + 0.5 * std::sin(u + 2 * v);
+  return uniaxial(1.5 + 0.02 * std::cos(u - v) * std::sin(z), 1.65, polar, azimuth);
 }
 
 // ---- what must hold exactly ---------------------------------------------------------------------------------------------
@@ -94,7 +95,10 @@ std::array<Eigen::VectorXcd, 2> dense_march(const MarchGrid& grid, double k0, do
     for (int i = 0; i < grid.nx; ++i) {
       const double x = (i + 0.5) / grid.nx - 0.5, y = (j + 0.5) / grid.ny - 0.5;
       const int p = j * grid.nx + i;
-      for (int c = 0; c < b; ++c) to_points(p, c) = std::polar(1.0, 2 * kPi * (orders[static_cast<std::size_t>(c)][0] * x + orders[static_cast<std::size_t>(c)][1] * y));
+      for (int c = 0; c < b; ++c) {
+        const auto [m, l] = orders[static_cast<std::size_t>(c)];
+        to_points(p, c) = std::polar(1.0, 2 * kPi * (m * x + l * y));
+      }
       const auto here = dielectric(x * grid.box_x_um, y * grid.box_y_um, 0);
       for (std::size_t c = 0; c < 6; ++c) eps[c](p) = here[c];
     }
@@ -108,8 +112,10 @@ std::array<Eigen::VectorXcd, 2> dense_march(const MarchGrid& grid, double k0, do
     return m;
   };
   const Matrix ex = unknown(0), ey = unknown(1), hx = unknown(2), hy = unknown(3), ex_points = to_points * ex, ey_points = to_points * ey;
-  const Matrix hz = kx * ey - ky * ex;                                                                      // (curl E)_z
-  const Matrix ez_points = eps[2].cwiseInverse().asDiagonal() * (-to_points * (kx * hy - ky * hx) - times(4, ex_points) - times(5, ey_points));  // (curl H)_z = -Dz
+  const Matrix hz = kx * ey - ky * ex;  // (curl E)_z
+  // (curl H)_z = -Dz
+  const Matrix ez_points =
+      eps[2].cwiseInverse().asDiagonal() * (-to_points * (kx * hy - ky * hx) - times(4, ex_points) - times(5, ey_points));
   const Matrix ez = to_waves * ez_points;
   const Matrix dx = to_waves * (times(0, ex_points) + times(3, ey_points) + times(4, ez_points));
   const Matrix dy = to_waves * (times(3, ex_points) + times(1, ey_points) + times(5, ez_points));
@@ -175,12 +181,13 @@ TEST(March, RandomMediumIsTheExponentialOfMaxwellsMatrix) {
       std::vector<std::array<double, 6>> values;
       for (int p = 0; p < grid.nx * grid.ny; ++p) values.push_back(uniaxial(index(random), index(random), angle(random), angle(random)));
       const auto medium = [&](double x, double y, double) {
-        const int i = static_cast<int>(std::floor((x / grid.box_x_um + 0.5) * grid.nx)), j = grid.ny == 1 ? 0 : static_cast<int>(std::floor((y / grid.box_y_um + 0.5) * grid.ny));
+        const int i = static_cast<int>(std::floor((x / grid.box_x_um + 0.5) * grid.nx));
+        const int j = grid.ny == 1 ? 0 : static_cast<int>(std::floor((y / grid.box_y_um + 0.5) * grid.ny));
         return values[static_cast<std::size_t>(j * grid.nx + i)];
       };
       const MarchWave wave{kappa, {{{0.6, 0.2}, {-0.3, 0.7}}}};
       MarchGrid dense_grid = grid;
-      if (grid.ny == 1) dense_grid.box_y_um = 1;
+      if (grid.ny == 1) dense_grid.box_y_um = 1;  // any
       const auto field = march(grid, kK0, 1.52, medium, {wave})[0];
       EXPECT_LT(difference(field, dense_march(dense_grid, kK0, 1.52, medium, wave)), 1e-10);
       EXPECT_NEAR(field.flux_out / field.flux_in, 1, 1e-11);
@@ -190,7 +197,7 @@ TEST(March, RandomMediumIsTheExponentialOfMaxwellsMatrix) {
 
 TEST(March, FluxIsConserved) {
   const IndependentBall ball{2.5, 1.52, 1.74, 1.43, 0.25, radial_director};
-  const auto fields = march({40, 40, 10, 10, -2.7, 2.7, 18, 2}, kK0, 1.43, ball, {{{0, 0}, kDiagonal}, {{0.3, -0.2}, {1, Number(0, 1)}}}, 2);
+  const auto fields = march({40, 40, 10, 10, -2.7, 2.7, 14}, kK0, 1.43, ball, {{{0, 0}, kDiagonal}, {{0.3, -0.2}, {1, Number(0, 1)}}}, 2);
   const auto smooth = march({24, 24, 8, 8, 0, 4, 10}, kK0, 1.55, smooth_medium, {{}});
   for (const auto& field : {fields[0], fields[1], smooth[0]}) {
     fmt::print("flux out / in - 1 = {:.1e}\n", field.flux_out / field.flux_in - 1);
@@ -239,14 +246,14 @@ double distance(const MarchedField& a, const MarchedField& b) {
   return std::sqrt(sum / all);
 }
 
-// Means over slabs: second order, half the slab a quarter of the error.
-TEST(March, ErrorFallsWithTheSquareOfTheSlabs) {
-  const auto at = [](int slabs) { return march({24, 24, 8, 8, 0, 4, slabs, 2}, kK0, 1.55, smooth_medium, {{}})[0]; };
+// Half the slab, a sixteenth of the error.
+TEST(March, ErrorFallsWithTheFourthPowerOfTheSlab) {
+  const auto at = [](int slabs) { return march({16, 16, 8, 8, 0, 4, slabs, 1}, kK0, 1.55, smooth_medium, {{}})[0]; };
   const MarchedField fine = at(320);
-  const double e20 = distance(at(20), fine), e40 = distance(at(40), fine), e80 = distance(at(80), fine);
-  fmt::print("slabs 20, 40, 80: {:.2e} {:.2e} {:.2e}, orders {:.2f} {:.2f}\n", e20, e40, e80, std::log2(e20 / e40), std::log2(e40 / e80));
-  // 20 slabs are not yet in the limit. The error of `fine` itself takes (80/320)^2 = 1/16 off the smallest: the order seen is 2.07.
-  EXPECT_NEAR(std::log2(e40 / e80), 2.07, 0.05);
+  const double e40 = distance(at(40), fine), e80 = distance(at(80), fine), e160 = distance(at(160), fine);
+  fmt::print("slabs 40, 80, 160: {:.2e} {:.2e} {:.2e}, orders {:.2f} {:.2f}\n", e40, e80, e160, std::log2(e40 / e80), std::log2(e80 / e160));
+  // The next term of the error, seen in the first order printed, is still in the second; that of `fine` takes 1/16 off the smallest, 0.09 of the order.
+  EXPECT_NEAR(std::log2(e80 / e160), 4.09, 0.2);
 }
 
 // Points: for a smooth medium the error falls faster than any power, down to rounding.
@@ -307,8 +314,8 @@ std::vector<double> exact_image(const Ball& ball, double aperture, double focus_
       }
       // Cubic through four rows: steps are below a seventh of the finest detail, lambda/NA.
       const double u = at - static_cast<double>(first);
-      const Number value = u * (u - 1) * (u - 2) / -6 * a2[first - 1] + (u + 1) * (u - 1) * (u - 2) / 2 * a2[first] - (u + 1) * u * (u - 2) / 2 * a2[first + 1] +
-                           (u + 1) * u * (u - 1) / 6 * a2[first + 2];
+      const Number value = u * (u - 1) * (u - 2) / -6 * a2[first - 1] + (u + 1) * (u - 1) * (u - 2) / 2 * a2[first] -
+                           (u + 1) * u * (u - 2) / 2 * a2[first + 1] + (u + 1) * u * (u - 1) / 6 * a2[first + 2];
       const double cos_2phi = (x * x - y * y) / (x * x + y * y);  // sin 2(phi - 45 degrees) = -cos 2 phi
       image.push_back(std::norm(value) * cos_2phi * cos_2phi);
     }
@@ -316,10 +323,10 @@ std::vector<double> exact_image(const Ball& ball, double aperture, double focus_
 }
 
 /// Relative RMS of the picture at NA 0.4 and 0.8 with the focus on the centre, then 2 um beyond.
-std::array<double, 4> ball_errors(const Ball& ball, int n, double box_um, int slabs, int subslices = 3) {
+std::array<double, 4> ball_errors(const Ball& ball, int n, double box_um, int slabs) {
   const double ramp = box_um / n, k0 = 2 * kPi / ball.wavelength_um, z = ball.radius_um + 0.5 * ramp;
   const IndependentBall medium{ball.radius_um, ball.n_o, ball.n_e, ball.n_host, ramp, radial_director};
-  const MarchedField field = march({n, n, box_um, box_um, -z, z, slabs, subslices}, k0, ball.n_host, medium, {{{0, 0}, kDiagonal}})[0];
+  const MarchedField field = march({n, n, box_um, box_um, -z, z, slabs}, k0, ball.n_host, medium, {{{0, 0}, kDiagonal}})[0];
   std::array<double, 4> errors{};
   for (std::size_t c = 0; c < 4; ++c) {
     const double aperture = c % 2 == 0 ? 0.4 : 0.8, focus = c < 2 ? 0 : 2;
@@ -330,41 +337,42 @@ std::array<double, 4> ball_errors(const Ball& ball, int n, double box_um, int sl
       if (!std::isnan(exact[i])) ours.push_back(image[i]), theirs.push_back(exact[i]);
     errors[c] = relative_rms(ours, theirs);
   }
-  fmt::print("R {} {}/{} in {}, {} um: {} points {} um, {} slabs: centre {:.4f} {:.4f}, +2 um {:.4f} {:.4f}\n", ball.radius_um, ball.n_o, ball.n_e, ball.n_host,
-             ball.wavelength_um, n, box_um, slabs, errors[0], errors[1], errors[2], errors[3]);
+  fmt::print("R {} {}/{} in {}, {} um: {} points {} um, {} slabs: centre {:.4f} {:.4f}, +2 um {:.4f} {:.4f}\n", ball.radius_um, ball.n_o, ball.n_e,
+             ball.n_host, ball.wavelength_um, n, box_um, slabs, errors[0], errors[1], errors[2], errors[3]);
   return errors;
 }
 
-// Light reflected twice inside is not in the march: near the axis it has r^2 = ((1.74 - 1.52)/(1.74 + 1.52))^2 = 0.0046 of the
-// amplitude, which interferes to 2 r^2 = 0.9 % of the intensity; at the rim, where light falls in flat, several times as much on a small part. So
-// 0.01-0.02 is the floor, and the bounds below are about twice that. A wrong sign anywhere costs tens of percent.
-constexpr double kNa04 = 0.025, kNa08 = 0.035;
-
-void expect_close(const std::array<double, 4>& errors) {
-  for (std::size_t c = 0; c < 4; ++c) EXPECT_LT(errors[c], c % 2 == 0 ? kNa04 : kNa08) << c;
+// Light reflected twice inside is not in the march: on the axis it has r^2 = ((n_e - n_host)/(n_e + n_host))^2 of the amplitude (0.0046 for
+// 1.74 in 1.52), which interferes to 2 r^2 of the intensity; towards the rim, where light meets the surface at a slant, r^2 is several times
+// larger, on the part of the picture that NA 0.8 sees. So 4 and 5 r^2, and 0.008 and 0.012 for the points (RadialBallConverges: 0.005 to
+// 0.01 from 72 to 128 of them). A wrong sign anywhere costs tens of percent, a second-order term left out 0.02-0.1.
+void expect_close(const Ball& ball, int n, double box_um, int slabs) {
+  const double r = (ball.n_e - ball.n_host) / (ball.n_e + ball.n_host);
+  const auto errors = ball_errors(ball, n, box_um, slabs);
+  for (std::size_t c = 0; c < 4; ++c) EXPECT_LT(errors[c], c % 2 == 0 ? 0.008 + 4 * r * r : 0.012 + 5 * r * r) << c;
 }
 
-TEST(March, RadialBallInItsOrdinaryIndex) { expect_close(ball_errors({4.5, 1.52, 1.74, 1.52, 0.59}, 96, 16, 60)); }
-TEST(March, SmallRadialBall) { expect_close(ball_errors({2.5, 1.52, 1.74, 1.52, 0.59}, 96, 12, 40)); }
-TEST(March, RadialBallInALowerIndex) { expect_close(ball_errors({4.65, 1.52, 1.74, 1.47, 0.59}, 96, 16, 60)); }
+TEST(March, RadialBallInItsOrdinaryIndex) { expect_close({4.5, 1.52, 1.74, 1.52, 0.59}, 96, 16, 24); }
+TEST(March, SmallRadialBall) { expect_close({2.5, 1.52, 1.74, 1.52, 0.59}, 96, 12, 16); }
+TEST(March, RadialBallInALowerIndex) { expect_close({4.65, 1.52, 1.74, 1.47, 0.59}, 96, 16, 24); }
 
 TEST(March, RadialBallConverges) {
   const Ball ball{2.5, 1.52, 1.74, 1.52, 0.59};
-  // Slabs of 0.55, 0.28, 0.14 um at one grid; then points.
-  const auto a = ball_errors(ball, 72, 12, 9), b = ball_errors(ball, 72, 12, 18), c = ball_errors(ball, 72, 12, 36);
+  // Slabs of 1.03, 0.58, 0.29 um at one grid, where the points are what is left; then points.
+  const auto a = ball_errors(ball, 72, 12, 5), b = ball_errors(ball, 72, 12, 9), c = ball_errors(ball, 72, 12, 18);
   EXPECT_GT(a[1], b[1]);
   EXPECT_GT(b[1], c[1]);
-  const auto d = ball_errors(ball, 48, 12, 36), e = ball_errors(ball, 128, 12, 36);
+  const auto d = ball_errors(ball, 48, 12, 18), e = ball_errors(ball, 128, 12, 18);
   EXPECT_GT(d[1], c[1]);
   EXPECT_GT(c[1], e[1]);
 }
 
 TEST(LongMarch, RadialBalls) {
-  expect_close(ball_errors({4.5, 1.52, 1.74, 1.52, 0.59}, 160, 20, 120, 2));
-  expect_close(ball_errors({7.0, 1.52, 1.62, 1.52, 0.59}, 160, 24, 90));
-  expect_close(ball_errors({6.0, 1.5, 1.45, 1.5, 0.633}, 128, 20, 80));
-  expect_close(ball_errors({4.65, 1.52, 1.74, 1.47, 0.59}, 160, 20, 120, 2));
-  expect_close(ball_errors({4.5, 1.534, 1.707, 1.42, 0.48}, 160, 18, 120, 2));
+  expect_close({4.5, 1.52, 1.74, 1.52, 0.59}, 160, 20, 40);
+  expect_close({7.0, 1.52, 1.62, 1.52, 0.59}, 160, 24, 40);
+  expect_close({6.0, 1.5, 1.45, 1.5, 0.633}, 128, 20, 30);
+  expect_close({4.65, 1.52, 1.74, 1.47, 0.59}, 160, 20, 40);
+  expect_close({4.5, 1.534, 1.707, 1.42, 0.48}, 160, 18, 60);
 }
 
 // ---- tilted light -------------------------------------------------------------------------------------------------------
@@ -376,7 +384,7 @@ TEST(March, TiltedLightScattersByTheAngleFromItself) {
   const int points = 64;
   const IndependentBall ball{radius, 1.52, 1.74, n, box / points, radial_director};
   const double tilt = std::asin(0.2 / n);
-  const auto fields = march({points, points, box, box, -z, z, 24, 3}, kK0, n, ball,
+  const auto fields = march({points, points, box, box, -z, z, 12}, kK0, n, ball,
                             {{{0, 0}, {0, 1}}, {{0.2, 0}, {0, 1}}, {{0, 0}, {1, 0}}, {{0.2, 0}, {std::cos(tilt), 0}}}, 2);
   const auto far = [&](const MarchedField& field, double kappa_in, double angle, bool s) {
     const double kappa = n * std::sin(angle), q = n * std::cos(angle);
@@ -397,22 +405,24 @@ TEST(March, TiltedLightScattersByTheAngleFromItself) {
     }
     const double error = std::sqrt(difference / all);
     fmt::print("{} light tilted by kappa 0.2: {:.4f} from the untilted far field\n", s ? "s" : "p", error);
-    EXPECT_LT(error, 0.03);
+    // What is seen of the square points (0.16 um, errors of 0.01 in the pictures above) from two directions 7.6 degrees apart.
+    EXPECT_LT(error, 0.005);
   }
 }
 
 // ---- the radial cylinder: two Maxwell solvers ---------------------------------------------------------------------------
 
 /// Crossed image, polarizer at 45 degrees, of a periodic row of cylinders, at 160 points over the period, by its orders one by one.
-std::vector<double> row_image(const std::vector<double>& x_um, const std::vector<Number>& tx, const std::vector<Number>& ty, double period_um, double n, double aperture,
-                              double distance_um) {
+std::vector<double> row_image(const std::vector<double>& x_um, const std::vector<Number>& tx, const std::vector<Number>& ty, double period_um,
+                              double n, double aperture, double distance_um) {
   std::vector<Number> difference(160);
   const int orders = static_cast<int>(aperture * kK0 * period_um / (2 * kPi));
   for (int m = -orders; m <= orders; ++m) {
     const double k = 2 * kPi * m / period_um, q = std::sqrt(n * n - k * k / (kK0 * kK0));
     Number amplitude = 0;
     for (std::size_t i = 0; i < x_um.size(); ++i) amplitude += (tx[i] - ty[i]) * std::polar(1.0 / static_cast<double>(x_um.size()), -k * x_um[i]);
-    for (std::size_t i = 0; i < 160; ++i) difference[i] += amplitude * std::polar(1.0, k * (static_cast<double>(i) + 0.5) * period_um / 160 + kK0 * q * distance_um);
+    amplitude *= std::polar(1.0, kK0 * q * distance_um);
+    for (std::size_t i = 0; i < 160; ++i) difference[i] += amplitude * std::polar(1.0, k * (static_cast<double>(i) + 0.5) * period_um / 160);
   }
   std::vector<double> image;
   for (const Number& d : difference) image.push_back(0.25 * std::norm(d));
@@ -435,7 +445,7 @@ TEST(March, RadialCylindersAgreeWithMaxwellSolvers) {
   };
   for (const int points : {160, 320}) {
     const IndependentBall cylinder{2, 1.52, 1.74, n, period / points, radial_cylinder_director, true};
-    const auto fields = march({points, 1, period, 0, -exit, exit, points == 160 ? 80 : 200, 3}, kK0, n, cylinder, {{{0, 0}, {1, 0}}, {{0, 0}, {0, 1}}});
+    const auto fields = march({points, 1, period, 0, -exit, exit, points == 160 ? 16 : 40}, kK0, n, cylinder, {{{0, 0}, {1, 0}}, {{0, 0}, {0, 1}}});
     // E along y sees n_o = n_host: nothing happens.
     EXPECT_LT(largest(fields[1].ey), 1e-10);
     std::vector<double> x;
@@ -447,11 +457,12 @@ TEST(March, RadialCylindersAgreeWithMaxwellSolvers) {
     }
     for (const double distance : {0.0, -exit})
       for (const double aperture : {0.4, 0.8}) {
-        const auto ours = row_image(x, tx, ty, period, n, aperture, distance), meep = table_image("meep80", aperture, distance), tmm = table_image("tmm2d", aperture, distance);
+        const auto ours = row_image(x, tx, ty, period, n, aperture, distance);
+        const auto meep = table_image("meep80", aperture, distance), tmm = table_image("tmm2d", aperture, distance);
         const double a = relative_rms(ours, meep), b = relative_rms(ours, tmm), between = relative_rms(tmm, meep);
-        fmt::print("{} points, {} NA {}: from meep80 {:.3f}, from tmm2d {:.3f}; these from each other {:.3f}\n", points, distance == 0 ? "exit  " : "centre", aperture, a, b,
-                   between);
-        // The two solvers differ by up to 0.040 (meep80's grid and tmm2d's slabs); the march is one more such witness.
+        fmt::print("{} points, {} NA {}: from meep80 {:.3f}, from tmm2d {:.3f}; these from each other {:.3f}\n", points,
+                   distance == 0 ? "exit  " : "centre", aperture, a, b, between);
+        // The two differ by up to 0.040 from each other (meep80 is good to 0.03-0.05 by its maker, README there); the march is a third witness.
         EXPECT_LT(a, 0.04);
         EXPECT_LT(b, 0.04);
       }
