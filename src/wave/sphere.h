@@ -60,7 +60,11 @@ class SphereMedium final : public WaveMedium<S> {
     const Vec3<S> r{inverse_radius_ * place_um.x, inverse_radius_ * place_um.y, inverse_radius_ * place_um.z};
     return std::visit([&](const auto& field) { return field.template at<S>(r); }, o_.field);
   }
-  S ramped(const S& depth_um) const { return min_of(max_of(depth_um * (1 / ramp_) + 0.5, S(0.0)), S(1.0)); }
+  /// A cubic: its slope is continuous, so that the image's derivative by a radius is, too.
+  S ramped(const S& depth_um) const {
+    const S t = min_of(max_of(depth_um * (1 / ramp_) + 0.5, S(0.0)), S(1.0));
+    return t * t * (3.0 - 2.0 * t);
+  }
   /// Fraction c of the uniaxial medium, the rest isotropic.
   static OpticalPoint<S> mixed(const Vec3<S>& n, const Vec3<S>& face, const S& eo, const S& ee, const S& other, const S& c) {
     const S de = ee - eo, rest = 1.0 - c;

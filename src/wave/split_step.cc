@@ -135,6 +135,10 @@ class Propagation {
     host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
     clear(host_slab_);
     for (int l = 0; l < g_.layers; ++l) add_layer(host_slab_, host_, light.k0_per_um, g_.n_ref, h_ / g_.layers);
+    felt_.assign(static_cast<std::size_t>(g_.ny) * kFields, 0);
+    awake_[0] = 1;
+    for (int f = 1; f < kFields; ++f)
+      awake_[static_cast<std::size_t>(f)] = part(light.k0_per_um, f) != 0 || part(incident_[0], f) != Z(0) || part(incident_[1], f) != Z(0);
     for (int a = 0; a < 2; ++a)
       for (int f = 0; f < kFields; ++f) {
         std::fill(fields_[f].a[a].begin(), fields_[f].a[a].end(), Z(0));
@@ -149,6 +153,8 @@ class Propagation {
       for (int slab = 0; slab < g_.slabs; ++slab) {
         const double from = g_.entry_um + slab * h_;
         crew.each(g_.ny, [&](int row) { sample_row(from, row); });
+        if (t == 0) wake();
+        crew.barrier.arrive_and_wait();
         // The oblique terms before the screen in one slab, behind it in the next: symmetric over two, so of second order.
         const bool before = slab % 2 == 0;
         for (int order = 1; before && order <= g_.order; ++order) oblique(crew, order);
@@ -207,12 +213,19 @@ class Propagation {
   }
   static constexpr double kAbsorption = 1.5;  ///< 1/um at the outer edge: strong enough over a frame, weak enough not to reflect
 
+  /// Parameters that the light has not met yet, or never will (where the picture lies), cost nothing.
+  void wake() {
+    for (std::size_t k = 0; k < felt_.size(); ++k) awake_[k % kFields] |= felt_[k];
+  }
+  bool asleep(int f) const { return !awake_[static_cast<std::size_t>(f)]; }
+
   double* table(int quantity, int field) { return table_.data() + (static_cast<std::size_t>(quantity) * kFields + static_cast<std::size_t>(field)) * n_; }
   const double* table(int quantity, int field) const { return const_cast<Propagation*>(this)->table(quantity, field); }
 
   void sample_row(double from_um, int row) {
     alignas(64) double x[kLanes];
     const double dz = h_ / g_.layers;
+    char* felt = felt_.data() + row * kFields;
     for (int i = 0; i < g_.nx; i += kLanes) {
       const int count = std::min(kLanes, g_.nx - i);
       for (int k = 0; k < kLanes; ++k) x[k] = g_.x_um(i + std::min(k, count - 1));
@@ -223,17 +236,18 @@ class Propagation {
       bool host = true;
       for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz);
       if (host) {
-        store(host_slab_, to, count);
+        store(host_slab_, to, count, felt);
         continue;
       }
       for (int l = 0; l < g_.layers; ++l) add_layer(p, medium_.at(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz), light_.k0_per_um, g_.n_ref, dz);
-      store(p, to, count);
+      store(p, to, count, felt);
     }
   }
-  void store(const SlabPoint<S>& p, std::size_t to, int count) {
+  void store(const SlabPoint<S>& p, std::size_t to, int count, char* felt) {
     const auto put = [&](int quantity, const S& x) {
       for (int f = 0; f < kFields; ++f) {
         double* out = table(quantity, f) + to;
+        if (f > 0 && !felt[f]) felt[f] = xsimd::any(lanes(x, f) != Pack(0.0));
         if (count == kLanes) {
           lanes(x, f).store_unaligned(out);
         } else {
@@ -274,6 +288,7 @@ class Propagation {
   void oblique(const Crew& crew, int order) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     crew.each(6 * kFields, [&](int job) {
+      if (asleep(job / 6)) return;
       Field& field = fields_[static_cast<std::size_t>(job / 6)];
       const int which = job % 6;
       const int component = which < 2 ? which : (which - 2) / 2;
@@ -290,6 +305,7 @@ class Propagation {
         Z in[6];
         for (int q = 0; q < 6; ++q) in[q] = fields_[0].work[q][i];
         for (int f = kFields - 1; f >= 0; --f) {
+          if (asleep(f)) continue;
           Z own[6], out[6] = {};
           for (int q = 0; q < 6; ++q) own[q] = fields_[static_cast<std::size_t>(f)].work[q][i];
           oblique_at(c[0], i, own, out);
@@ -298,10 +314,14 @@ class Propagation {
         }
       }
     });
-    crew.each(6 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]); });
+    crew.each(6 * kFields, [&](int job) {
+      if (!asleep(job / 6)) fft_.forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]);
+    });
     const Z factor(0, 1.0 / (order * static_cast<double>(n_)));
     crew.each(g_.ny, [&](int row) {
-      for (Field& field : fields_)
+      for (int f = 0; f < kFields; ++f) {
+        if (asleep(f)) continue;
+        Field& field = fields_[static_cast<std::size_t>(f)];
         for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
           const bool kept = half_step_[i] != Z(0);
           const double kx = kx_[i % nx], ky = ky_[i / nx];
@@ -312,6 +332,7 @@ class Propagation {
             field.a[a][i] += t;
           }
         }
+      }
     });
   }
 
@@ -333,10 +354,15 @@ class Propagation {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     const auto half_way = [&] {
       crew.each(2, [&](int a) { diffract(0, a); });
-      if (kFields > 1) crew.each(2 * (kFields - 1), [&](int job) { diffract(1 + job / 2, job % 2); });
+      if (kFields > 1)
+        crew.each(2 * (kFields - 1), [&](int job) {
+          if (!asleep(1 + job / 2)) diffract(1 + job / 2, job % 2);
+        });
     };
     half_way();
-    crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+    crew.each(2 * kFields, [&](int job) {
+      if (!asleep(job / 2)) fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
+    });
     Z inc[kFields][2];
     Complex<S> at_screen[2] = {incident_[0], incident_[1]};
     if (oblique_before) incident_oblique(at_screen);
@@ -351,6 +377,7 @@ class Propagation {
         const double keep = frame_x_[i % nx] * frame_y_[static_cast<std::size_t>(row)];
         const Z x = over * fields_[0].a[0][i], y = over * fields_[0].a[1][i];
         for (int f = kFields - 1; f >= 0; --f) {
+          if (asleep(f)) continue;
           Field& field = fields_[static_cast<std::size_t>(f)];
           const auto screen = [&](int a, int b, int plane) { return Z(table(kScreen + 4 * a + 2 * b, plane)[i], table(kScreen + 4 * a + 2 * b + 1, plane)[i]); };
           const Z own_x = over * field.a[0][i], own_y = over * field.a[1][i];
@@ -362,7 +389,9 @@ class Propagation {
         }
       }
     });
-    crew.each(2 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+    crew.each(2 * kFields, [&](int job) {
+      if (!asleep(job / 2)) fft_.forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
+    });
     half_way();
   }
 
@@ -425,6 +454,8 @@ class Propagation {
   std::size_t n_;
   double h_;
   std::array<Field, static_cast<std::size_t>(kFields)> fields_;
+  std::vector<char> felt_;     ///< [row][field]: some point of the row depends on the parameter
+  std::array<char, static_cast<std::size_t>(kFields)> awake_{};
   std::vector<double> table_;  ///< [quantity][value or derivative][point]
   std::vector<double> kx_, ky_;
   Plane half_step_;
