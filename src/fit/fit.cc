@@ -277,10 +277,12 @@ void Fit::look_near_rays() {
   minima.insert(minima.end(), rays.rivals_.begin(), rays.rivals_.end());
   starts = minima;
   starts.push_back(start_);
+  Eigen::VectorXd rates = Eigen::VectorXd::Zero(start_.size());
   for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
     const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
     double rate = 0;
     for (const Micrograph& m : by_rays.micrographs) rate = std::max(rate, std::abs(fringe_phase_per_unit(m.scene, rays.theta_, unknowns_.searched[j])));
+    rates[static_cast<Eigen::Index>(j)] = rate;
     if (!(rate * (parameter.upper - parameter.lower) > std::numbers::pi)) continue;
     for (const double orders : {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0}) {
       Eigen::VectorXd x = rays.best_;
@@ -294,7 +296,10 @@ void Fit::look_near_rays() {
   for (int g = 0; g < frames_; ++g) sets.push_back(pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]));
   LeastSquares all(job_, unknowns_, plans_, std::move(sets));
   all.set_misfit(prior_misfit());
-  found_ = polish(all, job_, std::move(starts), 3);
+  // Less than a third of an order apart in everything that forms fringes: the same minimum.
+  found_ = polish(all, job_, std::move(starts), 3, [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+    return ((a - b).cwiseProduct(rates)).cwiseAbs().maxCoeff() < 2;
+  });
   found_.traces = std::move(result_.scans);
   found_.points += scan_points_;
   evaluations_ += all.evaluations();

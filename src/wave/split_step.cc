@@ -101,7 +101,7 @@ class Propagation {
  public:
   static constexpr int kFields = 1 + ScalarTraits<S>::derivatives;
   Propagation(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium)
-      : g_(grid), light_(light), medium_(medium), fft_(grid.nx, grid.ny), n_(fft_.size()), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
+      : g_(grid), light_(light), medium_(medium), fft_(shared_fft(grid.nx, grid.ny)), n_(fft_->size()), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
     for (auto& field : fields_)
       for (Plane* plane : {&field.a[0], &field.a[1], &field.term[0], &field.term[1]}) plane->resize(n_);
     for (auto& field : fields_)
@@ -162,7 +162,7 @@ class Propagation {
         for (int order = 1; !before && order <= g_.order; ++order) oblique(crew, order);
         if (t == 0) pass_incident(before);
       }
-      crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+      crew.each(2 * kFields, [&](int job) { fft_->inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
     });
     return scattered();
   }
@@ -295,7 +295,7 @@ class Propagation {
       const Plane& from = order == 1 ? field.a[component] : field.term[component];
       Plane& to = field.work[which];
       for (std::size_t i = 0; i < n_; ++i) to[i] = which < 2 ? from[i] : (which % 2 == 0 ? kx_[i % nx] : ky_[i / nx]) * from[i];
-      fft_.inverse(to);
+      fft_->inverse(to);
     });
     crew.each(g_.ny, [&](int row) {
       Coefficients c[kFields];
@@ -315,7 +315,7 @@ class Propagation {
       }
     });
     crew.each(6 * kFields, [&](int job) {
-      if (!asleep(job / 6)) fft_.forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]);
+      if (!asleep(job / 6)) fft_->forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]);
     });
     const Z factor(0, 1.0 / (order * static_cast<double>(n_)));
     crew.each(g_.ny, [&](int row) {
@@ -361,7 +361,7 @@ class Propagation {
     };
     half_way();
     crew.each(2 * kFields, [&](int job) {
-      if (!asleep(job / 2)) fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
+      if (!asleep(job / 2)) fft_->inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
     });
     Z inc[kFields][2];
     Complex<S> at_screen[2] = {incident_[0], incident_[1]};
@@ -390,7 +390,7 @@ class Propagation {
       }
     });
     crew.each(2 * kFields, [&](int job) {
-      if (!asleep(job / 2)) fft_.forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
+      if (!asleep(job / 2)) fft_->forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
     });
     half_way();
   }
@@ -450,7 +450,7 @@ class Propagation {
   const WaveGrid& g_;
   const WaveLight<S>& light_;
   const WaveMedium<S>& medium_;
-  Fft2 fft_;
+  std::shared_ptr<const Fft2> fft_;
   std::size_t n_;
   double h_;
   std::array<Field, static_cast<std::size_t>(kFields)> fields_;
