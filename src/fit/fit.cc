@@ -377,8 +377,32 @@ void Fit::find_minima() {
     minima.push_back({x, problem_->objective(), summary.converged, summary.report});
     if (stopped_) break;
   }
-  const auto lowest = std::min_element(minima.begin(), minima.end(),
-                                       [](const Minimum& a, const Minimum& b) { return a.objective < b.objective; });
+  const auto lower = [](const Minimum& a, const Minimum& b) { return a.objective < b.objective; };
+  // A sphere's ripples are too fine for the scan's grid: from the best minimum on to its neighbours, as long as that helps.
+  for (int round = 0; round < 4 && !stopped_; ++round) {
+    const Minimum from = *std::min_element(minima.begin(), minima.end(), lower);
+    bool better = false;
+    for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
+      const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
+      double period = 0;
+      for (const Micrograph& m : job_.micrographs) period = std::max(period, ripple_period(m.scene, problem_->theta(), unknowns_.searched[j]));
+      for (const double ripples : {-2.0, -1.0, 1.0, 2.0}) {
+        Eigen::VectorXd x = from.searched;
+        double& moved = x[static_cast<Eigen::Index>(j)];
+        moved += ripples * period;
+        if (period == 0 || stopped_ || moved < parameter.lower || moved > parameter.upper) continue;
+        const SolveSummary summary = solve(x, "", 30);
+        const double objective = problem_->objective();
+        better = better || objective < from.objective;
+        const bool known = std::any_of(minima.begin(), minima.end(), [&](const Minimum& m) {
+          return std::abs(m.searched[static_cast<Eigen::Index>(j)] - x[static_cast<Eigen::Index>(j)]) < 0.2 * period && std::abs(m.objective - objective) < 1;
+        });
+        if (!known && objective - from.objective < kPlausible * reduced) minima.push_back({x, objective, summary.converged, summary.report});
+      }
+    }
+    if (!better) break;
+  }
+  const auto lowest = std::min_element(minima.begin(), minima.end(), lower);
   best_ = lowest->searched;
   result_.converged = lowest->converged && !stopped_;
   result_.solver_report = lowest->report;
