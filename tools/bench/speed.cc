@@ -65,6 +65,42 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
+/// What wave optics of a sphere costs against the ray picture of the same size.
+void time_waves(int rounds) {
+  for (const double diameter : {9.0, 20.0}) {
+    DropletScene s = droplet_scene(false, 500, 1.42 * diameter / 500);
+    s.table[std::get<Droplet>(s.scene.sample).diameter_um].value = diameter;
+    s.scene.microscope.objective_na = 0.8;
+    const Theta theta = s.table.values();
+    const RenderPlan rays = plan(s.scene, theta);
+    s.scene.ceiling = Ceiling::wave;
+    const RenderPlan series = plan(s.scene, theta);
+    s.scene.method = "split_step";
+    const RenderPlan propagated = plan(s.scene, theta);
+    // Diameter and indices change the light itself; two of `four` only move the picture.
+    const std::vector<int> of_light{s.eight[0], s.eight[1], s.eight[4], s.eight[5]};
+    Rendering out, derivatives;
+    std::vector<double> by_rays, by_series, by_series_four, by_waves, one, four, four_light;
+    for (int i = 0; i < rounds; ++i) {
+      by_rays.push_back(seconds_of([&] { render(s.scene, rays, theta, {}, 0, out); }));
+      by_series.push_back(seconds_of([&] { render(s.scene, series, theta, {}, 0, out); }));
+      by_series_four.push_back(seconds_of([&] { render(s.scene, series, theta, s.four, 0, derivatives); }));
+      by_waves.push_back(seconds_of([&] { render(s.scene, propagated, theta, {}, 0, out); }));
+      one.push_back(seconds_of([&] { render(s.scene, propagated, theta, {}, 1, out); }));
+      four.push_back(seconds_of([&] { render(s.scene, propagated, theta, s.four, 0, derivatives); }));
+      four_light.push_back(seconds_of([&] { render(s.scene, propagated, theta, of_light, 0, derivatives); }));
+    }
+    const double image = median(by_waves);
+    std::printf("500 x 500 radial droplet of %g um, NA 0.8, as waves:\n", diameter);
+    std::printf("  exact series                  %8.2f ms   %.2f times rays; with four derivatives %.2f ms, %.2f times\n", 1e3 * median(by_series),
+                median(by_series) / median(by_rays), 1e3 * median(by_series_four), median(by_series_four) / median(by_series));
+    std::printf("  propagation                   %8.2f ms   %.1f times rays; one thread %.2f ms, %.2f times\n", 1e3 * image, image / median(by_rays), 1e3 * median(one),
+                median(one) / image);
+    std::printf("    four derivatives            %8.2f ms   %.2f times the image; all four by what light meets %.2f ms, %.2f times\n", 1e3 * median(four), median(four) / image,
+                1e3 * median(four_light), median(four_light) / image);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -147,4 +183,7 @@ int main(int argc, char** argv) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   std::printf("peak memory %.0f MB\n", static_cast<double>(usage.ru_maxrss) / 1024);
+  time_waves(std::max(3, rounds / 3));
+  getrusage(RUSAGE_SELF, &usage);
+  std::printf("peak memory with waves %.0f MB\n", static_cast<double>(usage.ru_maxrss) / 1024);
 }
