@@ -15,36 +15,46 @@ namespace {
 using Z = std::complex<double>;
 
 // One slab of thickness h takes the field through
-//   a <- D^(1/2) S D^(1/2) exp(i h k0 V') a,
+//   a <- exp(i k0 V'_2) D^(1/2) S D^(1/2) exp(i k0 V'_1) a,
 // D free propagation in n_ref, S the screen: the ordered product over thin layers of exp(i k0 dz (N - n_ref)), N the exact 2 x 2
-// operator of normal incidence (N_e along the transverse director t, N_o along s), and V' what transverse wavevectors
-// kappa = k / k0 add to the second order:
+// operator of normal incidence (N_e along the transverse director t, N_o along s), and V'_1, V'_2 what transverse wavevectors
+// kappa = k / k0 add to the second order, summed over the layers of the first and of the second half. The second half of one slab and the first
+// of the next are taken together: second order in h for the price of the first.
 //   V' a = -1/2 [kappa (v . a) + v (kappa . a)] - 1/2 kappa (sd (kappa . a)) - 1/2 kappa' (sc (kappa' . a)) + kappa_i (D_ij (kappa_j a)).
 // It follows from the Riccati equation of the one-way Maxwell system, h = Y e; the order of wavevector and coefficient counts. v walks
 // extraordinary light off sideways; sd, sc and D are what diffraction in the medium has beyond that in n_ref.
 
-/// Of a slab at one point, h and k0 taken in: h v, (h / k0) of the others; the screen is the product over the layers.
+/// V' of some thickness at one point, thickness and k0 taken in: h v, (h / k0) of the others.
 template <class S>
-struct SlabPoint {
-  Complex<S> screen[2][2];
+struct ObliquePoint {
   S v[2];
   S sd, sc;
   S d[3][3];  ///< D_ij^ab: ij, ab = xx, xy, yy
 };
-constexpr int kScreen = 0, kWalk = 8, kSd = 10, kSc = 11, kD = 12, kQuantities = 21;
+constexpr int kWalk = 0, kSd = 2, kSc = 3, kD = 4, kObliques = 13;
+/// Of a slab at one point; the screen is the product over the layers.
+template <class S>
+struct SlabPoint {
+  Complex<S> screen[2][2];
+  ObliquePoint<S> half[2];
+};
+constexpr int kScreens = 8;
 
 template <class S>
 void clear(SlabPoint<S>& p) {
   p.screen[0][0] = p.screen[1][1] = Complex<S>(S(1.0));
   p.screen[0][1] = p.screen[1][0] = Complex<S>();
-  p.v[0] = p.v[1] = p.sd = p.sc = S(0.0);
-  for (auto& row : p.d)
-    for (S& x : row) x = S(0.0);
+  for (ObliquePoint<S>& o : p.half) {
+    o.v[0] = o.v[1] = o.sd = o.sc = S(0.0);
+    for (auto& row : o.d)
+      for (S& x : row) x = S(0.0);
+  }
 }
 
-/// One more layer behind those in p.
+/// Layer l of an even number: the one behind those in slab.
 template <class S>
-void add_layer(SlabPoint<S>& p, const OpticalPoint<S>& medium, const S& k0, double n_ref, double thickness) {
+void add_layer(SlabPoint<S>& slab, int l, int layers, const OpticalPoint<S>& medium, const S& k0, double n_ref, double slab_um) {
+  const double thickness = slab_um / layers;
   const S eo = medium.ordinary, de = medium.extraordinary - eo;
   const Vec3<S>& n = medium.axis;
   const S t2 = n.x * n.x + n.y * n.y, eta = inverse(S(eo + de * n.z * n.z));
@@ -60,10 +70,11 @@ void add_layer(SlabPoint<S>& p, const OpticalPoint<S>& medium, const S& k0, doub
   const Complex<S> a{cm * turn.cos_sq - sm * along, sm * turn.cos_sq + cm * along}, d{cm * turn.cos_sq + sm * along, sm * turn.cos_sq - cm * along};
   const Complex<S> b{S(0.0) - sm * across, cm * across};
   for (int c = 0; c < 2; ++c) {
-    const Complex<S> top = p.screen[0][c], bottom = p.screen[1][c];
-    p.screen[0][c] = a * top + b * bottom;
-    p.screen[1][c] = b * top + d * bottom;
+    const Complex<S> top = slab.screen[0][c], bottom = slab.screen[1][c];
+    slab.screen[0][c] = a * top + b * bottom;
+    slab.screen[1][c] = b * top + d * bottom;
   }
+  ObliquePoint<S>& p = slab.half[2 * l < layers ? 0 : 1];
   const S walk = thickness * de * n.z * eta;
   p.v[0] = p.v[0] + walk * n.x;
   p.v[1] = p.v[1] + walk * n.y;
@@ -106,7 +117,8 @@ class Propagation {
       for (Plane* plane : {&field.a[0], &field.a[1], &field.term[0], &field.term[1]}) plane->resize(n_);
     for (auto& field : fields_)
       for (Plane& plane : field.work) plane.resize(n_);
-    table_.resize(n_ * kQuantities * kFields);
+    screen_.resize(n_ * kScreens * kFields);
+    for (auto& table : oblique_) table.assign(n_ * kObliques * kFields, 0.0);
     const auto wavenumbers = [&](int n, double tilt) {
       std::vector<double> k(static_cast<std::size_t>(n));
       for (int m = 0; m < n; ++m) k[static_cast<std::size_t>(m)] = tilt + (n == 1 ? 0.0 : 2 * std::numbers::pi / (n * g_.step_um) * (m < n - m ? m : m - n));
@@ -134,7 +146,7 @@ class Propagation {
     to_flux(incident_, true);
     host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
     clear(host_slab_);
-    for (int l = 0; l < g_.layers; ++l) add_layer(host_slab_, host_, light.k0_per_um, g_.n_ref, h_ / g_.layers);
+    for (int l = 0; l < g_.layers; ++l) add_layer(host_slab_, l, g_.layers, host_, light.k0_per_um, g_.n_ref, h_);
     for (int a = 0; a < 2; ++a)
       for (int f = 0; f < kFields; ++f) {
         std::fill(fields_[f].a[a].begin(), fields_[f].a[a].end(), Z(0));
@@ -146,15 +158,13 @@ class Propagation {
     std::barrier barrier(threads);
     parallel_for(threads, threads, [&](int t) {
       const Crew crew{barrier, t, threads};
-      for (int slab = 0; slab < g_.slabs; ++slab) {
-        const double from = g_.entry_um + slab * h_;
-        crew.each(g_.ny, [&](int row) { sample_row(from, row); });
-        // The oblique terms before the screen in one slab, behind it in the next: symmetric over two, so of second order.
-        const bool before = slab % 2 == 0;
-        for (int order = 1; before && order <= g_.order; ++order) oblique(crew, order);
-        pass_screen(crew, before);
-        for (int order = 1; !before && order <= g_.order; ++order) oblique(crew, order);
-        if (t == 0) pass_incident(before);
+      for (int slab = 0; slab <= g_.slabs; ++slab) {
+        const std::vector<double>& table = oblique_[slab % 2];
+        if (slab < g_.slabs) crew.each(g_.ny, [&](int row) { sample_row(slab, row); });
+        for (int order = 1; order <= g_.order; ++order) oblique(crew, table, order);
+        if (t == 0) incident_oblique(slab);
+        if (slab < g_.slabs) pass_screen(crew);
+        if (t == 0 && slab < g_.slabs) pass_incident();
       }
       crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
     });
@@ -207,12 +217,11 @@ class Propagation {
   }
   static constexpr double kAbsorption = 1.5;  ///< 1/um at the outer edge: strong enough over a frame, weak enough not to reflect
 
-  double* table(int quantity, int field) { return table_.data() + (static_cast<std::size_t>(quantity) * kFields + static_cast<std::size_t>(field)) * n_; }
-  const double* table(int quantity, int field) const { return const_cast<Propagation*>(this)->table(quantity, field); }
+  std::size_t at(int quantity, int field) const { return (static_cast<std::size_t>(quantity) * kFields + static_cast<std::size_t>(field)) * n_; }
 
-  void sample_row(double from_um, int row) {
+  void sample_row(int slab, int row) {
     alignas(64) double x[kLanes];
-    const double dz = h_ / g_.layers;
+    const double from = g_.entry_um + slab * h_, dz = h_ / g_.layers;
     for (int i = 0; i < g_.nx; i += kLanes) {
       const int count = std::min(kLanes, g_.nx - i);
       for (int k = 0; k < kLanes; ++k) x[k] = g_.x_um(i + std::min(k, count - 1));
@@ -221,41 +230,47 @@ class Propagation {
       SlabPoint<S> p;
       clear(p);
       bool host = true;
-      for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz);
+      for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, Pack(g_.y_um(row)), from + (l + 0.5) * dz);
       if (host) {
-        store(host_slab_, to, count);
+        store(host_slab_, slab, to, count);
         continue;
       }
-      for (int l = 0; l < g_.layers; ++l) add_layer(p, medium_.at(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz), light_.k0_per_um, g_.n_ref, dz);
-      store(p, to, count);
+      for (int l = 0; l < g_.layers; ++l) add_layer(p, l, g_.layers, medium_.at(place, Pack(g_.y_um(row)), from + (l + 0.5) * dz), light_.k0_per_um, g_.n_ref, h_);
+      store(p, slab, to, count);
     }
   }
-  void store(const SlabPoint<S>& p, std::size_t to, int count) {
-    const auto put = [&](int quantity, const S& x) {
+  void store(const SlabPoint<S>& p, int slab, std::size_t to, int count) {
+    const auto put = [&](std::vector<double>& table, int quantity, const S& x, bool add) {
       for (int f = 0; f < kFields; ++f) {
-        double* out = table(quantity, f) + to;
+        double* out = table.data() + at(quantity, f) + to;
         if (count == kLanes) {
-          lanes(x, f).store_unaligned(out);
+          const Pack all = add ? Pack::load_unaligned(out) + lanes(x, f) : lanes(x, f);
+          all.store_unaligned(out);
         } else {
-          for (int k = 0; k < count; ++k) out[k] = lanes(x, f).get(static_cast<std::size_t>(k));
+          for (int k = 0; k < count; ++k) out[k] = (add ? out[k] : 0.0) + lanes(x, f).get(static_cast<std::size_t>(k));
         }
       }
     };
     for (int a = 0; a < 2; ++a)
       for (int b = 0; b < 2; ++b) {
-        put(kScreen + 4 * a + 2 * b, p.screen[a][b].re);
-        put(kScreen + 4 * a + 2 * b + 1, p.screen[a][b].im);
+        put(screen_, 4 * a + 2 * b, p.screen[a][b].re, false);
+        put(screen_, 4 * a + 2 * b + 1, p.screen[a][b].im, false);
       }
-    put(kWalk, p.v[0]), put(kWalk + 1, p.v[1]), put(kSd, p.sd), put(kSc, p.sc);
-    for (int ij = 0; ij < 3; ++ij)
-      for (int ab = 0; ab < 3; ++ab) put(kD + 3 * ij + ab, p.d[ij][ab]);
+    for (int half = 0; half < 2; ++half) {
+      std::vector<double>& table = oblique_[(slab + half) % 2];
+      const ObliquePoint<S>& o = p.half[half];
+      const auto set = [&](int quantity, const S& x) { put(table, quantity, x, half == 0); };
+      set(kWalk, o.v[0]), set(kWalk + 1, o.v[1]), set(kSd, o.sd), set(kSc, o.sc);
+      for (int ij = 0; ij < 3; ++ij)
+        for (int ab = 0; ab < 3; ++ab) set(kD + 3 * ij + ab, o.d[ij][ab]);
+    }
   }
 
   /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the coefficients of plane f: adds what
   /// stays as it is (out 0, 1) and what kx, ky will be applied to (out 2 .. 5, the same order).
   struct Coefficients {
-    const double* c[kQuantities - kWalk];
-    double operator()(int quantity, std::size_t i) const { return c[quantity - kWalk][i]; }
+    const double* c[kObliques];
+    double operator()(int quantity, std::size_t i) const { return c[quantity][i]; }
   };
   BIREFIT_INLINE static void oblique_at(const Coefficients& c, std::size_t i, const Z* in, Z* out) {
     const Z div = in[2] + in[5], curl = in[3] - in[4];  // kappa . a, kappa' . a
@@ -271,7 +286,7 @@ class Propagation {
   }
 
   /// term <- (i / order) V' term (of order 1: of a itself), a <- a + term.
-  void oblique(const Crew& crew, int order) {
+  void oblique(const Crew& crew, const std::vector<double>& table, int order) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     crew.each(6 * kFields, [&](int job) {
       Field& field = fields_[static_cast<std::size_t>(job / 6)];
@@ -285,7 +300,7 @@ class Propagation {
     crew.each(g_.ny, [&](int row) {
       Coefficients c[kFields];
       for (int f = 0; f < kFields; ++f)
-        for (int q = kWalk; q < kQuantities; ++q) c[f].c[q - kWalk] = table(q, f);
+        for (int q = 0; q < kObliques; ++q) c[f].c[q] = table.data() + at(q, f);
       for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
         Z in[6];
         for (int q = 0; q < 6; ++q) in[q] = fields_[0].work[q][i];
@@ -329,7 +344,7 @@ class Propagation {
     for (std::size_t i = 0; i < n_; ++i) to[i] += by_k0 * half_step_slope_[i] * Z(-base[i].imag(), base[i].real());
   }
 
-  void pass_screen(const Crew& crew, bool oblique_before) {
+  void pass_screen(const Crew& crew) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     const auto half_way = [&] {
       crew.each(2, [&](int a) { diffract(0, a); });
@@ -339,7 +354,6 @@ class Propagation {
     crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
     Z inc[kFields][2];
     Complex<S> at_screen[2] = {incident_[0], incident_[1]};
-    if (oblique_before) incident_oblique(at_screen);
     incident_half_step(at_screen);
     Complex<S> behind[2];
     for (int a = 0; a < 2; ++a) behind[a] = host_slab_.screen[a][0] * at_screen[0] + host_slab_.screen[a][1] * at_screen[1];
@@ -352,7 +366,7 @@ class Propagation {
         const Z x = over * fields_[0].a[0][i], y = over * fields_[0].a[1][i];
         for (int f = kFields - 1; f >= 0; --f) {
           Field& field = fields_[static_cast<std::size_t>(f)];
-          const auto screen = [&](int a, int b, int plane) { return Z(table(kScreen + 4 * a + 2 * b, plane)[i], table(kScreen + 4 * a + 2 * b + 1, plane)[i]); };
+          const auto screen = [&](int a, int b, int plane) { return Z(screen_[at(4 * a + 2 * b, plane) + i], screen_[at(4 * a + 2 * b + 1, plane) + i]); };
           const Z own_x = over * field.a[0][i], own_y = over * field.a[1][i];
           for (int a = 0; a < 2; ++a) {
             Z r = times(screen(a, 0, 0), own_x) + times(screen(a, 1, 0), own_y);
@@ -366,18 +380,20 @@ class Propagation {
     half_way();
   }
 
-  // The incident wave through one slab of the host, by the same steps.
-  void incident_oblique(Complex<S>* a) const {
+  // The incident wave through the host, by the same steps.
+  void incident_oblique(int slab) {
     if (tilt2_ == 0) return;
-    const S kx(light_.kx_per_um), ky(light_.ky_per_um);
-    Complex<S> term[2] = {a[0], a[1]};
+    const S kx(light_.kx_per_um), ky(light_.ky_per_um), none(0.0);
+    const ObliquePoint<S>*half = host_slab_.half;
+    const S sd = (slab > 0 ? half[1].sd : none) + (slab < g_.slabs ? half[0].sd : none), sc = (slab > 0 ? half[1].sc : none) + (slab < g_.slabs ? half[0].sc : none);
+    Complex<S> term[2] = {incident_[0], incident_[1]};
     for (int order = 1; order <= g_.order; ++order) {
-      const Complex<S> div = S(-0.5 * host_slab_.sd) * (kx * term[0] + ky * term[1]), curl = S(-0.5 * host_slab_.sc) * (ky * term[0] - kx * term[1]);
+      const Complex<S> div = S(-0.5 * sd) * (kx * term[0] + ky * term[1]), curl = S(-0.5 * sc) * (ky * term[0] - kx * term[1]);
       const Complex<S> x = kx * div + ky * curl, y = ky * div - kx * curl;
       const S f(1.0 / order);
       term[0] = Complex<S>(S(0.0) - f * x.im, f * x.re);
       term[1] = Complex<S>(S(0.0) - f * y.im, f * y.re);
-      for (int c = 0; c < 2; ++c) a[c] = a[c] + term[c];
+      for (int c = 0; c < 2; ++c) incident_[c] = incident_[c] + term[c];
     }
   }
   void incident_half_step(Complex<S>* a) const {
@@ -387,14 +403,12 @@ class Propagation {
     sin_cos(0.5 * h_ * (root(kn * kn - tilt2_) - kn), s, c);
     for (int i = 0; i < 2; ++i) a[i] = Complex<S>(c, s) * a[i];
   }
-  void pass_incident(bool oblique_before) {
-    if (oblique_before) incident_oblique(incident_);
+  void pass_incident() {
     incident_half_step(incident_);
     const Complex<S> x = host_slab_.screen[0][0] * incident_[0] + host_slab_.screen[0][1] * incident_[1];
     incident_[1] = host_slab_.screen[1][0] * incident_[0] + host_slab_.screen[1][1] * incident_[1];
     incident_[0] = x;
     incident_half_step(incident_);
-    if (!oblique_before) incident_oblique(incident_);
   }
 
   /// Less the incident wave, in units of its phase.
@@ -425,7 +439,8 @@ class Propagation {
   std::size_t n_;
   double h_;
   std::array<Field, static_cast<std::size_t>(kFields)> fields_;
-  std::vector<double> table_;  ///< [quantity][value or derivative][point]
+  std::vector<double> screen_;      ///< of the slab: [quantity][value or derivative][point]
+  std::vector<double> oblique_[2];  ///< the same of V' about the slab's entry and exit, by turns
   std::vector<double> kx_, ky_;
   Plane half_step_;
   std::vector<double> half_step_slope_;
