@@ -1,6 +1,9 @@
 #pragma once
 // A birefringent sphere or shell in its host as a medium on the grid of wave optics.
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <variant>
 
 #include "medium/families/ball.h"
@@ -80,5 +83,26 @@ class SphereMedium final : public WaveMedium<S> {
   double ramp_;
   S inverse_radius_;
 };
+
+/// The grid for pictures of a sphere, surfaces being ramps one step thick. Against the exact series (tests/cross/split_step_test.cc; n_o 1.52,
+/// n_e 1.74, diameters of 5 to 20 um) this leaves 0.01 to 0.06 of the picture's RMS, most of it what a one-way wave to the second order
+/// in its slope leaves out; finer grids bring a tenth of that. A margin of host that is too narrow lets light in again on the other side.
+inline WaveGrid sphere_grid(double radius_um, double k0_per_um, double n_host, double objective_na) {
+  const double wavelength = 2 * std::numbers::pi / k0_per_um, margin = 1.5 + 3 * objective_na, box = 2 * (radius_um + margin);
+  // Steep waves need thin slabs: the error of those 0.8 wavelengths thick is that of the model at NA 0.4, and twice it at NA 0.8.
+  const double step = 0.339 * wavelength, slab = (0.95 - 0.375 * std::min(objective_na, 1.2)) * wavelength;
+  WaveGrid g;
+  g.nx = g.ny = fast_fft_size(static_cast<int>(std::ceil(box / step)));
+  g.step_um = box / g.nx;
+  // 5 % more: the diameter may be fitted.
+  g.exit_um = 1.05 * radius_um + g.step_um;
+  g.entry_um = -g.exit_um;
+  g.slabs = static_cast<int>(std::ceil((g.exit_um - g.entry_um) / slab));
+  g.layers = 4;
+  g.n_ref = n_host;
+  g.cut_per_um = std::min({1.2, 0.5 * (objective_na + n_host) + 0.2, 0.97 * n_host}) * k0_per_um;
+  g.frame_um = 0.25 * margin;
+  return g;
+}
 
 }  // namespace birefit
