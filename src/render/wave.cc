@@ -66,7 +66,7 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   const double k0 = wavenumber_per_um(scene, value), wavelength = 2 * std::numbers::pi / k0;
   auto wave = std::make_shared<WavePlan>();
   wave->radius_um = o.radius_um;
-  const WaveGrid& g = wave->grid = sphere_grid(o.radius_um, k0, o.n_host, na);
+  const WaveGrid& g = wave->grid = sphere_grid(o, k0, na);
   wave->ramp_um = g.step_um;
   if (g.nx > 2000)
     throw UserError(Where{}, fmt::format("wave optics of a sphere of {:.3g} um would need {} x {} points in {} slabs, about {:.1f} GB and {:.0f} min an image",
