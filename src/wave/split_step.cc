@@ -32,7 +32,7 @@ struct ObliquePoint {
   S d[3][3];  ///< D_ij^ab: ij, ab = xx, xy, yy
 };
 constexpr int kWalk = 0, kSd = 2, kSc = 3, kD = 4, kObliques = 13;
-/// Of a slab at one point; the screen is the product over the layers.
+/// Of a slab at one point.
 template <class S>
 struct SlabPoint {
   Complex<S> screen[2][2];
@@ -51,30 +51,21 @@ void clear(SlabPoint<S>& p) {
   }
 }
 
-/// Layer l of an even number: the one behind those in slab.
+/// N = n_o + g n_t n_t^T at one place.
 template <class S>
-void add_layer(SlabPoint<S>& slab, int l, int layers, const OpticalPoint<S>& medium, const S& k0, double n_ref, double slab_um) {
-  const double thickness = slab_um / layers;
+struct Flat {
+  S sum;  ///< n_o + N_e
+  S g, x, y;
+};
+
+/// What one layer, of this thickness, adds to V'.
+template <class S>
+Flat<S> add_layer(ObliquePoint<S>& p, const OpticalPoint<S>& medium, const S& k0, double n_ref, double thickness) {
   const S eo = medium.ordinary, de = medium.extraordinary - eo;
   const Vec3<S>& n = medium.axis;
   const S t2 = n.x * n.x + n.y * n.y, eta = inverse(S(eo + de * n.z * n.z));
   const S no = root(eo), ne = root(eo * medium.extraordinary * eta), sum = no + ne, over = inverse(sum);
   const S g = eo * de * eta * over;  // (ne - no) / t2, finite for an axis along z
-  // exp(i k0 dz (N - n_ref)) = exp(i mean) (cos + i sin (2 t t^T - 1)), N = no + g n_t n_t^T.
-  const S phase = k0 * thickness, half = 0.5 * phase * g;
-  const CosSinc<S> turn = cos_sinc_sq(S(square(half * t2)));
-  S sm, cm;
-  sin_cos(phase * (0.5 * sum - n_ref), sm, cm);
-  const S s = half * turn.sinc_sq, along = s * (n.x * n.x - n.y * n.y), across = 2.0 * s * n.x * n.y;
-  // i along on the diagonal (+, -), i across off it, cos on both; times exp(i mean).
-  const Complex<S> a{cm * turn.cos_sq - sm * along, sm * turn.cos_sq + cm * along}, d{cm * turn.cos_sq + sm * along, sm * turn.cos_sq - cm * along};
-  const Complex<S> b{S(0.0) - sm * across, cm * across};
-  for (int c = 0; c < 2; ++c) {
-    const Complex<S> top = slab.screen[0][c], bottom = slab.screen[1][c];
-    slab.screen[0][c] = a * top + b * bottom;
-    slab.screen[1][c] = b * top + d * bottom;
-  }
-  ObliquePoint<S>& p = slab.half[2 * l < layers ? 0 : 1];
   const S walk = thickness * de * n.z * eta;
   p.v[0] = p.v[0] + walk * n.x;
   p.v[1] = p.v[1] + walk * n.y;
@@ -94,6 +85,50 @@ void add_layer(SlabPoint<S>& slab, int l, int layers, const OpticalPoint<S>& med
     const S on_t = scale * (tt_tt * t[ij] + ss_tt * o[ij]), on_s = scale * (tt_ss * t[ij] + ss_ss * o[ij]), mixed = 0.5 * scale * ts_ts * m[ij];
     for (int ab = 0; ab < 3; ++ab) p.d[ij][ab] = p.d[ij][ab] + on_t * t[ab] + on_s * o[ab] + mixed * m[ab];
   }
+  return {sum, g, n.x, n.y};
+}
+
+/// The screen of thickness h, N known at its two Gauss points: the fourth order of Magnus' series, by Gauss' rule and the commutator,
+///   exp(i k0 h ((N_1 + N_2) / 2 - n_ref) + sqrt(3)/12 (k0 h)^2 [N_1, N_2]),
+/// and where N turns by dphi the field turns back by dphi (N_e - N_o)^2 / (2 (N_e + N_o)^2): what dY/dz leaves of the Riccati equation, to second order in
+/// d/dz / k0, where N is constant in front and behind. A helix's exact modes have it.
+template <class S>
+void pass_layers(SlabPoint<S>& slab, const Flat<S>& one, const Flat<S>& two, const S& k0, double n_ref, double h) {
+  const S phase = k0 * h, mean = 0.25 * (one.sum + two.sum), over = inverse(mean), quarter = 0.25 * phase;
+  // N_1 + N_2 in parts: 1, i (x x - y y), i (x y + y x); and a rotation.
+  const S p3 = quarter * (one.g * (one.x * one.x - one.y * one.y) + two.g * (two.x * two.x - two.y * two.y));
+  const S p1 = 2.0 * quarter * (one.g * one.x * one.y + two.g * two.x * two.y);
+  const S turned = std::numbers::sqrt3 * one.g * two.g * (one.x * two.x + one.y * two.y) * (one.x * two.y - one.y * two.x);
+  const S p2 = turned * ((-1.0 / 12) * phase * phase - 0.125 * over * over);
+  const CosSinc<S> turn = cos_sinc_sq(S(p3 * p3 + p1 * p1 + p2 * p2));
+  S sm, cm;
+  sin_cos(phase * (mean - n_ref), sm, cm);
+  const Complex<S> whole(cm, sm);
+  const Complex<S> a = whole * Complex<S>(turn.cos_sq, turn.sinc_sq * p3), d = whole * Complex<S>(turn.cos_sq, S(0.0) - turn.sinc_sq * p3);
+  const S rotation = turn.sinc_sq * p2, across = turn.sinc_sq * p1;
+  const Complex<S> b = whole * Complex<S>(S(0.0) - rotation, across), c = whole * Complex<S>(rotation, across);
+  for (int i = 0; i < 2; ++i) {
+    const Complex<S> top = slab.screen[0][i], bottom = slab.screen[1][i];
+    slab.screen[0][i] = a * top + b * bottom;
+    slab.screen[1][i] = c * top + d * bottom;
+  }
+}
+
+/// The medium in a slab is asked for at `layers` depths, two by two the Gauss points of equal parts.
+double layer_depth(int layer, int layers) {
+  return (layer / 2 + 0.5 + (layer % 2 == 0 ? -0.5 : 0.5) / std::numbers::sqrt3) * 2 / layers;
+}
+template <class S, class F>
+SlabPoint<S> slab_point(int layers, double slab_um, const S& k0, double n_ref, const F& medium_at) {
+  SlabPoint<S> p;
+  clear(p);
+  Flat<S> before;
+  for (int l = 0; l < layers; ++l) {
+    const Flat<S> here = add_layer(p.half[2 * l < layers ? 0 : 1], medium_at(l), k0, n_ref, slab_um / layers);
+    if (l % 2 == 1) pass_layers(p, before, here, k0, n_ref, 2 * slab_um / layers);
+    before = here;
+  }
+  return p;
 }
 
 /// The walk of a worker through work that all share: phases end at a barrier.
@@ -145,8 +180,7 @@ class Propagation {
     // a = Y^(1/2) e, in units of n_host^(1/2): q / n_host for s, its inverse for p.
     to_flux(incident_, true);
     host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
-    clear(host_slab_);
-    for (int l = 0; l < g_.layers; ++l) add_layer(host_slab_, l, g_.layers, host_, light.k0_per_um, g_.n_ref, h_);
+    host_slab_ = slab_point(g_.layers, h_, light.k0_per_um, g_.n_ref, [&](int) { return host_; });
     for (int a = 0; a < 2; ++a)
       for (int f = 0; f < kFields; ++f) {
         std::fill(fields_[f].a[a].begin(), fields_[f].a[a].end(), Z(0));
@@ -221,22 +255,19 @@ class Propagation {
 
   void sample_row(int slab, int row) {
     alignas(64) double x[kLanes];
-    const double from = g_.entry_um + slab * h_, dz = h_ / g_.layers;
+    const Pack y(g_.y_um(row));
+    const auto depth = [&](int layer) { return g_.entry_um + (slab + layer_depth(layer, g_.layers)) * h_; };
     for (int i = 0; i < g_.nx; i += kLanes) {
       const int count = std::min(kLanes, g_.nx - i);
       for (int k = 0; k < kLanes; ++k) x[k] = g_.x_um(i + std::min(k, count - 1));
       const Pack place = Pack::load_aligned(x);
       const std::size_t to = static_cast<std::size_t>(row) * static_cast<std::size_t>(g_.nx) + static_cast<std::size_t>(i);
-      SlabPoint<S> p;
-      clear(p);
       bool host = true;
-      for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, Pack(g_.y_um(row)), from + (l + 0.5) * dz);
-      if (host) {
+      for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, y, depth(l));
+      if (host)
         store(host_slab_, slab, to, count);
-        continue;
-      }
-      for (int l = 0; l < g_.layers; ++l) add_layer(p, l, g_.layers, medium_.at(place, Pack(g_.y_um(row)), from + (l + 0.5) * dz), light_.k0_per_um, g_.n_ref, h_);
-      store(p, slab, to, count);
+      else
+        store(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref, [&](int l) { return medium_.at(place, y, depth(l)); }), slab, to, count);
     }
   }
   void store(const SlabPoint<S>& p, int slab, std::size_t to, int count) {
