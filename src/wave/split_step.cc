@@ -131,6 +131,42 @@ SlabPoint<S> slab_point(int layers, double slab_um, const S& k0, double n_ref, c
   return p;
 }
 
+/// Complex numbers, one a lane, with only what is needed below: real and imaginary parts apart, so that coefficients are plain packs.
+struct Lanes {
+  Pack re, im;
+};
+BIREFIT_INLINE Lanes operator+(const Lanes& a, const Lanes& b) { return {a.re + b.re, a.im + b.im}; }
+BIREFIT_INLINE Lanes operator-(const Lanes& a, const Lanes& b) { return {a.re - b.re, a.im - b.im}; }
+BIREFIT_INLINE Lanes operator*(const Pack& a, const Lanes& b) { return {a * b.re, a * b.im}; }
+BIREFIT_INLINE Lanes operator*(const Lanes& a, const Lanes& b) { return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re}; }
+using Interleaved = xsimd::batch<Z, Pack::arch_type>;
+/// The `count` numbers from here on; zeros in lanes beyond.
+BIREFIT_INLINE Lanes load(const Z* from, int count) {
+  Z some[kLanes] = {};
+  if (count < kLanes) {
+    std::copy_n(from, count, some);
+    from = some;
+  }
+  const Interleaved z = Interleaved::load_unaligned(from);
+  return {z.real(), z.imag()};
+}
+BIREFIT_INLINE void store(const Lanes& a, Z* to, int count) {
+  if (count == kLanes) return Interleaved(a.re, a.im).store_unaligned(to);
+  Z some[kLanes];
+  Interleaved(a.re, a.im).store_unaligned(some);
+  std::copy_n(some, count, to);
+}
+/// f(first, count) for [0, n) in pieces of one pack.
+template <class F>
+void in_packs(std::size_t n, const F& f) {
+  for (std::size_t i = 0; i < n; i += kLanes) f(i, static_cast<int>(std::min<std::size_t>(kLanes, n - i)));
+}
+/// What packs read with load_unaligned may be read beyond the end.
+std::vector<double> padded(std::vector<double> x) {
+  x.resize(x.size() + kLanes);
+  return x;
+}
+
 /// The walk of a worker through work that all share: phases end at a barrier.
 struct Crew {
   std::barrier<>& barrier;
@@ -147,13 +183,14 @@ class Propagation {
  public:
   static constexpr int kFields = 1 + ScalarTraits<S>::derivatives;
   Propagation(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium)
-      : g_(grid), light_(light), medium_(medium), fft_(grid.nx, grid.ny), n_(fft_.size()), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
+      : g_(grid), light_(light), medium_(medium), fft_(grid.nx, grid.ny), n_(fft_.size()), blocks_((static_cast<std::size_t>(grid.nx) + kLanes - 1) / kLanes), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
     for (auto& field : fields_)
       for (Plane* plane : {&field.a[0], &field.a[1], &field.term[0], &field.term[1]}) plane->resize(n_);
     for (auto& field : fields_)
       for (Plane& plane : field.work) plane.resize(n_);
-    screen_.resize(n_ * kScreens * kFields);
-    for (auto& table : oblique_) table.assign(n_ * kObliques * kFields, 0.0);
+    const std::size_t blocks = blocks_ * static_cast<std::size_t>(grid.ny) * kFields * kLanes;
+    screen_.resize(blocks * kScreens);
+    for (auto& table : oblique_) table.assign(blocks * kObliques, 0.0);
     const auto wavenumbers = [&](int n, double tilt) {
       std::vector<double> k(static_cast<std::size_t>(n));
       for (int m = 0; m < n; ++m) k[static_cast<std::size_t>(m)] = tilt + (n == 1 ? 0.0 : 2 * std::numbers::pi / (n * g_.step_um) * (m < n - m ? m : m - n));
@@ -164,15 +201,18 @@ class Propagation {
     const double k0 = first(light.k0_per_um);
     half_step_.resize(n_);
     half_step_slope_.resize(n_);
+    kept_.resize(n_);
     const double kn = k0 * g_.n_ref;
     for (std::size_t i = 0; i < n_; ++i) {
       const double k2 = square(kx_[i % kx_.size()]) + square(ky_[i / kx_.size()]);
       if (k2 > square(g_.cut_per_um)) continue;  // zero: cut
       const double q = std::sqrt(kn * kn - k2), phase = 0.5 * h_ * (q - kn);
+      kept_[i] = 1;
       half_step_[i] = std::polar(1.0, phase);
       half_step_slope_[i] = 0.5 * h_ * (k0 * square(g_.n_ref) / q - g_.n_ref);
     }
-    frame_x_ = frame(g_.nx), frame_y_ = frame(g_.ny);
+    kx_ = padded(kx_), kept_ = padded(kept_), half_step_slope_ = padded(half_step_slope_);
+    frame_x_ = padded(frame(g_.nx)), frame_y_ = frame(g_.ny);
     incident_[0] = Complex<S>(light.ex), incident_[1] = Complex<S>(light.ey);
     const S kh = light.k0_per_um * light.n_host;
     tilt2_ = square(light.kx_per_um) + square(light.ky_per_um);
@@ -193,7 +233,7 @@ class Propagation {
     parallel_for(threads, threads, [&](int t) {
       const Crew crew{barrier, t, threads};
       for (int slab = 0; slab <= g_.slabs; ++slab) {
-        const std::vector<double>& table = oblique_[slab % 2];
+        const Table& table = oblique_[slab % 2];
         if (slab < g_.slabs) crew.each(g_.ny, [&](int row) { sample_row(slab, row); });
         for (int order = 1; order <= g_.order; ++order) oblique(crew, table, order);
         if (t == 0) incident_oblique(slab);
@@ -206,6 +246,8 @@ class Propagation {
   }
 
  private:
+  /// By pieces of a row, one pack of points each: [row][piece][quantity][value or derivative].
+  using Table = std::vector<double, AlignedAllocator<double>>;
   struct Field {
     Plane a[2];      ///< spectrum
     Plane term[2];   ///< of the Taylor series
@@ -251,7 +293,13 @@ class Propagation {
   }
   static constexpr double kAbsorption = 1.5;  ///< 1/um at the outer edge: strong enough over a frame, weak enough not to reflect
 
-  std::size_t at(int quantity, int field) const { return (static_cast<std::size_t>(quantity) * kFields + static_cast<std::size_t>(field)) * n_; }
+  /// Of one piece.
+  static Pack entry(const double* piece, int quantity, int field) {
+    return Pack::load_aligned(piece + (quantity * kFields + field) * kLanes);
+  }
+  std::size_t piece(int row, std::size_t first, int quantities) const {
+    return (static_cast<std::size_t>(row) * blocks_ + first / kLanes) * static_cast<std::size_t>(quantities * kFields * kLanes);
+  }
 
   void sample_row(int slab, int row) {
     alignas(64) double x[kLanes];
@@ -261,34 +309,30 @@ class Propagation {
       const int count = std::min(kLanes, g_.nx - i);
       for (int k = 0; k < kLanes; ++k) x[k] = g_.x_um(i + std::min(k, count - 1));
       const Pack place = Pack::load_aligned(x);
-      const std::size_t to = static_cast<std::size_t>(row) * static_cast<std::size_t>(g_.nx) + static_cast<std::size_t>(i);
       bool host = true;
       for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, y, depth(l));
       if (host)
-        store(host_slab_, slab, to, count);
+        keep(host_slab_, slab, row, i);
       else
-        store(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref, [&](int l) { return medium_.at(place, y, depth(l)); }), slab, to, count);
+        keep(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref, [&](int l) { return medium_.at(place, y, depth(l)); }), slab, row, i);
     }
   }
-  void store(const SlabPoint<S>& p, int slab, std::size_t to, int count) {
-    const auto put = [&](std::vector<double>& table, int quantity, const S& x, bool add) {
+  void keep(const SlabPoint<S>& p, int slab, int row, int first) {
+    const auto put = [&](double* to, int quantity, const S& x, bool add) {
       for (int f = 0; f < kFields; ++f) {
-        double* out = table.data() + at(quantity, f) + to;
-        if (count == kLanes) {
-          const Pack all = add ? Pack::load_unaligned(out) + lanes(x, f) : lanes(x, f);
-          all.store_unaligned(out);
-        } else {
-          for (int k = 0; k < count; ++k) out[k] = (add ? out[k] : 0.0) + lanes(x, f).get(static_cast<std::size_t>(k));
-        }
+        double* out = to + (quantity * kFields + f) * kLanes;
+        const Pack all = add ? Pack::load_aligned(out) + lanes(x, f) : lanes(x, f);
+        all.store_aligned(out);
       }
     };
+    double* screen = screen_.data() + piece(row, static_cast<std::size_t>(first), kScreens);
     for (int a = 0; a < 2; ++a)
       for (int b = 0; b < 2; ++b) {
-        put(screen_, 4 * a + 2 * b, p.screen[a][b].re, false);
-        put(screen_, 4 * a + 2 * b + 1, p.screen[a][b].im, false);
+        put(screen, 4 * a + 2 * b, p.screen[a][b].re, false);
+        put(screen, 4 * a + 2 * b + 1, p.screen[a][b].im, false);
       }
     for (int half = 0; half < 2; ++half) {
-      std::vector<double>& table = oblique_[(slab + half) % 2];
+      double* table = oblique_[(slab + half) % 2].data() + piece(row, static_cast<std::size_t>(first), kObliques);
       const ObliquePoint<S>& o = p.half[half];
       const auto set = [&](int quantity, const S& x) { put(table, quantity, x, half == 0); };
       set(kWalk, o.v[0]), set(kWalk + 1, o.v[1]), set(kSd, o.sd), set(kSc, o.sc);
@@ -297,27 +341,26 @@ class Propagation {
     }
   }
 
-  /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the coefficients of plane f: adds what
+  /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the f-th coefficients: adds what
   /// stays as it is (out 0, 1) and what kx, ky will be applied to (out 2 .. 5, the same order).
-  struct Coefficients {
-    const double* c[kObliques];
-    double operator()(int quantity, std::size_t i) const { return c[quantity][i]; }
-  };
-  BIREFIT_INLINE static void oblique_at(const Coefficients& c, std::size_t i, const Z* in, Z* out) {
-    const Z div = in[2] + in[5], curl = in[3] - in[4];  // kappa . a, kappa' . a
-    const double vx = -0.5 * c(kWalk, i), vy = -0.5 * c(kWalk + 1, i);
-    out[0] += vx * div;
-    out[1] += vy * div;
-    const Z walked = vx * in[0] + vy * in[1] - (0.5 * c(kSd, i)) * div, turned = (-0.5 * c(kSc, i)) * curl;
-    const auto d = [&](int ij, int ab) { return c(kD + 3 * ij + ab, i); };
-    out[2] += walked + d(0, 0) * in[2] + d(1, 0) * in[3] + d(0, 1) * in[4] + d(1, 1) * in[5];
-    out[3] += turned + d(1, 0) * in[2] + d(2, 0) * in[3] + d(1, 1) * in[4] + d(2, 1) * in[5];
-    out[4] += -turned + d(0, 1) * in[2] + d(1, 1) * in[3] + d(0, 2) * in[4] + d(1, 2) * in[5];
-    out[5] += walked + d(1, 1) * in[2] + d(2, 1) * in[3] + d(1, 2) * in[4] + d(2, 2) * in[5];
+  BIREFIT_INLINE static void oblique_at(const double* coefficients, int f, const Lanes* in, Lanes* out) {
+    const auto c = [&](int quantity) { return entry(coefficients, quantity, f); };
+    const Lanes div = in[2] + in[5], curl = in[3] - in[4];  // kappa . a, kappa' . a
+    const Pack vx = -0.5 * c(kWalk), vy = -0.5 * c(kWalk + 1);
+    out[0] = out[0] + vx * div;
+    out[1] = out[1] + vy * div;
+    const Lanes walked = vx * in[0] + vy * in[1] - (0.5 * c(kSd)) * div, turned = (-0.5 * c(kSc)) * curl;
+    Pack d[3][3];
+    for (int ij = 0; ij < 3; ++ij)
+      for (int ab = 0; ab < 3; ++ab) d[ij][ab] = c(kD + 3 * ij + ab);
+    out[2] = out[2] + walked + d[0][0] * in[2] + d[1][0] * in[3] + d[0][1] * in[4] + d[1][1] * in[5];
+    out[3] = out[3] + turned + d[1][0] * in[2] + d[2][0] * in[3] + d[1][1] * in[4] + d[2][1] * in[5];
+    out[4] = out[4] - turned + d[0][1] * in[2] + d[1][1] * in[3] + d[0][2] * in[4] + d[1][2] * in[5];
+    out[5] = out[5] + walked + d[1][1] * in[2] + d[2][1] * in[3] + d[1][2] * in[4] + d[2][2] * in[5];
   }
 
   /// term <- (i / order) V' term (of order 1: of a itself), a <- a + term.
-  void oblique(const Crew& crew, const std::vector<double>& table, int order) {
+  void oblique(const Crew& crew, const Table& table, int order) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     crew.each(6 * kFields, [&](int job) {
       Field& field = fields_[static_cast<std::size_t>(job / 6)];
@@ -325,39 +368,49 @@ class Propagation {
       const int component = which < 2 ? which : (which - 2) / 2;
       const Plane& from = order == 1 ? field.a[component] : field.term[component];
       Plane& to = field.work[which];
-      for (std::size_t i = 0; i < n_; ++i) to[i] = which < 2 ? from[i] : (which % 2 == 0 ? kx_[i % nx] : ky_[i / nx]) * from[i];
+      for (std::size_t row = 0; row < ky_.size(); ++row) {
+        const Z* in = from.data() + row * nx;
+        Z* out = to.data() + row * nx;
+        if (which < 2)
+          std::copy_n(in, nx, out);
+        else if (which % 2 == 0)
+          in_packs(nx, [&](std::size_t i, int count) { store(Pack::load_unaligned(kx_.data() + i) * load(in + i, count), out + i, count); });
+        else
+          in_packs(nx, [&](std::size_t i, int count) { store(Pack(ky_[row]) * load(in + i, count), out + i, count); });
+      }
       fft_.inverse(to);
     });
     crew.each(g_.ny, [&](int row) {
-      Coefficients c[kFields];
-      for (int f = 0; f < kFields; ++f)
-        for (int q = 0; q < kObliques; ++q) c[f].c[q] = table.data() + at(q, f);
-      for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
-        Z in[6];
-        for (int q = 0; q < 6; ++q) in[q] = fields_[0].work[q][i];
+      in_packs(nx, [&](std::size_t first, int count) {
+        const double* c = table.data() + piece(row, first, kObliques);
+        const std::size_t i = static_cast<std::size_t>(row) * nx + first;
+        Lanes in[6];
+        for (int q = 0; q < 6; ++q) in[q] = load(fields_[0].work[q].data() + i, count);
         for (int f = kFields - 1; f >= 0; --f) {
-          Z own[6], out[6] = {};
-          for (int q = 0; q < 6; ++q) own[q] = fields_[static_cast<std::size_t>(f)].work[q][i];
-          oblique_at(c[0], i, own, out);
-          if (f > 0) oblique_at(c[f], i, in, out);
-          for (int q = 0; q < 6; ++q) fields_[static_cast<std::size_t>(f)].work[q][i] = out[q];
+          Field& field = fields_[static_cast<std::size_t>(f)];
+          Lanes own[6], out[6];
+          for (int q = 0; q < 6; ++q) own[q] = load(field.work[q].data() + i, count), out[q] = {Pack(0.0), Pack(0.0)};
+          oblique_at(c, 0, own, out);
+          if (f > 0) oblique_at(c, f, in, out);
+          for (int q = 0; q < 6; ++q) store(out[q], field.work[q].data() + i, count);
         }
-      }
+      });
     });
     crew.each(6 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]); });
-    const Z factor(0, 1.0 / (order * static_cast<double>(n_)));
+    const Pack factor(1.0 / (order * static_cast<double>(n_)));
     crew.each(g_.ny, [&](int row) {
+      const Pack ky(ky_[static_cast<std::size_t>(row)]);
       for (Field& field : fields_)
-        for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
-          const bool kept = half_step_[i] != Z(0);
-          const double kx = kx_[i % nx], ky = ky_[i / nx];
+        in_packs(nx, [&](std::size_t first, int count) {
+          const std::size_t i = static_cast<std::size_t>(row) * nx + first;
+          const Pack kx = Pack::load_unaligned(kx_.data() + first), f = factor * Pack::load_unaligned(kept_.data() + i);
           for (int a = 0; a < 2; ++a) {
-            const Z v = field.work[a][i] + kx * field.work[2 + 2 * a][i] + ky * field.work[3 + 2 * a][i];
-            const Z t = kept ? Z(-factor.imag() * v.imag(), factor.imag() * v.real()) : Z(0);
-            field.term[a][i] = t;
-            field.a[a][i] += t;
+            const Lanes v = load(field.work[a].data() + i, count) + kx * load(field.work[2 + 2 * a].data() + i, count) + ky * load(field.work[3 + 2 * a].data() + i, count);
+            const Lanes t{-f * v.im, f * v.re};
+            store(t, field.term[a].data() + i, count);
+            store(load(field.a[a].data() + i, count) + t, field.a[a].data() + i, count);
           }
-        }
+        });
     });
   }
 
@@ -368,11 +421,16 @@ class Propagation {
   /// exp(i phase) over half a slab, with the derivative by the wavenumber.
   void diffract(int f, int a) {
     Plane& to = fields_[static_cast<std::size_t>(f)].a[a];
-    for (std::size_t i = 0; i < n_; ++i) to[i] = times(half_step_[i], to[i]);
-    const double by_k0 = part(light_.k0_per_um, f);
-    if (f == 0 || by_k0 == 0) return;
     const Plane& base = fields_[0].a[a];  // diffracted before: d exp(i phase) a = i dphase (exp(i phase) a)
-    for (std::size_t i = 0; i < n_; ++i) to[i] += by_k0 * half_step_slope_[i] * Z(-base[i].imag(), base[i].real());
+    const double by_k0 = f == 0 ? 0.0 : part(light_.k0_per_um, f);
+    in_packs(n_, [&](std::size_t i, int count) {
+      Lanes turned = load(half_step_.data() + i, count) * load(to.data() + i, count);
+      if (by_k0 != 0) {
+        const Lanes b = load(base.data() + i, count);
+        turned = turned + (by_k0 * Pack::load_unaligned(half_step_slope_.data() + i)) * Lanes{-b.im, b.re};
+      }
+      store(turned, to.data() + i, count);
+    });
   }
 
   void pass_screen(const Crew& crew) {
@@ -392,20 +450,23 @@ class Propagation {
       for (int a = 0; a < 2; ++a) inc[f][a] = part(behind[a], f);
     const double over = 1.0 / static_cast<double>(n_);  // of the transform there and back
     crew.each(g_.ny, [&](int row) {
-      for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
-        const double keep = frame_x_[i % nx] * frame_y_[static_cast<std::size_t>(row)];
-        const Z x = over * fields_[0].a[0][i], y = over * fields_[0].a[1][i];
+      in_packs(nx, [&](std::size_t first, int count) {
+        const double* c = screen_.data() + piece(row, first, kScreens);
+        const std::size_t i = static_cast<std::size_t>(row) * nx + first;
+        const Pack frame = frame_y_[static_cast<std::size_t>(row)] * Pack::load_unaligned(frame_x_.data() + first);
+        const auto at_point = [&](int f, int a) { return Pack(over) * load(fields_[static_cast<std::size_t>(f)].a[a].data() + i, count); };
+        const Lanes x = at_point(0, 0), y = at_point(0, 1);
         for (int f = kFields - 1; f >= 0; --f) {
-          Field& field = fields_[static_cast<std::size_t>(f)];
-          const auto screen = [&](int a, int b, int plane) { return Z(screen_[at(4 * a + 2 * b, plane) + i], screen_[at(4 * a + 2 * b + 1, plane) + i]); };
-          const Z own_x = over * field.a[0][i], own_y = over * field.a[1][i];
+          const auto screen = [&](int a, int b, int of) { return Lanes{entry(c, 4 * a + 2 * b, of), entry(c, 4 * a + 2 * b + 1, of)}; };
+          const Lanes own_x = at_point(f, 0), own_y = at_point(f, 1);
           for (int a = 0; a < 2; ++a) {
-            Z r = times(screen(a, 0, 0), own_x) + times(screen(a, 1, 0), own_y);
-            if (f > 0) r += times(screen(a, 0, f), x) + times(screen(a, 1, f), y);
-            field.a[a][i] = inc[f][a] + keep * (r - inc[f][a]);
+            Lanes r = screen(a, 0, 0) * own_x + screen(a, 1, 0) * own_y;
+            if (f > 0) r = r + screen(a, 0, f) * x + screen(a, 1, f) * y;
+            const Lanes incident{Pack(inc[f][a].real()), Pack(inc[f][a].imag())};
+            store(incident + frame * (r - incident), fields_[static_cast<std::size_t>(f)].a[a].data() + i, count);
           }
         }
-      }
+      });
     });
     crew.each(2 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
     half_way();
@@ -467,12 +528,12 @@ class Propagation {
   const WaveLight<S>& light_;
   const WaveMedium<S>& medium_;
   Fft2 fft_;
-  std::size_t n_;
+  std::size_t n_, blocks_;
   double h_;
   std::array<Field, static_cast<std::size_t>(kFields)> fields_;
-  std::vector<double> screen_;      ///< of the slab: [quantity][value or derivative][point]
-  std::vector<double> oblique_[2];  ///< the same of V' about the slab's entry and exit, by turns
-  std::vector<double> kx_, ky_;
+  Table screen_;      ///< of the slab
+  Table oblique_[2];  ///< of V' about the slab's entry and exit, by turns
+  std::vector<double> kx_, ky_, kept_;
   Plane half_step_;
   std::vector<double> half_step_slope_;
   std::vector<double> frame_x_, frame_y_;
