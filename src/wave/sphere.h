@@ -28,10 +28,10 @@ template <class S>
 class SphereMedium final : public WaveMedium<S> {
  public:
   using P = PlainOf<S>;
-  SphereMedium(const SphereOptics<S>& optics, double ramp_um) : o_(optics), ramp_(ramp_um), inverse_radius_(inverse(o_.radius_um)) {}
+  SphereMedium(const SphereOptics<S>& optics, double ramp_um) : o_(optics), width_(1.29 * ramp_um), inverse_radius_(inverse(o_.radius_um)) {}
 
   bool reaches(const P& x, const P& y, double z) const override {
-    const double most = lane(plain(o_.radius_um), 0) + 0.5 * ramp_;
+    const double most = lane(plain(o_.radius_um), 0) + 0.5 * width_;
     return smallest(x * x + y * y) + z * z < most * most;
   }
   OpticalPoint<S> at(const P& x, const P& y, double z) const override {
@@ -63,7 +63,11 @@ class SphereMedium final : public WaveMedium<S> {
     const Vec3<S> r{inverse_radius_ * place_um.x, inverse_radius_ * place_um.y, inverse_radius_ * place_um.z};
     return std::visit([&](const auto& field) { return field.template at<S>(r); }, o_.field);
   }
-  S ramped(const S& depth_um) const { return min_of(max_of(depth_um * (1 / ramp_) + 0.5, S(0.0)), S(1.0)); }
+  /// Cubic, so that derivatives have no steps; as blurred as a linear ramp of ramp_um (the same second moment).
+  S ramped(const S& depth_um) const {
+    const S u = min_of(max_of(depth_um * (1 / width_) + 0.5, S(0.0)), S(1.0));
+    return u * u * (3.0 - 2.0 * u);
+  }
   /// Fraction c of the uniaxial medium, the rest isotropic.
   static OpticalPoint<S> mixed(const Vec3<S>& n, const Vec3<S>& face, const S& eo, const S& ee, const S& other, const S& c) {
     const S de = ee - eo, rest = 1.0 - c;
@@ -80,7 +84,7 @@ class SphereMedium final : public WaveMedium<S> {
   }
 
   SphereOptics<S> o_;
-  double ramp_;
+  double width_;
   S inverse_radius_;
 };
 
