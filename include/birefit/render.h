@@ -97,6 +97,10 @@ struct JonesRow {
 /// Slab scenes: one row per microscope direction; others: per pixel.
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta);
 
+/// Light caught within a sphere ripples its image: how far theta[index] (a diameter, a wall) goes from one ripple to the next, where the
+/// scene is computed with reflections; else 0. A fit has a shallow minimum in each.
+double ripple_period(const Scene& scene, const Theta& theta, int index);
+
 /// Largest change of retardance phase (rad) anywhere in the image per unit of theta[index]; 0 when the parameter forms
 /// no fringes. The coarse scan steps by less than a radian of it.
 double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index);

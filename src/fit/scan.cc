@@ -41,7 +41,7 @@ std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std
 
 /// Solves from every start and keeps the distinct minima, best first, at least one.
 void polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options, std::vector<std::pair<double, Eigen::VectorXd>>& starts, int steps,
-                 double hopeless_above) {
+                 double hopeless_above, const SameMinimum& same = {}) {
   const Eigen::VectorXd start = starts.back().second;
   // A few steps for everyone, the rest for those that may still be the best: a wrong order stays many times worse.
   constexpr double kHopeless = 4;
@@ -56,6 +56,7 @@ void polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& op
     best = std::min(best, objective);
   }
   const bool beaten = best > hopeless_above;
+  if (same) std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [objective, from] : starts) {
     if (!(objective <= (beaten ? 1 : kHopeless) * best) || !std::isfinite(objective)) continue;
     if (beaten) {
@@ -63,6 +64,7 @@ void polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& op
       result.candidates.push_back({from, problem.objective(), projected_information(problem)});
       break;
     }
+    if (same && std::any_of(result.candidates.begin(), result.candidates.end(), [&](const Candidate& known) { return same(known.searched, from); })) continue;
     Candidate candidate;
     candidate.searched = from;
     polish.max_iterations = 20;
@@ -205,7 +207,7 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   return result;
 }
 
-ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> from, int steps) {
+ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> from, int steps, const SameMinimum& same) {
   ScanResult result;
   std::vector<std::pair<double, Eigen::VectorXd>> starts;
   for (Eigen::VectorXd& x : from) {
@@ -216,7 +218,7 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
   std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   const std::size_t most = static_cast<std::size_t>(std::max(1, job.options.scan_candidates));
   if (starts.size() > most) starts.resize(most);
-  polish_into(result, problem, job.options, starts, steps, std::numeric_limits<double>::infinity());
+  polish_into(result, problem, job.options, starts, steps, std::numeric_limits<double>::infinity(), same);
   return result;
 }
 

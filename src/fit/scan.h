@@ -2,6 +2,7 @@
 // The global part of a fit: which fringe order? Residuals of fringes are full of local minima one order apart, so the
 // fringe-forming parameters are scanned on a grid, on a subsample of pixels, before any solver starts.
 
+#include <functional>
 #include <vector>
 
 #include "fit/least_squares.h"
@@ -28,8 +29,9 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
                 const std::vector<double>& phase_per_unit, double hopeless_above);
 
 /// The same from given starts instead of a grid, best first, of which no more than options.scan_candidates are polished; `steps` of
-/// the solver for each before the worst are dropped.
-ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> starts, int steps);
+/// the solver for each before the worst are dropped, and those that `same` finds on the way to a minimum that is already known.
+using SameMinimum = std::function<bool(const Eigen::VectorXd&, const Eigen::VectorXd&)>;
+ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> starts, int steps, const SameMinimum& same);
 
 /// |R delta|: how many joint standard errors apart.
 double separation(const Candidate& minimum, const Eigen::VectorXd& other);

@@ -814,6 +814,19 @@ WaveChoice wave_choice(const Scene& scene, const Theta& theta) {
   }
 }
 
+double ripple_period(const Scene& scene, const Theta& theta, int index) {
+  if (scene.ceiling != Ceiling::wave || !has_series(scene) || scene.method == "split_step") return 0;
+  const Droplet& droplet = std::get<Droplet>(scene.sample);
+  const auto* shell = std::get_if<ShellDirector>(&droplet.director);
+  if (index != droplet.diameter_um.index && !(shell && index == shell->wall_um.index)) return 0;
+  const Values<double> value(theta, {});
+  // Light caught under the surface: resonances follow each other by atan(s)/s of the size parameter, s^2 = m^2 - 1 (P. Chylek, J. Opt. Soc.
+  // Am. A 7, 1609 (1990)); by one where the sphere is hardly denser.
+  const DropletOptics<double> o = droplet_optics(scene, value);
+  const double s2 = o.n_o * o.n_e / (o.n_host * o.n_host) - 1, s = std::sqrt(std::max(s2, 1e-6));
+  return 2 * std::atan(s) / s / (o.k0 * o.n_host);
+}
+
 double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index) {
   const std::size_t i = static_cast<std::size_t>(index);
   const double h = std::max(1e-6, 1e-5 * std::abs(theta[i]));

@@ -333,21 +333,16 @@ void in_chunks(const std::vector<int>& active, const Body& body) {
 
 void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
             Rendering& into) {
+  if (plan.wave) return render_wave(scene, *plan.wave, theta, active, threads, into);
   into.derivatives.resize(active.size());
   if (active.empty()) {
-    if (plan.wave)
-      render_wave<Pack>(scene, *plan.wave, Values<Pack>(theta, {}), threads, {&into.intensity});
-    else
-      render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
+    render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
     return;
   }
   in_chunks(active, [&]<class S>(const std::vector<int>& chunk, int first) {
     std::vector<Image*> images{&into.intensity};
     for (std::size_t j = 0; j < chunk.size(); ++j) images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
-    if (plan.wave)
-      render_wave<S>(scene, *plan.wave, Values<S>(theta, chunk), threads, images);
-    else
-      render_planes<S>(scene, plan, theta, chunk, threads, images);
+    render_planes<S>(scene, plan, theta, chunk, threads, images);
   });
 }
 

@@ -96,11 +96,17 @@ bool outgrown(const RenderPlan& now, const RenderPlan& before) {
   return ratio > 1.04 || ratio < 0.8;
 }
 
+namespace {
+
 template <class S>
-void render_wave(const Scene& scene, const WavePlan& plan, const Values<S>& value, int threads, const std::vector<Image*>& images) {
-  const SphereMedium<S> medium(sphere_optics(scene, value), plan.ramp_um);
+WaveLight<S> wave_light(const Scene& scene, const Values<S>& value) {
   const Polarizers<S> p = polarizers(scene, value);
-  const WaveLight<S> light{wavenumber_per_um(scene, value), host_index(scene, value), p.px, p.py};
+  return {wavenumber_per_um(scene, value), host_index(scene, value), p.px, p.py};
+}
+
+template <class S>
+void picture(const Scene& scene, const WavePlan& plan, const Values<S>& value, const std::vector<WaveField>& fields, int threads, const std::vector<Image*>& images) {
+  const Polarizers<S> p = polarizers(scene, value);
   WaveMicroscope<S> m;
   m.objective_na = scene.microscope.objective_na;
   m.aplanatic = scene.microscope.aplanatic;
@@ -109,13 +115,57 @@ void render_wave(const Scene& scene, const WavePlan& plan, const Values<S>& valu
   m.center_x_px = value(scene.view.center_x_px), m.center_y_px = value(scene.view.center_y_px);
   m.pixel_um = scene.view.pixel_size_um;
   m.width = scene.view.width, m.height = scene.view.height;
-  form_image(plan.grid, plan.imaging, light, m, propagate(plan.grid, light, medium, threads), threads, images);
+  form_image(plan.grid, plan.imaging, wave_light(scene, value), m, fields, threads, images);
 }
 
-#define BIREFIT_INSTANTIATE(S) template void render_wave<S>(const Scene&, const WavePlan&, const Values<S>&, int, const std::vector<Image*>&);
-BIREFIT_INSTANTIATE(Pack)
-BIREFIT_INSTANTIATE(Dual1)
-BIREFIT_INSTANTIATE(Dual2)
-BIREFIT_INSTANTIATE(Dual4)
+}  // namespace
+
+void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, const std::vector<int>& active, int threads, Rendering& into) {
+  // What moves only the picture needs no light sent through the sample again.
+  struct Part {
+    std::vector<int> parameters;
+    std::vector<Image*> images;
+  } of_light, of_picture;
+  const Microscope& m = scene.microscope;
+  into.derivatives.resize(active.size());
+  for (std::size_t j = 0; j < active.size(); ++j) {
+    const auto is = [&](ParameterRef ref) { return ref && ref.index == active[j]; };
+    const bool only_picture = is(scene.view.center_x_px) || is(scene.view.center_y_px) || is(m.focus_um) || (is(m.analyzer_deg) && !is(m.polarizer_deg));
+    Part& part = only_picture ? of_picture : of_light;
+    part.parameters.push_back(active[j]);
+    part.images.push_back(&into.derivatives[j]);
+  }
+  // Calls body<S>(parameters, images) for up to four of a part at a time.
+  const auto in_chunks = [&](const Part& part, const auto& body) {
+    for (std::size_t first = 0, take; first < part.parameters.size(); first += take) {
+      take = std::min<std::size_t>(part.parameters.size() - first, 4);
+      const auto from = static_cast<long>(first), to = static_cast<long>(first + take);
+      const std::vector<int> chunk(part.parameters.begin() + from, part.parameters.begin() + to);
+      std::vector<Image*> images{&into.intensity};
+      images.insert(images.end(), part.images.begin() + from, part.images.begin() + to);
+      if (take > 2)
+        body.template operator()<Dual4>(chunk, images);
+      else if (take == 2)
+        body.template operator()<Dual2>(chunk, images);
+      else
+        body.template operator()<Dual1>(chunk, images);
+    }
+  };
+  std::vector<WaveField> base;  // without derivatives
+  const auto send = [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
+    const Values<S> value(theta, chunk);
+    std::vector<WaveField> fields = propagate(plan.grid, wave_light(scene, value), SphereMedium<S>(sphere_optics(scene, value), plan.ramp_um), threads);
+    picture(scene, plan, value, fields, threads, images);
+    fields.resize(1);
+    base = std::move(fields);
+  };
+  if (of_light.parameters.empty())
+    send.template operator()<Pack>({}, {&into.intensity});
+  else
+    in_chunks(of_light, send);
+  in_chunks(of_picture, [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
+    picture(scene, plan, Values<S>(theta, chunk), base, threads, images);
+  });
+}
 
 }  // namespace birefit

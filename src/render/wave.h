@@ -21,8 +21,7 @@ void check_objective(const Scene& scene, double n_host);
 /// or the propagation would need more memory than there should be.
 RenderPlan plan_wave(const Scene& scene, const Values<double>& value);
 
-/// The whole picture and its derivatives: 1 + derivatives images. S = Pack or a dual of packs.
-template <class S>
-void render_wave(const Scene& scene, const WavePlan& plan, const Values<S>& value, int threads, const std::vector<Image*>& images);
+/// The whole picture and its derivatives by `active` (indices of theta), images and all resized to fit.
+void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, const std::vector<int>& active, int threads, Rendering& into);
 
 }  // namespace birefit

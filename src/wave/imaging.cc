@@ -121,8 +121,10 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   for (int i = 0; i < g.nx; ++i) gx.push_back(g.x_um(i));
   for (int j = 0; j < g.ny; ++j) gy.push_back(g.y_um(j));
   const Matrix to_kx = waves(gx, shifted(kx, light.kx_per_um), -1) * g.step_um, to_ky = waves(shifted(ky, light.ky_per_um), gy, -1) * (g.ny == 1 ? 1.0 : g.step_um);
+  const auto reaches = [&](int f) { return static_cast<std::size_t>(f) < fields.size(); };
   std::vector<Matrix> spectrum(2 * kFields);
   parallel_for(2 * kFields, threads, [&](int job) {
+    if (!reaches(job / 2)) return;
     using Rows = Eigen::Matrix<Z, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Eigen::Map<const Rows> field(fields[static_cast<std::size_t>(job / 2)].a[job % 2].data(), g.ny, g.nx);
     spectrum[static_cast<std::size_t>(job)] = to_ky * (field * to_kx);
@@ -163,7 +165,8 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
         };
         const Z base_x = spectrum[0](row + k, column), base_y = spectrum[1](row + k, column);
         for (int p = 0; p < kFields; ++p) {
-          Z v = number(0, 0) * spectrum[static_cast<std::size_t>(2 * p)](row + k, column) + number(1, 0) * spectrum[static_cast<std::size_t>(2 * p + 1)](row + k, column);
+          Z v(0);
+          if (reaches(p)) v = number(0, 0) * spectrum[static_cast<std::size_t>(2 * p)](row + k, column) + number(1, 0) * spectrum[static_cast<std::size_t>(2 * p + 1)](row + k, column);
           if (p > 0) v += number(0, p) * base_x + number(1, p) * base_y;
           seen[static_cast<std::size_t>(p)](row + k, column) = v;
         }

@@ -29,7 +29,8 @@ struct WaveMicroscope {
   int width = 0, height = 0;  ///< of the picture, pixels
 };
 
-/// Mean intensity of every pixel, and its derivatives: 1 + derivatives images, resized to fit.
+/// Mean intensity of every pixel, and its derivatives: 1 + derivatives images, resized to fit. Derivatives beyond those that `fields` has
+/// are by parameters that the light on its way does not depend on.
 template <class S>
 void form_image(const WaveGrid&, const WaveImaging&, const WaveLight<S>&, const WaveMicroscope<S>&, const std::vector<WaveField>&, int threads,
                 const std::vector<Image*>& images);

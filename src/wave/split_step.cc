@@ -183,7 +183,7 @@ class Propagation {
  public:
   static constexpr int kFields = 1 + ScalarTraits<S>::derivatives;
   Propagation(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium)
-      : g_(grid), light_(light), medium_(medium), fft_(grid.nx, grid.ny), n_(fft_.size()), blocks_((static_cast<std::size_t>(grid.nx) + kLanes - 1) / kLanes), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
+      : g_(grid), light_(light), medium_(medium), fft_(shared_fft(grid.nx, grid.ny)), n_(fft_->size()), blocks_((static_cast<std::size_t>(grid.nx) + kLanes - 1) / kLanes), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
     for (auto& field : fields_)
       for (Plane* plane : {&field.a[0], &field.a[1], &field.term[0], &field.term[1]}) plane->resize(n_);
     for (auto& field : fields_)
@@ -221,6 +221,10 @@ class Propagation {
     to_flux(incident_, true);
     host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
     host_slab_ = slab_point(g_.layers, h_, light.k0_per_um, g_.n_ref, [&](int) { return host_; });
+    felt_.assign(static_cast<std::size_t>(g_.ny) * kFields, 0);
+    awake_[0] = 1;
+    for (int f = 1; f < kFields; ++f)
+      awake_[static_cast<std::size_t>(f)] = part(light.k0_per_um, f) != 0 || part(incident_[0], f) != Z(0) || part(incident_[1], f) != Z(0);
     for (int a = 0; a < 2; ++a)
       for (int f = 0; f < kFields; ++f) {
         std::fill(fields_[f].a[a].begin(), fields_[f].a[a].end(), Z(0));
@@ -235,12 +239,14 @@ class Propagation {
       for (int slab = 0; slab <= g_.slabs; ++slab) {
         const Table& table = oblique_[slab % 2];
         if (slab < g_.slabs) crew.each(g_.ny, [&](int row) { sample_row(slab, row); });
+        if (t == 0) wake();
+        crew.barrier.arrive_and_wait();
         for (int order = 1; order <= g_.order; ++order) oblique(crew, table, order);
         if (t == 0) incident_oblique(slab);
         if (slab < g_.slabs) pass_screen(crew);
         if (t == 0 && slab < g_.slabs) pass_incident();
       }
-      crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+      crew.each(2 * kFields, [&](int job) { fft_->inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
     });
     return scattered();
   }
@@ -293,6 +299,12 @@ class Propagation {
   }
   static constexpr double kAbsorption = 1.5;  ///< 1/um at the outer edge: strong enough over a frame, weak enough not to reflect
 
+  /// Parameters that the light has not met yet, or never will (where the picture lies), cost nothing.
+  void wake() {
+    for (std::size_t k = 0; k < felt_.size(); ++k) awake_[k % kFields] |= felt_[k];
+  }
+  bool asleep(int f) const { return !awake_[static_cast<std::size_t>(f)]; }
+
   /// Of one piece.
   static Pack entry(const double* piece, int quantity, int field) {
     return Pack::load_aligned(piece + (quantity * kFields + field) * kLanes);
@@ -318,8 +330,10 @@ class Propagation {
     }
   }
   void keep(const SlabPoint<S>& p, int slab, int row, int first) {
+    char* felt = felt_.data() + row * kFields;
     const auto put = [&](double* to, int quantity, const S& x, bool add) {
       for (int f = 0; f < kFields; ++f) {
+        if (f > 0 && !felt[f]) felt[f] = xsimd::any(lanes(x, f) != Pack(0.0));
         double* out = to + (quantity * kFields + f) * kLanes;
         const Pack all = add ? Pack::load_aligned(out) + lanes(x, f) : lanes(x, f);
         all.store_aligned(out);
@@ -363,6 +377,7 @@ class Propagation {
   void oblique(const Crew& crew, const Table& table, int order) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     crew.each(6 * kFields, [&](int job) {
+      if (asleep(job / 6)) return;
       Field& field = fields_[static_cast<std::size_t>(job / 6)];
       const int which = job % 6;
       const int component = which < 2 ? which : (which - 2) / 2;
@@ -378,7 +393,7 @@ class Propagation {
         else
           in_packs(nx, [&](std::size_t i, int count) { store(Pack(ky_[row]) * load(in + i, count), out + i, count); });
       }
-      fft_.inverse(to);
+      fft_->inverse(to);
     });
     crew.each(g_.ny, [&](int row) {
       in_packs(nx, [&](std::size_t first, int count) {
@@ -387,6 +402,7 @@ class Propagation {
         Lanes in[6];
         for (int q = 0; q < 6; ++q) in[q] = load(fields_[0].work[q].data() + i, count);
         for (int f = kFields - 1; f >= 0; --f) {
+          if (asleep(f)) continue;
           Field& field = fields_[static_cast<std::size_t>(f)];
           Lanes own[6], out[6];
           for (int q = 0; q < 6; ++q) own[q] = load(field.work[q].data() + i, count), out[q] = {Pack(0.0), Pack(0.0)};
@@ -396,11 +412,15 @@ class Propagation {
         }
       });
     });
-    crew.each(6 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]); });
+    crew.each(6 * kFields, [&](int job) {
+      if (!asleep(job / 6)) fft_->forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]);
+    });
     const Pack factor(1.0 / (order * static_cast<double>(n_)));
     crew.each(g_.ny, [&](int row) {
       const Pack ky(ky_[static_cast<std::size_t>(row)]);
-      for (Field& field : fields_)
+      for (int of = 0; of < kFields; ++of) {
+        if (asleep(of)) continue;
+        Field& field = fields_[static_cast<std::size_t>(of)];
         in_packs(nx, [&](std::size_t first, int count) {
           const std::size_t i = static_cast<std::size_t>(row) * nx + first;
           const Pack kx = Pack::load_unaligned(kx_.data() + first), f = factor * Pack::load_unaligned(kept_.data() + i);
@@ -411,6 +431,7 @@ class Propagation {
             store(load(field.a[a].data() + i, count) + t, field.a[a].data() + i, count);
           }
         });
+      }
     });
   }
 
@@ -437,10 +458,15 @@ class Propagation {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     const auto half_way = [&] {
       crew.each(2, [&](int a) { diffract(0, a); });
-      if (kFields > 1) crew.each(2 * (kFields - 1), [&](int job) { diffract(1 + job / 2, job % 2); });
+      if (kFields > 1)
+        crew.each(2 * (kFields - 1), [&](int job) {
+          if (!asleep(1 + job / 2)) diffract(1 + job / 2, job % 2);
+        });
     };
     half_way();
-    crew.each(2 * kFields, [&](int job) { fft_.inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+    crew.each(2 * kFields, [&](int job) {
+      if (!asleep(job / 2)) fft_->inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
+    });
     Z inc[kFields][2];
     Complex<S> at_screen[2] = {incident_[0], incident_[1]};
     incident_half_step(at_screen);
@@ -457,6 +483,7 @@ class Propagation {
         const auto at_point = [&](int f, int a) { return Pack(over) * load(fields_[static_cast<std::size_t>(f)].a[a].data() + i, count); };
         const Lanes x = at_point(0, 0), y = at_point(0, 1);
         for (int f = kFields - 1; f >= 0; --f) {
+          if (asleep(f)) continue;
           const auto screen = [&](int a, int b, int of) { return Lanes{entry(c, 4 * a + 2 * b, of), entry(c, 4 * a + 2 * b + 1, of)}; };
           const Lanes own_x = at_point(f, 0), own_y = at_point(f, 1);
           for (int a = 0; a < 2; ++a) {
@@ -468,7 +495,9 @@ class Propagation {
         }
       });
     });
-    crew.each(2 * kFields, [&](int job) { fft_.forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
+    crew.each(2 * kFields, [&](int job) {
+      if (!asleep(job / 2)) fft_->forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
+    });
     half_way();
   }
 
@@ -527,10 +556,12 @@ class Propagation {
   const WaveGrid& g_;
   const WaveLight<S>& light_;
   const WaveMedium<S>& medium_;
-  Fft2 fft_;
+  std::shared_ptr<const Fft2> fft_;
   std::size_t n_, blocks_;
   double h_;
   std::array<Field, static_cast<std::size_t>(kFields)> fields_;
+  std::vector<char> felt_;  ///< [row][field]: some point of the row depends on the parameter
+  std::array<char, static_cast<std::size_t>(kFields)> awake_{};
   Table screen_;      ///< of the slab
   Table oblique_[2];  ///< of V' about the slab's entry and exit, by turns
   std::vector<double> kx_, ky_, kept_;

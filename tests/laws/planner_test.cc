@@ -198,6 +198,7 @@ TEST(Planner, ShippedScenesTakeAtMostHalfMoreSamplesThanTheCheapestMethod) {
     }
     const Theta theta = config.job.parameters.values();
     const RenderPlan planned = plan(config.scene, theta);
+    if (planned.physics == "wave") continue;  // no rays whose samples could be counted
     const double ratio = planned_over_cheapest(config.scene, theta, planned);
     judged += ratio > 0;
     EXPECT_LE(ratio, 1.5) << entry.path().filename() << ": " << planned.method << " " << planned.steps;

@@ -186,8 +186,28 @@ TEST_F(Config, CountsNoBracketsInQuotesAndComments) {
   EXPECT_NE(mistakes(kRender + "extra: \"" + brackets + "\"\n").find("unknown key extra"), std::string::npos);
 }
 
+TEST_F(Config, WavesNeedAnApertureAndASphere) {
+  const std::string without = replaced(kRender, ", objective_na: 0.8", ""), &with_objective = kRender;
+  EXPECT_NE(mistakes(without + "physics: {ceiling: wave}\n").find("ceiling: wave needs microscope.objective_na"), std::string::npos);
+  EXPECT_EQ(mistakes(with_objective + "physics: {ceiling: wave}\n"), "");
+  EXPECT_NE(mistakes(with_objective + "physics: {ceiling: wave, rays: straight}\n").find("rays has no meaning"), std::string::npos);
+  EXPECT_NE(mistakes(with_objective + "physics: {max_seconds: -1}\n").find("max_seconds"), std::string::npos);
+  const std::string defocused = replaced(with_objective, "objective_na: 0.8", "objective_na: 0.8, focus_um: 2");
+  EXPECT_EQ(mistakes(defocused), "");
+  EXPECT_NE(mistakes(defocused + "physics: {ceiling: one_way}\n").find("defocus needs wave optics"), std::string::npos);
+}
+
+TEST_F(Config, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
+  const std::string without = replaced(kRender, ", objective_na: 0.8", ""), &with_objective = kRender;
+  const auto ceiling = [&](const std::string& text) { return load(text).scene.ceiling; };
+  EXPECT_EQ(ceiling(without), Ceiling::one_way);
+  EXPECT_EQ(ceiling(with_objective), Ceiling::wave);
+  EXPECT_EQ(ceiling(with_objective + "physics: {rays: straight}\n"), Ceiling::one_way);
+  EXPECT_EQ(ceiling(with_objective + "physics: {max_seconds: 0}\n"), Ceiling::one_way);
+  EXPECT_EQ(ceiling(with_objective + "transport: {method: diagonal}\n"), Ceiling::one_way);
+}
+
 TEST_F(Config, SaysWhatComesLater) {
-  EXPECT_NE(mistakes(kRender + "physics: {ceiling: wave}\n").find("not available yet"), std::string::npos);
   EXPECT_NE(mistakes(kRender + "physics: {ceiling: reflections}\n").find("cells and slabs"), std::string::npos);
 }
 

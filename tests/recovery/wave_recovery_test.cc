@@ -1,0 +1,184 @@
+// Radial droplets as Maxwell's equations show them (the exact series, summed here at the points of every pixel, with 1 % of noise): the
+// series fitted to them, wave propagation fitted to them, and rays, which must say what they are worth.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <random>
+
+#include "birefit/fit.h"
+#include "birefit/render.h"
+#include "scene_builder.h"
+#include "transport/quadrature.h"
+#include "wave/radial_series.h"
+
+namespace birefit {
+namespace {
+using namespace testing;
+
+struct WaveDraw {
+  TableBuilder b;
+  Scene scene;
+  std::vector<double> counts;
+  double noise = 0, birefringence = 0, diameter = 0;
+  FitJob job(Ceiling ceiling, const std::string& method) const {
+    FitJob job;
+    TableBuilder table = b;
+    Scene fitted = scene;
+    fitted.ceiling = ceiling;
+    fitted.method = method;
+    const ParameterRef gain = table.linear("gain", 900), offset = table.linear("offset", 5);
+    // Nobody's gain is below zero: that would pass off dark fringes as bright ones.
+    table.table[gain].lower = table.table[gain].physical_lower = 0;
+    job.micrographs.push_back(micrograph_of("droplet", fitted, counts, gain, offset, {noise, 0}));
+    job.parameters = table.table;
+    return job;
+  }
+};
+
+/// Radius 3 to 12 um, hosts 1.43 to 1.55, birefringence 0.05 to 0.24, apertures 0.4 and 0.8. Bounds of half and of one and a half times the
+/// birefringence, and of 6 % of the diameter, to both sides; the start anywhere between them.
+WaveDraw draw(unsigned seed, double largest_um, int size) {
+  std::mt19937_64 random(seed * 7919u);
+  const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  WaveDraw d;
+  const double radius = between(3, largest_um), host = between(1.43, 1.55), na = seed % 2 ? 0.4 : 0.8, k0 = 2 * std::numbers::pi / 0.59, n_o = 1.52;
+  d.diameter = 2 * radius;
+  d.birefringence = between(0.05, 0.24);
+  Scene& s = d.scene;
+  s.sample = Droplet{d.b.fitted("diameter_um", between(0.95, 1.05) * d.diameter, 0.94 * d.diameter, 1.06 * d.diameter), RadialDirector{}};
+  s.material = ConstantIndices{d.b.fixed("ordinary", n_o), d.b.fitted("birefringence", between(0.6, 1.4) * d.birefringence, 0.5 * d.birefringence, 1.5 * d.birefringence)};
+  s.surround_index = d.b.fixed("surround", host);
+  s.microscope.wavelength_nm = d.b.fixed("wavelength_nm", 590);
+  s.microscope.polarizer_deg = d.b.fixed("polarizer_deg", 30);
+  s.microscope.analyzer_deg = d.b.fixed("analyzer_deg", 120);
+  s.microscope.objective_na = na;
+  s.view.width = s.view.height = size;
+  const double px = s.view.pixel_size_um = (d.diameter + 4) / size, middle = 0.5 * (size - 1), cx = middle + between(-1, 1), cy = middle + between(-1, 1);
+  s.view.center_x_px = d.b.fitted("center_x", middle, middle - 3, middle + 3);
+  s.view.center_y_px = d.b.fitted("center_y", middle, middle - 3, middle + 3);
+  s.view.rotation_deg = d.b.fixed("rotation_deg", 0);
+
+  RadialBall<double> ball{{{radius, n_o, n_o + d.birefringence}}, host, k0};
+  const RadialImage<double> image(radial_series(ball), na, 0.0, px * size);
+  // Fringes are no finer than lambda / (2 NA), 0.37 um, pixels no wider than 0.5 um: six Gauss points a side err by 1e-5.
+  std::vector<double> node, weight;
+  legendre_nodes(6, node, weight);
+  const double twice = 2 * std::numbers::pi / 6;
+  std::vector<double> exact;
+  for (int row = 0; row < size; ++row)
+    for (int column = 0; column < size; ++column) {
+      double sum = 0;
+      for (std::size_t i = 0; i < node.size(); ++i)
+        for (std::size_t j = 0; j < node.size(); ++j) {
+          const double x = (column + 0.5 * node[i] - cx) * px, y = (cy - row - 0.5 * node[j]) * px;
+          const RadialAmplitudes<double> a = image(std::hypot(x, y));
+          const double turn = std::sin(2 * std::atan2(y, x) - twice);
+          sum += 0.25 * weight[i] * weight[j] * (a.a2.re * a.a2.re + a.a2.im * a.a2.im) * turn * turn;
+        }
+      exact.push_back(1000 * sum);
+    }
+  d.noise = 0.01 * *std::max_element(exact.begin(), exact.end());
+  std::normal_distribution<double> noise(0, d.noise);
+  for (double v : exact) d.counts.push_back(v + noise(random));
+  return d;
+}
+
+struct Tally {
+  int answers = 0, inside = 0, intervals = 0, refused = 0, wrong = 0, wide = 0;
+  void add(const WaveDraw& d, const FitResult& r) {
+    if (!r.has_answer()) {
+      ++refused;
+      return;
+    }
+    ++answers;
+    for (const auto& [name, truth] : {std::pair{"birefringence", d.birefringence}, {"diameter_um", d.diameter}}) {
+      const ParameterEstimate* p = find_estimate(r, name);
+      ASSERT_TRUE(p);
+      ++intervals;
+      inside += p->interval95_low <= truth && truth <= p->interval95_high;
+      wrong += std::abs(p->value - truth) > 5 * p->stderr_;
+      wide += 0.5 * (p->interval95_high - p->interval95_low) > 0.02 * truth;
+    }
+  }
+  void print(const char* of) const {
+    std::printf("  %s: %d answers, %d refused; %d of %d intervals hold the truth, %d wider than 2 %%, %d confidently wrong\n", of, answers, refused, inside, intervals, wide,
+                wrong);
+  }
+};
+
+void describe(int i, const WaveDraw& d, const FitResult& r) {
+  for (const char* name : {"birefringence", "diameter_um"}) {
+    const ParameterEstimate* p = find_estimate(r, name);
+    const double truth = *name == 'b' ? d.birefringence : d.diameter;
+    std::printf("  %3d %-13s truth %.5g: %+.3f %% +/- %.3f %%, %+.1f standard errors%s\n", i, name, truth, 100 * (p->value / truth - 1), 100 * p->stderr_ / truth,
+                (p->value - truth) / p->stderr_, r.has_answer() ? "" : "  (no answer)");
+  }
+}
+
+bool says_rays_do_not_suffice(const FitResult& r) {
+  const auto warns = [](const std::string& w) {
+    return w.find("Rays are not the image") != std::string::npos || w.find("does not describe") != std::string::npos;
+  };
+  return !r.has_answer() || std::any_of(r.warnings.begin(), r.warnings.end(), warns);
+}
+
+/// Rays on the same pictures: whenever their interval misses the truth, a flag.
+void check_rays(int draws, double largest_um, int size) {
+  int missed = 0, silent = 0;
+  for (int i = 1; i <= draws; ++i) {
+    const WaveDraw d = draw(static_cast<unsigned>(i), largest_um, size);
+    const FitResult r = fit(d.job(Ceiling::one_way, "auto"));
+    const ParameterEstimate *n = find_estimate(r, "birefringence"), *w = find_estimate(r, "diameter_um");
+    ASSERT_TRUE(n && w);
+    const bool misses = !(n->interval95_low <= d.birefringence && d.birefringence <= n->interval95_high) || !(w->interval95_low <= d.diameter && d.diameter <= w->interval95_high);
+    missed += misses;
+    silent += misses && !says_rays_do_not_suffice(r);
+  }
+  std::printf("  rays: %d of %d missed the truth, %d of them silently\n", missed, draws, silent);
+  EXPECT_EQ(silent, 0);
+}
+
+void check_series(int draws, double largest_um, int size, double least_share) {
+  Tally t;
+  for (int i = 1; i <= draws; ++i) {
+    const WaveDraw d = draw(static_cast<unsigned>(i), largest_um, size);
+    const FitResult r = fit(d.job(Ceiling::wave, "auto"));
+    if (draws < 100) describe(i, d, r);
+    t.add(d, r);
+  }
+  t.print("series");
+  EXPECT_EQ(t.wrong, 0);
+  EXPECT_EQ(t.wide, 0);
+  EXPECT_LE(t.refused, std::max(1, draws / 20));
+  EXPECT_GE(t.inside, least_share * t.intervals);
+}
+
+TEST(SeriesRecovery, TruthIsInsideTheInterval) { check_series(12, 7, 48, 0.8); }  // of 24 intervals fewer than 20: 0.3 % by chance
+TEST(LongSeriesRecovery, TruthIsInsideTheInterval) { check_series(500, 12, 64, 0.93); }  // 95 % less three standard deviations
+TEST(RaysOnWaves, SayWhenTheyAreWrong) { check_rays(4, 6, 48); }
+TEST(LongRaysOnWaves, SayWhenTheyAreWrong) { check_rays(100, 12, 64); }
+
+// Propagation is itself 0.01 to 0.05 of the image away from the truth: the interval must know.
+void check_propagation(int draws, double largest_um, int size, double least_share) {
+  Tally t;
+  for (int i = 1; i <= draws; ++i) {
+    const WaveDraw d = draw(static_cast<unsigned>(i), largest_um, size);
+    const FitResult r = fit(d.job(Ceiling::wave, "split_step"));
+    describe(i, d, r);
+    t.add(d, r);
+  }
+  t.print("propagation");
+  EXPECT_EQ(t.wrong, 0);
+  EXPECT_LE(t.wide, draws / 10);
+  EXPECT_LE(t.refused, draws / 10);
+  EXPECT_GE(t.inside, least_share * t.intervals);
+}
+TEST(WaveRecovery, TruthIsInsideTheInterval) { check_propagation(2, 4, 48, 0.5); }
+TEST(LongWaveRecovery, TruthIsInsideTheInterval) { check_propagation(60, 12, 64, 0.9); }
+
+}  // namespace
+}  // namespace birefit
