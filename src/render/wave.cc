@@ -66,27 +66,12 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   const double k0 = wavenumber_per_um(scene, value), wavelength = 2 * std::numbers::pi / k0;
   auto wave = std::make_shared<WavePlan>();
   wave->radius_um = o.radius_um;
-  WaveGrid& g = wave->grid;
-  // Measured against the exact series (docs/methods.md, "Waves"): steps of a third of the wavelength, slabs of half of it and a margin of
-  // host that grows with the aperture leave 0.01 to 0.03 of the image's RMS, of which a third is discretisation.
-  const double margin = 1.5 + 3 * na, step = 0.339 * wavelength, slab = 0.53 * wavelength;
-  const double box = 2 * (o.radius_um + margin);
-  const double points = box / step;
-  if (points > 2000)
-    throw UserError(Where{}, fmt::format("wave optics of a sphere of {:.3g} um would need {:.0f} x {:.0f} points in {:.0f} slabs, about {:.1f} GB and {:.0f} min an image",
-                                         2 * o.radius_um, points, points, 2 * o.radius_um / slab, points * points * 4e-7, points * points * o.radius_um / slab * 3e-6 / 60),
-                    "use ceiling: one_way, which becomes better with size only for weak birefringence, or check diameter_um");
-  g.nx = g.ny = fast_fft_size(static_cast<int>(std::ceil(points)));
-  g.step_um = box / g.nx;
+  const WaveGrid& g = wave->grid = sphere_grid(o, k0, na);
   wave->ramp_um = g.step_um;
-  // 5 % more: the diameter may be fitted.
-  g.exit_um = 1.05 * o.radius_um + g.step_um;
-  g.entry_um = -g.exit_um;
-  g.slabs = 2 * static_cast<int>(std::ceil((g.exit_um - g.entry_um) / slab / 2));
-  g.layers = 4;
-  g.n_ref = o.n_host;
-  g.cut_per_um = std::min({1.2, 0.5 * (na + o.n_host) + 0.2, 0.97 * o.n_host}) * k0;
-  g.frame_um = 0.4 * margin;
+  if (g.nx > 2000)
+    throw UserError(Where{}, fmt::format("wave optics of a sphere of {:.3g} um would need {} x {} points in {} slabs, about {:.1f} GB and {:.0f} min an image",
+                                         2 * o.radius_um, g.nx, g.ny, g.slabs, 4e-7 * g.nx * g.ny, 3e-6 / 60 * g.nx * g.ny * g.slabs),
+                    "use ceiling: one_way, which becomes better with size only for weak birefringence, or check diameter_um");
   const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px), px = scene.view.pixel_size_um;
   const double reach_x = px * (std::max(std::abs(cx), std::abs(scene.view.width - 1 - cx)) + 1), reach_y = px * (std::max(std::abs(cy), std::abs(scene.view.height - 1 - cy)) + 1);
   wave->imaging = plan_imaging(g, k0, na, reach_x, reach_y);

@@ -142,9 +142,9 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
       const Pack y = Pack::load_aligned(ky_lanes), k2 = y * y + Pack(x * x), f = inverse_root(max_of(k2, Pack(1e-30)));
       const auto centre = k2 < Pack(1e-20);
       const Pack px = select(centre, Pack(1.0), f * Pack(x)), py = select(centre, Pack(0.0), f * y);
-      // Where the pupil ends within a step, the part of the step that is inside.
-      const S edge = (m.objective_na * light.k0_per_um - S(k2 * f)) * (1 / plan.pupil_step_per_um) + 0.5;
-      const S open = min_of(max_of(edge, S(0.0)), S(1.0));
+      // Where the pupil ends within a step, about the part of the step that is inside; a cubic ramp, for derivatives without steps.
+      const S edge = (m.objective_na * light.k0_per_um - S(k2 * f)) * (1 / (1.29 * plan.pupil_step_per_um)) + 0.5;
+      const S inside = min_of(max_of(edge, S(0.0)), S(1.0)), open = inside * inside * (3.0 - 2.0 * inside);
       const S q = root(max_of(S(light.n_host * light.n_host - S(k2) * inverse_k0 * inverse_k0), S(1e-6)));
       // An aplanatic objective turns s and p into the plane and keeps their flux: a itself.
       const S s_over = m.aplanatic ? S(1.0) : root(light.n_host * inverse(q)), p_over = m.aplanatic ? S(1.0) : inverse(s_over);

@@ -1,6 +1,9 @@
 #pragma once
 // A birefringent sphere or shell in its host as a medium on the grid of wave optics.
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <variant>
 
 #include "medium/families/ball.h"
@@ -25,10 +28,10 @@ template <class S>
 class SphereMedium final : public WaveMedium<S> {
  public:
   using P = PlainOf<S>;
-  SphereMedium(const SphereOptics<S>& optics, double ramp_um) : o_(optics), ramp_(ramp_um), inverse_radius_(inverse(o_.radius_um)) {}
+  SphereMedium(const SphereOptics<S>& optics, double ramp_um) : o_(optics), width_(1.29 * ramp_um), inverse_radius_(inverse(o_.radius_um)) {}
 
   bool reaches(const P& x, const P& y, double z) const override {
-    const double most = lane(plain(o_.radius_um), 0) + 0.5 * ramp_;
+    const double most = lane(plain(o_.radius_um), 0) + 0.5 * width_;
     return smallest(x * x + y * y) + z * z < most * most;
   }
   OpticalPoint<S> at(const P& x, const P& y, double z) const override {
@@ -60,10 +63,10 @@ class SphereMedium final : public WaveMedium<S> {
     const Vec3<S> r{inverse_radius_ * place_um.x, inverse_radius_ * place_um.y, inverse_radius_ * place_um.z};
     return std::visit([&](const auto& field) { return field.template at<S>(r); }, o_.field);
   }
-  /// A cubic: its slope is continuous, so that the image's derivative by a radius is, too.
+  /// Cubic, so that derivatives have no steps; as blurred as a linear ramp of ramp_um (the same second moment).
   S ramped(const S& depth_um) const {
-    const S t = min_of(max_of(depth_um * (1 / ramp_) + 0.5, S(0.0)), S(1.0));
-    return t * t * (3.0 - 2.0 * t);
+    const S u = min_of(max_of(depth_um * (1 / width_) + 0.5, S(0.0)), S(1.0));
+    return u * u * (3.0 - 2.0 * u);
   }
   /// Fraction c of the uniaxial medium, the rest isotropic.
   static OpticalPoint<S> mixed(const Vec3<S>& n, const Vec3<S>& face, const S& eo, const S& ee, const S& other, const S& c) {
@@ -81,8 +84,34 @@ class SphereMedium final : public WaveMedium<S> {
   }
 
   SphereOptics<S> o_;
-  double ramp_;
+  double width_;
   S inverse_radius_;
 };
+
+/// The grid for pictures of a sphere, surfaces being ramps one step thick. Measured against the exact series
+/// (tests/cross/split_step_test.cc): n_o 1.52, n_e 1.74, diameters of 5 to 20 um leave 0.01 to 0.06 of the picture's RMS, most of it what a
+/// one-way wave to the second order in its slope leaves out.
+inline WaveGrid sphere_grid(const SphereOptics<double>& o, double k0_per_um, double objective_na) {
+  const double wavelength = 2 * std::numbers::pi / k0_per_um, sine = std::min(objective_na / o.n_host, 0.99);
+  // Light that leaves the box on its way to the exit plane is lost to the picture. Solid spheres send little past their rims at a
+  // slant; a wall does, from its widest part on.
+  const double near = 1.5 + 3 * objective_na, far = 1 + o.radius_um * sine / std::sqrt(1 - sine * sine), margin = o.has_core ? std::max(near, far) : near;
+  // Steep waves need thin slabs: 0.8 wavelengths add nothing to the model's error at NA 0.4, and half of it at NA 0.8.
+  const double step = 0.339 * wavelength, slab = (0.95 - 0.375 * std::min(objective_na, 1.2)) * wavelength, box = 2 * (o.radius_um + margin);
+  const auto count = [](double x) { return static_cast<int>(std::ceil(std::min(x, 1e6))); };  // more is refused elsewhere
+  WaveGrid g;
+  g.nx = g.ny = fast_fft_size(count(box / step));
+  g.step_um = box / g.nx;
+  // 5 % more: the diameter may be fitted.
+  g.exit_um = 1.05 * o.radius_um + g.step_um;
+  g.entry_um = -g.exit_um;
+  g.slabs = count((g.exit_um - g.entry_um) / slab);
+  g.layers = 4;
+  // Between host and medium: the diffraction of neither is then far from exact.
+  g.n_ref = 0.5 * o.n_host + 0.25 * (o.n_o + o.n_e);
+  g.cut_per_um = std::min({1.2, 0.5 * (objective_na + o.n_host) + 0.2, 0.97 * o.n_host, 0.97 * g.n_ref}) * k0_per_um;
+  g.frame_um = 0.25 * near;
+  return g;
+}
 
 }  // namespace birefit

@@ -15,55 +15,57 @@ namespace {
 using Z = std::complex<double>;
 
 // One slab of thickness h takes the field through
-//   a <- D^(1/2) S D^(1/2) exp(i h k0 V') a,
+//   a <- exp(i k0 V'_2) D^(1/2) S D^(1/2) exp(i k0 V'_1) a,
 // D free propagation in n_ref, S the screen: the ordered product over thin layers of exp(i k0 dz (N - n_ref)), N the exact 2 x 2
-// operator of normal incidence (N_e along the transverse director t, N_o along s), and V' what transverse wavevectors
-// kappa = k / k0 add to the second order:
+// operator of normal incidence (N_e along the transverse director t, N_o along s), and V'_1, V'_2 what transverse wavevectors
+// kappa = k / k0 add to the second order, summed over the layers of the first and of the second half. The second half of one slab and the first
+// of the next are taken together: second order in h for the price of the first.
 //   V' a = -1/2 [kappa (v . a) + v (kappa . a)] - 1/2 kappa (sd (kappa . a)) - 1/2 kappa' (sc (kappa' . a)) + kappa_i (D_ij (kappa_j a)).
 // It follows from the Riccati equation of the one-way Maxwell system, h = Y e; the order of wavevector and coefficient counts. v walks
 // extraordinary light off sideways; sd, sc and D are what diffraction in the medium has beyond that in n_ref.
 
-/// Of a slab at one point, h and k0 taken in: h v, (h / k0) of the others; the screen is the product over the layers.
+/// V' of some thickness at one point, thickness and k0 taken in: h v, (h / k0) of the others.
 template <class S>
-struct SlabPoint {
-  Complex<S> screen[2][2];
+struct ObliquePoint {
   S v[2];
   S sd, sc;
   S d[3][3];  ///< D_ij^ab: ij, ab = xx, xy, yy
 };
-constexpr int kScreen = 0, kWalk = 8, kSd = 10, kSc = 11, kD = 12, kQuantities = 21;
+constexpr int kWalk = 0, kSd = 2, kSc = 3, kD = 4, kObliques = 13;
+/// Of a slab at one point.
+template <class S>
+struct SlabPoint {
+  Complex<S> screen[2][2];
+  ObliquePoint<S> half[2];
+};
+constexpr int kScreens = 8;
 
 template <class S>
 void clear(SlabPoint<S>& p) {
   p.screen[0][0] = p.screen[1][1] = Complex<S>(S(1.0));
   p.screen[0][1] = p.screen[1][0] = Complex<S>();
-  p.v[0] = p.v[1] = p.sd = p.sc = S(0.0);
-  for (auto& row : p.d)
-    for (S& x : row) x = S(0.0);
+  for (ObliquePoint<S>& o : p.half) {
+    o.v[0] = o.v[1] = o.sd = o.sc = S(0.0);
+    for (auto& row : o.d)
+      for (S& x : row) x = S(0.0);
+  }
 }
 
-/// One more layer behind those in p.
+/// N = n_o + g n_t n_t^T at one place.
 template <class S>
-void add_layer(SlabPoint<S>& p, const OpticalPoint<S>& medium, const S& k0, double n_ref, double thickness) {
+struct Flat {
+  S sum;  ///< n_o + N_e
+  S g, x, y;
+};
+
+/// What one layer, of this thickness, adds to V'.
+template <class S>
+Flat<S> add_layer(ObliquePoint<S>& p, const OpticalPoint<S>& medium, const S& k0, double n_ref, double thickness) {
   const S eo = medium.ordinary, de = medium.extraordinary - eo;
   const Vec3<S>& n = medium.axis;
   const S t2 = n.x * n.x + n.y * n.y, eta = inverse(S(eo + de * n.z * n.z));
   const S no = root(eo), ne = root(eo * medium.extraordinary * eta), sum = no + ne, over = inverse(sum);
   const S g = eo * de * eta * over;  // (ne - no) / t2, finite for an axis along z
-  // exp(i k0 dz (N - n_ref)) = exp(i mean) (cos + i sin (2 t t^T - 1)), N = no + g n_t n_t^T.
-  const S phase = k0 * thickness, half = 0.5 * phase * g;
-  const CosSinc<S> turn = cos_sinc_sq(S(square(half * t2)));
-  S sm, cm;
-  sin_cos(phase * (0.5 * sum - n_ref), sm, cm);
-  const S s = half * turn.sinc_sq, along = s * (n.x * n.x - n.y * n.y), across = 2.0 * s * n.x * n.y;
-  // i along on the diagonal (+, -), i across off it, cos on both; times exp(i mean).
-  const Complex<S> a{cm * turn.cos_sq - sm * along, sm * turn.cos_sq + cm * along}, d{cm * turn.cos_sq + sm * along, sm * turn.cos_sq - cm * along};
-  const Complex<S> b{S(0.0) - sm * across, cm * across};
-  for (int c = 0; c < 2; ++c) {
-    const Complex<S> top = p.screen[0][c], bottom = p.screen[1][c];
-    p.screen[0][c] = a * top + b * bottom;
-    p.screen[1][c] = b * top + d * bottom;
-  }
   const S walk = thickness * de * n.z * eta;
   p.v[0] = p.v[0] + walk * n.x;
   p.v[1] = p.v[1] + walk * n.y;
@@ -83,6 +85,86 @@ void add_layer(SlabPoint<S>& p, const OpticalPoint<S>& medium, const S& k0, doub
     const S on_t = scale * (tt_tt * t[ij] + ss_tt * o[ij]), on_s = scale * (tt_ss * t[ij] + ss_ss * o[ij]), mixed = 0.5 * scale * ts_ts * m[ij];
     for (int ab = 0; ab < 3; ++ab) p.d[ij][ab] = p.d[ij][ab] + on_t * t[ab] + on_s * o[ab] + mixed * m[ab];
   }
+  return {sum, g, n.x, n.y};
+}
+
+/// The screen of thickness h, N known at its two Gauss points: the fourth order of Magnus' series, by Gauss' rule and the commutator,
+///   exp(i k0 h ((N_1 + N_2) / 2 - n_ref) + sqrt(3)/12 (k0 h)^2 [N_1, N_2]),
+/// and where N turns by dphi the field turns back by dphi (N_e - N_o)^2 / (2 (N_e + N_o)^2): what dY/dz leaves of the Riccati equation, to second order in
+/// d/dz / k0, where N is constant in front and behind. A helix's exact modes have it.
+template <class S>
+void pass_layers(SlabPoint<S>& slab, const Flat<S>& one, const Flat<S>& two, const S& k0, double n_ref, double h) {
+  const S phase = k0 * h, mean = 0.25 * (one.sum + two.sum), over = inverse(mean), quarter = 0.25 * phase;
+  // N_1 + N_2 in parts: 1, i (x x - y y), i (x y + y x); and a rotation.
+  const S p3 = quarter * (one.g * (one.x * one.x - one.y * one.y) + two.g * (two.x * two.x - two.y * two.y));
+  const S p1 = 2.0 * quarter * (one.g * one.x * one.y + two.g * two.x * two.y);
+  const S turned = std::numbers::sqrt3 * one.g * two.g * (one.x * two.x + one.y * two.y) * (one.x * two.y - one.y * two.x);
+  const S p2 = turned * ((-1.0 / 12) * phase * phase - 0.125 * over * over);
+  const CosSinc<S> turn = cos_sinc_sq(S(p3 * p3 + p1 * p1 + p2 * p2));
+  S sm, cm;
+  sin_cos(phase * (mean - n_ref), sm, cm);
+  const Complex<S> whole(cm, sm);
+  const Complex<S> a = whole * Complex<S>(turn.cos_sq, turn.sinc_sq * p3), d = whole * Complex<S>(turn.cos_sq, S(0.0) - turn.sinc_sq * p3);
+  const S rotation = turn.sinc_sq * p2, across = turn.sinc_sq * p1;
+  const Complex<S> b = whole * Complex<S>(S(0.0) - rotation, across), c = whole * Complex<S>(rotation, across);
+  for (int i = 0; i < 2; ++i) {
+    const Complex<S> top = slab.screen[0][i], bottom = slab.screen[1][i];
+    slab.screen[0][i] = a * top + b * bottom;
+    slab.screen[1][i] = c * top + d * bottom;
+  }
+}
+
+/// The medium in a slab is asked for at `layers` depths, two by two the Gauss points of equal parts.
+double layer_depth(int layer, int layers) {
+  return (layer / 2 + 0.5 + (layer % 2 == 0 ? -0.5 : 0.5) / std::numbers::sqrt3) * 2 / layers;
+}
+template <class S, class F>
+SlabPoint<S> slab_point(int layers, double slab_um, const S& k0, double n_ref, const F& medium_at) {
+  SlabPoint<S> p;
+  clear(p);
+  Flat<S> before;
+  for (int l = 0; l < layers; ++l) {
+    const Flat<S> here = add_layer(p.half[2 * l < layers ? 0 : 1], medium_at(l), k0, n_ref, slab_um / layers);
+    if (l % 2 == 1) pass_layers(p, before, here, k0, n_ref, 2 * slab_um / layers);
+    before = here;
+  }
+  return p;
+}
+
+/// Complex numbers, one a lane, with only what is needed below: real and imaginary parts apart, so that coefficients are plain packs.
+struct Lanes {
+  Pack re, im;
+};
+BIREFIT_INLINE Lanes operator+(const Lanes& a, const Lanes& b) { return {a.re + b.re, a.im + b.im}; }
+BIREFIT_INLINE Lanes operator-(const Lanes& a, const Lanes& b) { return {a.re - b.re, a.im - b.im}; }
+BIREFIT_INLINE Lanes operator*(const Pack& a, const Lanes& b) { return {a * b.re, a * b.im}; }
+BIREFIT_INLINE Lanes operator*(const Lanes& a, const Lanes& b) { return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re}; }
+using Interleaved = xsimd::batch<Z, Pack::arch_type>;
+/// The `count` numbers from here on; zeros in lanes beyond.
+BIREFIT_INLINE Lanes load(const Z* from, int count) {
+  Z some[kLanes] = {};
+  if (count < kLanes) {
+    std::copy_n(from, count, some);
+    from = some;
+  }
+  const Interleaved z = Interleaved::load_unaligned(from);
+  return {z.real(), z.imag()};
+}
+BIREFIT_INLINE void store(const Lanes& a, Z* to, int count) {
+  if (count == kLanes) return Interleaved(a.re, a.im).store_unaligned(to);
+  Z some[kLanes];
+  Interleaved(a.re, a.im).store_unaligned(some);
+  std::copy_n(some, count, to);
+}
+/// f(first, count) for [0, n) in pieces of one pack.
+template <class F>
+void in_packs(std::size_t n, const F& f) {
+  for (std::size_t i = 0; i < n; i += kLanes) f(i, static_cast<int>(std::min<std::size_t>(kLanes, n - i)));
+}
+/// What packs read with load_unaligned may be read beyond the end.
+std::vector<double> padded(std::vector<double> x) {
+  x.resize(x.size() + kLanes);
+  return x;
 }
 
 /// The walk of a worker through work that all share: phases end at a barrier.
@@ -101,12 +183,14 @@ class Propagation {
  public:
   static constexpr int kFields = 1 + ScalarTraits<S>::derivatives;
   Propagation(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium)
-      : g_(grid), light_(light), medium_(medium), fft_(shared_fft(grid.nx, grid.ny)), n_(fft_->size()), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
+      : g_(grid), light_(light), medium_(medium), fft_(shared_fft(grid.nx, grid.ny)), n_(fft_->size()), blocks_((static_cast<std::size_t>(grid.nx) + kLanes - 1) / kLanes), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
     for (auto& field : fields_)
       for (Plane* plane : {&field.a[0], &field.a[1], &field.term[0], &field.term[1]}) plane->resize(n_);
     for (auto& field : fields_)
       for (Plane& plane : field.work) plane.resize(n_);
-    table_.resize(n_ * kQuantities * kFields);
+    const std::size_t blocks = blocks_ * static_cast<std::size_t>(grid.ny) * kFields * kLanes;
+    screen_.resize(blocks * kScreens);
+    for (auto& table : oblique_) table.assign(blocks * kObliques, 0.0);
     const auto wavenumbers = [&](int n, double tilt) {
       std::vector<double> k(static_cast<std::size_t>(n));
       for (int m = 0; m < n; ++m) k[static_cast<std::size_t>(m)] = tilt + (n == 1 ? 0.0 : 2 * std::numbers::pi / (n * g_.step_um) * (m < n - m ? m : m - n));
@@ -117,15 +201,18 @@ class Propagation {
     const double k0 = first(light.k0_per_um);
     half_step_.resize(n_);
     half_step_slope_.resize(n_);
+    kept_.resize(n_);
     const double kn = k0 * g_.n_ref;
     for (std::size_t i = 0; i < n_; ++i) {
       const double k2 = square(kx_[i % kx_.size()]) + square(ky_[i / kx_.size()]);
       if (k2 > square(g_.cut_per_um)) continue;  // zero: cut
       const double q = std::sqrt(kn * kn - k2), phase = 0.5 * h_ * (q - kn);
+      kept_[i] = 1;
       half_step_[i] = std::polar(1.0, phase);
       half_step_slope_[i] = 0.5 * h_ * (k0 * square(g_.n_ref) / q - g_.n_ref);
     }
-    frame_x_ = frame(g_.nx), frame_y_ = frame(g_.ny);
+    kx_ = padded(kx_), kept_ = padded(kept_), half_step_slope_ = padded(half_step_slope_);
+    frame_x_ = padded(frame(g_.nx)), frame_y_ = frame(g_.ny);
     incident_[0] = Complex<S>(light.ex), incident_[1] = Complex<S>(light.ey);
     const S kh = light.k0_per_um * light.n_host;
     tilt2_ = square(light.kx_per_um) + square(light.ky_per_um);
@@ -133,8 +220,7 @@ class Propagation {
     // a = Y^(1/2) e, in units of n_host^(1/2): q / n_host for s, its inverse for p.
     to_flux(incident_, true);
     host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
-    clear(host_slab_);
-    for (int l = 0; l < g_.layers; ++l) add_layer(host_slab_, host_, light.k0_per_um, g_.n_ref, h_ / g_.layers);
+    host_slab_ = slab_point(g_.layers, h_, light.k0_per_um, g_.n_ref, [&](int) { return host_; });
     felt_.assign(static_cast<std::size_t>(g_.ny) * kFields, 0);
     awake_[0] = 1;
     for (int f = 1; f < kFields; ++f)
@@ -150,17 +236,15 @@ class Propagation {
     std::barrier barrier(threads);
     parallel_for(threads, threads, [&](int t) {
       const Crew crew{barrier, t, threads};
-      for (int slab = 0; slab < g_.slabs; ++slab) {
-        const double from = g_.entry_um + slab * h_;
-        crew.each(g_.ny, [&](int row) { sample_row(from, row); });
+      for (int slab = 0; slab <= g_.slabs; ++slab) {
+        const Table& table = oblique_[slab % 2];
+        if (slab < g_.slabs) crew.each(g_.ny, [&](int row) { sample_row(slab, row); });
         if (t == 0) wake();
         crew.barrier.arrive_and_wait();
-        // The oblique terms before the screen in one slab, behind it in the next: symmetric over two, so of second order.
-        const bool before = slab % 2 == 0;
-        for (int order = 1; before && order <= g_.order; ++order) oblique(crew, order);
-        pass_screen(crew, before);
-        for (int order = 1; !before && order <= g_.order; ++order) oblique(crew, order);
-        if (t == 0) pass_incident(before);
+        for (int order = 1; order <= g_.order; ++order) oblique(crew, table, order);
+        if (t == 0) incident_oblique(slab);
+        if (slab < g_.slabs) pass_screen(crew);
+        if (t == 0 && slab < g_.slabs) pass_incident();
       }
       crew.each(2 * kFields, [&](int job) { fft_->inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
     });
@@ -168,6 +252,8 @@ class Propagation {
   }
 
  private:
+  /// By pieces of a row, one pack of points each: [row][piece][quantity][value or derivative].
+  using Table = std::vector<double, AlignedAllocator<double>>;
   struct Field {
     Plane a[2];      ///< spectrum
     Plane term[2];   ///< of the Taylor series
@@ -219,73 +305,76 @@ class Propagation {
   }
   bool asleep(int f) const { return !awake_[static_cast<std::size_t>(f)]; }
 
-  double* table(int quantity, int field) { return table_.data() + (static_cast<std::size_t>(quantity) * kFields + static_cast<std::size_t>(field)) * n_; }
-  const double* table(int quantity, int field) const { return const_cast<Propagation*>(this)->table(quantity, field); }
+  /// Of one piece.
+  static Pack entry(const double* piece, int quantity, int field) {
+    return Pack::load_aligned(piece + (quantity * kFields + field) * kLanes);
+  }
+  std::size_t piece(int row, std::size_t first, int quantities) const {
+    return (static_cast<std::size_t>(row) * blocks_ + first / kLanes) * static_cast<std::size_t>(quantities * kFields * kLanes);
+  }
 
-  void sample_row(double from_um, int row) {
+  void sample_row(int slab, int row) {
     alignas(64) double x[kLanes];
-    const double dz = h_ / g_.layers;
-    char* felt = felt_.data() + row * kFields;
+    const Pack y(g_.y_um(row));
+    const auto depth = [&](int layer) { return g_.entry_um + (slab + layer_depth(layer, g_.layers)) * h_; };
     for (int i = 0; i < g_.nx; i += kLanes) {
       const int count = std::min(kLanes, g_.nx - i);
       for (int k = 0; k < kLanes; ++k) x[k] = g_.x_um(i + std::min(k, count - 1));
       const Pack place = Pack::load_aligned(x);
-      const std::size_t to = static_cast<std::size_t>(row) * static_cast<std::size_t>(g_.nx) + static_cast<std::size_t>(i);
-      SlabPoint<S> p;
-      clear(p);
       bool host = true;
-      for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz);
-      if (host) {
-        store(host_slab_, to, count, felt);
-        continue;
-      }
-      for (int l = 0; l < g_.layers; ++l) add_layer(p, medium_.at(place, Pack(g_.y_um(row)), from_um + (l + 0.5) * dz), light_.k0_per_um, g_.n_ref, dz);
-      store(p, to, count, felt);
+      for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, y, depth(l));
+      if (host)
+        keep(host_slab_, slab, row, i);
+      else
+        keep(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref, [&](int l) { return medium_.at(place, y, depth(l)); }), slab, row, i);
     }
   }
-  void store(const SlabPoint<S>& p, std::size_t to, int count, char* felt) {
-    const auto put = [&](int quantity, const S& x) {
+  void keep(const SlabPoint<S>& p, int slab, int row, int first) {
+    char* felt = felt_.data() + row * kFields;
+    const auto put = [&](double* to, int quantity, const S& x, bool add) {
       for (int f = 0; f < kFields; ++f) {
-        double* out = table(quantity, f) + to;
         if (f > 0 && !felt[f]) felt[f] = xsimd::any(lanes(x, f) != Pack(0.0));
-        if (count == kLanes) {
-          lanes(x, f).store_unaligned(out);
-        } else {
-          for (int k = 0; k < count; ++k) out[k] = lanes(x, f).get(static_cast<std::size_t>(k));
-        }
+        double* out = to + (quantity * kFields + f) * kLanes;
+        const Pack all = add ? Pack::load_aligned(out) + lanes(x, f) : lanes(x, f);
+        all.store_aligned(out);
       }
     };
+    double* screen = screen_.data() + piece(row, static_cast<std::size_t>(first), kScreens);
     for (int a = 0; a < 2; ++a)
       for (int b = 0; b < 2; ++b) {
-        put(kScreen + 4 * a + 2 * b, p.screen[a][b].re);
-        put(kScreen + 4 * a + 2 * b + 1, p.screen[a][b].im);
+        put(screen, 4 * a + 2 * b, p.screen[a][b].re, false);
+        put(screen, 4 * a + 2 * b + 1, p.screen[a][b].im, false);
       }
-    put(kWalk, p.v[0]), put(kWalk + 1, p.v[1]), put(kSd, p.sd), put(kSc, p.sc);
-    for (int ij = 0; ij < 3; ++ij)
-      for (int ab = 0; ab < 3; ++ab) put(kD + 3 * ij + ab, p.d[ij][ab]);
+    for (int half = 0; half < 2; ++half) {
+      double* table = oblique_[(slab + half) % 2].data() + piece(row, static_cast<std::size_t>(first), kObliques);
+      const ObliquePoint<S>& o = p.half[half];
+      const auto set = [&](int quantity, const S& x) { put(table, quantity, x, half == 0); };
+      set(kWalk, o.v[0]), set(kWalk + 1, o.v[1]), set(kSd, o.sd), set(kSc, o.sc);
+      for (int ij = 0; ij < 3; ++ij)
+        for (int ab = 0; ab < 3; ++ab) set(kD + 3 * ij + ab, o.d[ij][ab]);
+    }
   }
 
-  /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the coefficients of plane f: adds what
+  /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the f-th coefficients: adds what
   /// stays as it is (out 0, 1) and what kx, ky will be applied to (out 2 .. 5, the same order).
-  struct Coefficients {
-    const double* c[kQuantities - kWalk];
-    double operator()(int quantity, std::size_t i) const { return c[quantity - kWalk][i]; }
-  };
-  BIREFIT_INLINE static void oblique_at(const Coefficients& c, std::size_t i, const Z* in, Z* out) {
-    const Z div = in[2] + in[5], curl = in[3] - in[4];  // kappa . a, kappa' . a
-    const double vx = -0.5 * c(kWalk, i), vy = -0.5 * c(kWalk + 1, i);
-    out[0] += vx * div;
-    out[1] += vy * div;
-    const Z walked = vx * in[0] + vy * in[1] - (0.5 * c(kSd, i)) * div, turned = (-0.5 * c(kSc, i)) * curl;
-    const auto d = [&](int ij, int ab) { return c(kD + 3 * ij + ab, i); };
-    out[2] += walked + d(0, 0) * in[2] + d(1, 0) * in[3] + d(0, 1) * in[4] + d(1, 1) * in[5];
-    out[3] += turned + d(1, 0) * in[2] + d(2, 0) * in[3] + d(1, 1) * in[4] + d(2, 1) * in[5];
-    out[4] += -turned + d(0, 1) * in[2] + d(1, 1) * in[3] + d(0, 2) * in[4] + d(1, 2) * in[5];
-    out[5] += walked + d(1, 1) * in[2] + d(2, 1) * in[3] + d(1, 2) * in[4] + d(2, 2) * in[5];
+  BIREFIT_INLINE static void oblique_at(const double* coefficients, int f, const Lanes* in, Lanes* out) {
+    const auto c = [&](int quantity) { return entry(coefficients, quantity, f); };
+    const Lanes div = in[2] + in[5], curl = in[3] - in[4];  // kappa . a, kappa' . a
+    const Pack vx = -0.5 * c(kWalk), vy = -0.5 * c(kWalk + 1);
+    out[0] = out[0] + vx * div;
+    out[1] = out[1] + vy * div;
+    const Lanes walked = vx * in[0] + vy * in[1] - (0.5 * c(kSd)) * div, turned = (-0.5 * c(kSc)) * curl;
+    Pack d[3][3];
+    for (int ij = 0; ij < 3; ++ij)
+      for (int ab = 0; ab < 3; ++ab) d[ij][ab] = c(kD + 3 * ij + ab);
+    out[2] = out[2] + walked + d[0][0] * in[2] + d[1][0] * in[3] + d[0][1] * in[4] + d[1][1] * in[5];
+    out[3] = out[3] + turned + d[1][0] * in[2] + d[2][0] * in[3] + d[1][1] * in[4] + d[2][1] * in[5];
+    out[4] = out[4] - turned + d[0][1] * in[2] + d[1][1] * in[3] + d[0][2] * in[4] + d[1][2] * in[5];
+    out[5] = out[5] + walked + d[1][1] * in[2] + d[2][1] * in[3] + d[1][2] * in[4] + d[2][2] * in[5];
   }
 
   /// term <- (i / order) V' term (of order 1: of a itself), a <- a + term.
-  void oblique(const Crew& crew, int order) {
+  void oblique(const Crew& crew, const Table& table, int order) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     crew.each(6 * kFields, [&](int job) {
       if (asleep(job / 6)) return;
@@ -294,44 +383,54 @@ class Propagation {
       const int component = which < 2 ? which : (which - 2) / 2;
       const Plane& from = order == 1 ? field.a[component] : field.term[component];
       Plane& to = field.work[which];
-      for (std::size_t i = 0; i < n_; ++i) to[i] = which < 2 ? from[i] : (which % 2 == 0 ? kx_[i % nx] : ky_[i / nx]) * from[i];
+      for (std::size_t row = 0; row < ky_.size(); ++row) {
+        const Z* in = from.data() + row * nx;
+        Z* out = to.data() + row * nx;
+        if (which < 2)
+          std::copy_n(in, nx, out);
+        else if (which % 2 == 0)
+          in_packs(nx, [&](std::size_t i, int count) { store(Pack::load_unaligned(kx_.data() + i) * load(in + i, count), out + i, count); });
+        else
+          in_packs(nx, [&](std::size_t i, int count) { store(Pack(ky_[row]) * load(in + i, count), out + i, count); });
+      }
       fft_->inverse(to);
     });
     crew.each(g_.ny, [&](int row) {
-      Coefficients c[kFields];
-      for (int f = 0; f < kFields; ++f)
-        for (int q = kWalk; q < kQuantities; ++q) c[f].c[q - kWalk] = table(q, f);
-      for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
-        Z in[6];
-        for (int q = 0; q < 6; ++q) in[q] = fields_[0].work[q][i];
+      in_packs(nx, [&](std::size_t first, int count) {
+        const double* c = table.data() + piece(row, first, kObliques);
+        const std::size_t i = static_cast<std::size_t>(row) * nx + first;
+        Lanes in[6];
+        for (int q = 0; q < 6; ++q) in[q] = load(fields_[0].work[q].data() + i, count);
         for (int f = kFields - 1; f >= 0; --f) {
           if (asleep(f)) continue;
-          Z own[6], out[6] = {};
-          for (int q = 0; q < 6; ++q) own[q] = fields_[static_cast<std::size_t>(f)].work[q][i];
-          oblique_at(c[0], i, own, out);
-          if (f > 0) oblique_at(c[f], i, in, out);
-          for (int q = 0; q < 6; ++q) fields_[static_cast<std::size_t>(f)].work[q][i] = out[q];
+          Field& field = fields_[static_cast<std::size_t>(f)];
+          Lanes own[6], out[6];
+          for (int q = 0; q < 6; ++q) own[q] = load(field.work[q].data() + i, count), out[q] = {Pack(0.0), Pack(0.0)};
+          oblique_at(c, 0, own, out);
+          if (f > 0) oblique_at(c, f, in, out);
+          for (int q = 0; q < 6; ++q) store(out[q], field.work[q].data() + i, count);
         }
-      }
+      });
     });
     crew.each(6 * kFields, [&](int job) {
       if (!asleep(job / 6)) fft_->forward(fields_[static_cast<std::size_t>(job / 6)].work[job % 6]);
     });
-    const Z factor(0, 1.0 / (order * static_cast<double>(n_)));
+    const Pack factor(1.0 / (order * static_cast<double>(n_)));
     crew.each(g_.ny, [&](int row) {
-      for (int f = 0; f < kFields; ++f) {
-        if (asleep(f)) continue;
-        Field& field = fields_[static_cast<std::size_t>(f)];
-        for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
-          const bool kept = half_step_[i] != Z(0);
-          const double kx = kx_[i % nx], ky = ky_[i / nx];
+      const Pack ky(ky_[static_cast<std::size_t>(row)]);
+      for (int of = 0; of < kFields; ++of) {
+        if (asleep(of)) continue;
+        Field& field = fields_[static_cast<std::size_t>(of)];
+        in_packs(nx, [&](std::size_t first, int count) {
+          const std::size_t i = static_cast<std::size_t>(row) * nx + first;
+          const Pack kx = Pack::load_unaligned(kx_.data() + first), f = factor * Pack::load_unaligned(kept_.data() + i);
           for (int a = 0; a < 2; ++a) {
-            const Z v = field.work[a][i] + kx * field.work[2 + 2 * a][i] + ky * field.work[3 + 2 * a][i];
-            const Z t = kept ? Z(-factor.imag() * v.imag(), factor.imag() * v.real()) : Z(0);
-            field.term[a][i] = t;
-            field.a[a][i] += t;
+            const Lanes v = load(field.work[a].data() + i, count) + kx * load(field.work[2 + 2 * a].data() + i, count) + ky * load(field.work[3 + 2 * a].data() + i, count);
+            const Lanes t{-f * v.im, f * v.re};
+            store(t, field.term[a].data() + i, count);
+            store(load(field.a[a].data() + i, count) + t, field.a[a].data() + i, count);
           }
-        }
+        });
       }
     });
   }
@@ -343,14 +442,19 @@ class Propagation {
   /// exp(i phase) over half a slab, with the derivative by the wavenumber.
   void diffract(int f, int a) {
     Plane& to = fields_[static_cast<std::size_t>(f)].a[a];
-    for (std::size_t i = 0; i < n_; ++i) to[i] = times(half_step_[i], to[i]);
-    const double by_k0 = part(light_.k0_per_um, f);
-    if (f == 0 || by_k0 == 0) return;
     const Plane& base = fields_[0].a[a];  // diffracted before: d exp(i phase) a = i dphase (exp(i phase) a)
-    for (std::size_t i = 0; i < n_; ++i) to[i] += by_k0 * half_step_slope_[i] * Z(-base[i].imag(), base[i].real());
+    const double by_k0 = f == 0 ? 0.0 : part(light_.k0_per_um, f);
+    in_packs(n_, [&](std::size_t i, int count) {
+      Lanes turned = load(half_step_.data() + i, count) * load(to.data() + i, count);
+      if (by_k0 != 0) {
+        const Lanes b = load(base.data() + i, count);
+        turned = turned + (by_k0 * Pack::load_unaligned(half_step_slope_.data() + i)) * Lanes{-b.im, b.re};
+      }
+      store(turned, to.data() + i, count);
+    });
   }
 
-  void pass_screen(const Crew& crew, bool oblique_before) {
+  void pass_screen(const Crew& crew) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     const auto half_way = [&] {
       crew.each(2, [&](int a) { diffract(0, a); });
@@ -365,7 +469,6 @@ class Propagation {
     });
     Z inc[kFields][2];
     Complex<S> at_screen[2] = {incident_[0], incident_[1]};
-    if (oblique_before) incident_oblique(at_screen);
     incident_half_step(at_screen);
     Complex<S> behind[2];
     for (int a = 0; a < 2; ++a) behind[a] = host_slab_.screen[a][0] * at_screen[0] + host_slab_.screen[a][1] * at_screen[1];
@@ -373,21 +476,24 @@ class Propagation {
       for (int a = 0; a < 2; ++a) inc[f][a] = part(behind[a], f);
     const double over = 1.0 / static_cast<double>(n_);  // of the transform there and back
     crew.each(g_.ny, [&](int row) {
-      for (std::size_t i = static_cast<std::size_t>(row) * nx; i < static_cast<std::size_t>(row + 1) * nx; ++i) {
-        const double keep = frame_x_[i % nx] * frame_y_[static_cast<std::size_t>(row)];
-        const Z x = over * fields_[0].a[0][i], y = over * fields_[0].a[1][i];
+      in_packs(nx, [&](std::size_t first, int count) {
+        const double* c = screen_.data() + piece(row, first, kScreens);
+        const std::size_t i = static_cast<std::size_t>(row) * nx + first;
+        const Pack frame = frame_y_[static_cast<std::size_t>(row)] * Pack::load_unaligned(frame_x_.data() + first);
+        const auto at_point = [&](int f, int a) { return Pack(over) * load(fields_[static_cast<std::size_t>(f)].a[a].data() + i, count); };
+        const Lanes x = at_point(0, 0), y = at_point(0, 1);
         for (int f = kFields - 1; f >= 0; --f) {
           if (asleep(f)) continue;
-          Field& field = fields_[static_cast<std::size_t>(f)];
-          const auto screen = [&](int a, int b, int plane) { return Z(table(kScreen + 4 * a + 2 * b, plane)[i], table(kScreen + 4 * a + 2 * b + 1, plane)[i]); };
-          const Z own_x = over * field.a[0][i], own_y = over * field.a[1][i];
+          const auto screen = [&](int a, int b, int of) { return Lanes{entry(c, 4 * a + 2 * b, of), entry(c, 4 * a + 2 * b + 1, of)}; };
+          const Lanes own_x = at_point(f, 0), own_y = at_point(f, 1);
           for (int a = 0; a < 2; ++a) {
-            Z r = times(screen(a, 0, 0), own_x) + times(screen(a, 1, 0), own_y);
-            if (f > 0) r += times(screen(a, 0, f), x) + times(screen(a, 1, f), y);
-            field.a[a][i] = inc[f][a] + keep * (r - inc[f][a]);
+            Lanes r = screen(a, 0, 0) * own_x + screen(a, 1, 0) * own_y;
+            if (f > 0) r = r + screen(a, 0, f) * x + screen(a, 1, f) * y;
+            const Lanes incident{Pack(inc[f][a].real()), Pack(inc[f][a].imag())};
+            store(incident + frame * (r - incident), fields_[static_cast<std::size_t>(f)].a[a].data() + i, count);
           }
         }
-      }
+      });
     });
     crew.each(2 * kFields, [&](int job) {
       if (!asleep(job / 2)) fft_->forward(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]);
@@ -395,18 +501,20 @@ class Propagation {
     half_way();
   }
 
-  // The incident wave through one slab of the host, by the same steps.
-  void incident_oblique(Complex<S>* a) const {
+  // The incident wave through the host, by the same steps.
+  void incident_oblique(int slab) {
     if (tilt2_ == 0) return;
-    const S kx(light_.kx_per_um), ky(light_.ky_per_um);
-    Complex<S> term[2] = {a[0], a[1]};
+    const S kx(light_.kx_per_um), ky(light_.ky_per_um), none(0.0);
+    const ObliquePoint<S>*half = host_slab_.half;
+    const S sd = (slab > 0 ? half[1].sd : none) + (slab < g_.slabs ? half[0].sd : none), sc = (slab > 0 ? half[1].sc : none) + (slab < g_.slabs ? half[0].sc : none);
+    Complex<S> term[2] = {incident_[0], incident_[1]};
     for (int order = 1; order <= g_.order; ++order) {
-      const Complex<S> div = S(-0.5 * host_slab_.sd) * (kx * term[0] + ky * term[1]), curl = S(-0.5 * host_slab_.sc) * (ky * term[0] - kx * term[1]);
+      const Complex<S> div = S(-0.5 * sd) * (kx * term[0] + ky * term[1]), curl = S(-0.5 * sc) * (ky * term[0] - kx * term[1]);
       const Complex<S> x = kx * div + ky * curl, y = ky * div - kx * curl;
       const S f(1.0 / order);
       term[0] = Complex<S>(S(0.0) - f * x.im, f * x.re);
       term[1] = Complex<S>(S(0.0) - f * y.im, f * y.re);
-      for (int c = 0; c < 2; ++c) a[c] = a[c] + term[c];
+      for (int c = 0; c < 2; ++c) incident_[c] = incident_[c] + term[c];
     }
   }
   void incident_half_step(Complex<S>* a) const {
@@ -416,14 +524,12 @@ class Propagation {
     sin_cos(0.5 * h_ * (root(kn * kn - tilt2_) - kn), s, c);
     for (int i = 0; i < 2; ++i) a[i] = Complex<S>(c, s) * a[i];
   }
-  void pass_incident(bool oblique_before) {
-    if (oblique_before) incident_oblique(incident_);
+  void pass_incident() {
     incident_half_step(incident_);
     const Complex<S> x = host_slab_.screen[0][0] * incident_[0] + host_slab_.screen[0][1] * incident_[1];
     incident_[1] = host_slab_.screen[1][0] * incident_[0] + host_slab_.screen[1][1] * incident_[1];
     incident_[0] = x;
     incident_half_step(incident_);
-    if (!oblique_before) incident_oblique(incident_);
   }
 
   /// Less the incident wave, in units of its phase.
@@ -451,13 +557,14 @@ class Propagation {
   const WaveLight<S>& light_;
   const WaveMedium<S>& medium_;
   std::shared_ptr<const Fft2> fft_;
-  std::size_t n_;
+  std::size_t n_, blocks_;
   double h_;
   std::array<Field, static_cast<std::size_t>(kFields)> fields_;
-  std::vector<char> felt_;     ///< [row][field]: some point of the row depends on the parameter
+  std::vector<char> felt_;  ///< [row][field]: some point of the row depends on the parameter
   std::array<char, static_cast<std::size_t>(kFields)> awake_{};
-  std::vector<double> table_;  ///< [quantity][value or derivative][point]
-  std::vector<double> kx_, ky_;
+  Table screen_;      ///< of the slab
+  Table oblique_[2];  ///< of V' about the slab's entry and exit, by turns
+  std::vector<double> kx_, ky_, kept_;
   Plane half_step_;
   std::vector<double> half_step_slope_;
   std::vector<double> frame_x_, frame_y_;

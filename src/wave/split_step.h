@@ -16,7 +16,7 @@ struct WaveGrid {
   int nx = 0, ny = 0;              ///< ny = 1: nothing changes along y
   double step_um = 0;              ///< between points, both directions
   double entry_um = 0, exit_um = 0;  ///< planes in the host, z
-  int slabs = 0, layers = 0;       ///< layers: of the medium in every slab
+  int slabs = 0, layers = 0;       ///< layers: of the medium in every slab; even
   double n_ref = 0;                ///< of the free propagation; any near the medium's
   double cut_per_um = 0;           ///< transverse wavevectors beyond are left out; below k0 n_ref
   double frame_um = 0;             ///< width of the absorbing frame; 0: periodic
