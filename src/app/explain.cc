@@ -1,5 +1,7 @@
 // birefit explain: which model and method would run, why, what it is expected to cost and to err.
 
+#include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
 
@@ -13,7 +15,7 @@ namespace {
 
 struct Arguments {
   std::string config;
-  bool json = false;
+  bool json = false, check = false;
 };
 
 std::string quoted(const std::string& text) {
@@ -82,6 +84,18 @@ int run_explain(const Arguments& arguments) {
   }
   if (!any) std::cout << "Fitted     nothing\n";
   for (const std::string& warning : warnings) std::cout << "Warning    " << warning << "\n";
+  if (arguments.check) {
+    const Image planned = render(config.scene, chosen, theta).intensity, judge = image_by_march(config.scene, theta);
+    double difference = 0, size = 0, worst = 0;
+    for (std::size_t i = 0; i < judge.values().size(); ++i) {
+      const double d = planned.values()[i] - judge.values()[i];
+      difference += d * d;
+      size += judge.values()[i] * judge.values()[i];
+      worst = std::max(worst, std::abs(d));
+    }
+    std::cout << fmt::format("Check      {:.2g} of the image's RMS (worst pixel {:.2g}) from Maxwell's equations marched through the sample, which leave out light reflected twice\n",
+                             std::sqrt(difference / size), worst);
+  }
   return kExitDone;
 }
 
@@ -92,6 +106,7 @@ Command add_explain_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   command->add_flag("--json", arguments->json, "for scripts");
+  command->add_flag("--check", arguments->check, "droplets and shells: compare the picture with Maxwell's equations, marched through the sample (slow)")->excludes("--json");
   return {command, [arguments] { return run_explain(*arguments); }};
 }
 
