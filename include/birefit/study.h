@@ -40,6 +40,18 @@ struct MethodChart {
   std::vector<ChartFrame> frames;
 };
 
+/// A picture of a radial droplet, 128 x 128 pixels over diameter + 4 um, 590 nm, crossed polarizers at 45 degrees, by one model; the error is the
+/// RMS of the difference from the exact series over the RMS of that.
+struct WavePoint {
+  std::string sample;          ///< "dn 0.22 in 1.43"
+  double radius_um = 0, objective_na = 0;
+  std::string model;           ///< straight, eikonal, split_step, march; series with error 0
+  std::string effort;          ///< "" as planned, else what was changed
+  double seconds = 0, error = 0;
+  double estimate = 0;         ///< what the planner says of it; not a number where it says nothing
+};
+std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const std::string&)>& say = {});
+
 /// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.
 MethodChart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
 

@@ -1,5 +1,6 @@
 // birefit chart: every transport method's speed against its accuracy, as tables and pictures.
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -101,6 +102,50 @@ std::string frames_script(const MethodChart& chart, const std::string& svg) {
   return script + "plot " + plot + "\n";
 }
 
+std::string waves_csv(const std::vector<WavePoint>& points) {
+  std::string text = "sample,radius_um,objective_na,model,effort,seconds,relative_rms_error,planner_estimate\n";
+  for (const WavePoint& p : points)
+    text += fmt::format("{},{:g},{:g},{},{},{},{},{}\n", p.sample, p.radius_um, p.objective_na, p.model, p.effort, csv_number(p.seconds), csv_number(p.error), csv_number(p.estimate));
+  return text;
+}
+
+/// Error against radius for each sample at NA 0.4, and time against error for one droplet.
+std::string waves_script(const std::vector<WavePoint>& points, const std::string& svg) {
+  constexpr const char* kModels[] = {"straight", "eikonal", "split_step", "march"};
+  std::string script = fmt::format(
+      "set terminal svg size 1500,430 dynamic font 'sans,13' background rgb 'white'\nset output {}\nset logscale y\nset grid lc rgb '#dddddd'\n"
+      "set key top left noenhanced maxrows 2\nset multiplot layout 1,4 margins 0.05,0.99,0.13,0.9 spacing 0.045,0.1\nset yrange [0.003:4]\n",
+      svg);
+  std::vector<std::string> samples;
+  for (const WavePoint& p : points)
+    if (std::find(samples.begin(), samples.end(), p.sample) == samples.end()) samples.push_back(p.sample);
+  int block = 0;
+  for (std::size_t k = 0; k < samples.size() && k < 3; ++k) {
+    std::string plot;
+    for (std::size_t m = 0; m < std::size(kModels); ++m) {
+      std::string data;
+      for (const WavePoint& p : points)
+        if (p.sample == samples[k] && p.model == kModels[m] && p.effort.empty() && p.objective_na == 0.4 && p.error > 0) data += fmt::format("{:g} {:.4g}\n", p.radius_um, p.error);
+      if (data.empty()) continue;
+      script += fmt::format("$w{} << EOD\n{}EOD\n", block, data);
+      plot += fmt::format("{}$w{} with linespoints lw 2 pt 7 ps 0.5 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kColours[m], kModels[m]);
+    }
+    script += fmt::format("set title '{}, NA 0.4' noenhanced\nset xlabel 'radius (um)'\nset ylabel 'RMS error of the picture'\nplot {}\n", samples[k], plot);
+  }
+  std::string plot;
+  for (std::size_t m = 0; m < std::size(kModels); ++m) {
+    std::string data;
+    for (const WavePoint& p : points)
+      if (p.objective_na == 0.8 && p.model == kModels[m] && p.error > 0) data += fmt::format("{:.4g} {:.4g}\n", p.error, 1e3 * p.seconds);
+    if (data.empty()) continue;
+    script += fmt::format("$w{} << EOD\n{}EOD\n", block, data);
+    plot += fmt::format("{}$w{} with points pt 7 ps 0.8 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kColours[m], kModels[m]);
+  }
+  if (plot.empty()) return script + "unset multiplot\n";  // of a quick run
+  return script + "set logscale x\nset yrange [1:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS error of the picture'\nset ylabel 'ms a picture'\nplot " + plot +
+         "\nunset multiplot\n";
+}
+
 int run_chart(const Arguments& arguments) {
   const std::filesystem::path out = arguments.out;
   make_folder(arguments.out);
@@ -112,6 +157,11 @@ int run_chart(const Arguments& arguments) {
   if (!chart.frames.empty()) write_file((out / "frames.csv").string(), frames_csv(chart));
   if (draw(rays_script(chart, plot_path(out / "chart.svg"))) && !chart.frames.empty())
     draw(frames_script(chart, plot_path(out / "frames.svg")));
+  const std::vector<WavePoint> waves = measure_waves(arguments.quick, [&](const std::string& what) {
+    if (!arguments.quiet) std::cerr << "measuring " << what << "\n";
+  });
+  write_file((out / "waves.csv").string(), waves_csv(waves));
+  draw(waves_script(waves, plot_path(out / "waves.svg")));
   if (!arguments.quiet) std::cout << (out / "chart.csv").string() << ": " << chart.points.size() << " measurements\n";
   return kExitDone;
 }
@@ -121,7 +171,7 @@ int run_chart(const Arguments& arguments) {
 Command add_chart_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("chart", "speed against accuracy of every transport method, measured here: tables and pictures");
-  command->add_option("--out", arguments->out, "folder for chart.csv, scenes.csv, frames.csv and the SVGs")->capture_default_str();
+  command->add_option("--out", arguments->out, "folder for chart.csv, scenes.csv, frames.csv, waves.csv and the SVGs")->capture_default_str();
   command->add_flag("--quick", arguments->quick, "fewer efforts, no frames");
   command->add_flag("-q,--quiet", arguments->quiet, "say nothing");
   return {command, [arguments] { return run_chart(*arguments); }};

@@ -389,7 +389,7 @@ void Fit::find_minima() {
       const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
       double period = 0;
       for (const Micrograph& m : job_.micrographs) period = std::max(period, ripple_period(m.scene, problem_->theta(), unknowns_.searched[j]));
-      for (const double ripples : {-2.0, -1.0, 1.0, 2.0}) {
+      for (const double ripples : {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0}) {  // TE and TM resonances interlace
         Eigen::VectorXd x = from.searched;
         double& moved = x[static_cast<Eigen::Index>(j)];
         moved += ripples * period;
