@@ -114,7 +114,7 @@ std::string waves_script(const std::vector<WavePoint>& points, const std::string
   constexpr const char* kModels[] = {"straight", "eikonal", "split_step", "march"};
   std::string script = fmt::format(
       "set terminal svg size 1500,430 dynamic font 'sans,13' background rgb 'white'\nset output {}\nset logscale y\nset grid lc rgb '#dddddd'\n"
-      "set key top left noenhanced maxrows 2\nset multiplot layout 1,4 margins 0.05,0.99,0.13,0.9 spacing 0.045,0.1\nset yrange [0.003:4]\n",
+      "set key top left noenhanced maxrows 2\nset multiplot layout 1,4 margins 0.055,0.99,0.14,0.9 spacing 0.055,0.1\nset yrange [0.001:6]\n",
       svg);
   std::vector<std::string> samples;
   for (const WavePoint& p : points)
@@ -130,7 +130,8 @@ std::string waves_script(const std::vector<WavePoint>& points, const std::string
       script += fmt::format("$w{} << EOD\n{}EOD\n", block, data);
       plot += fmt::format("{}$w{} with linespoints lw 2 pt 7 ps 0.5 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kColours[m], kModels[m]);
     }
-    script += fmt::format("set title '{}, NA 0.4' noenhanced\nset xlabel 'radius (um)'\nset ylabel 'RMS error of the picture'\nplot {}\n", samples[k], plot);
+    script += fmt::format("set title '{}, NA 0.4' noenhanced\nset xlabel 'radius (um)'\nset ylabel '{}' offset 1,0\nplot {}\n", samples[k],
+                          k == 0 ? "RMS error of the picture" : "", plot);
   }
   std::string plot;
   for (std::size_t m = 0; m < std::size(kModels); ++m) {
@@ -142,7 +143,7 @@ std::string waves_script(const std::vector<WavePoint>& points, const std::string
     plot += fmt::format("{}$w{} with points pt 7 ps 0.8 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kColours[m], kModels[m]);
   }
   if (plot.empty()) return script + "unset multiplot\n";  // of a quick run
-  return script + "set logscale x\nset yrange [1:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS error of the picture'\nset ylabel 'ms a picture'\nplot " + plot +
+  return script + "set logscale x\nset yrange [1:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS error of the picture'\nset ylabel 'ms a picture' offset 1.5,0\nplot " + plot +
          "\nunset multiplot\n";
 }
 

@@ -96,7 +96,7 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   // the square of the aperture, and where light must leave a wall into a thinner medium.
   const double contrast = std::abs(o.n_e - o.n_o) + 2 * std::abs((2 * o.n_o + o.n_e) / 3 - o.n_host);
   const double step_out = o.has_core ? std::max(0.0, std::max(o.n_o, o.n_e) - std::min(o.n_host, o.core_index)) : 0;
-  plan.model_error = (0.012 + 0.045 * na * na) * std::clamp(contrast / 0.4, 0.15, 1.6) + 0.15 * na * step_out;
+  plan.model_error = (0.018 + 0.068 * na * na) * std::clamp(contrast / 0.4, 0.15, 1.6) + 0.15 * na * step_out;
   plan.reasons.push_back("errors are relative RMS of the image under ceiling: wave; what is left out are reflections and the third order in the wave's slope");
   plan.cost_seconds = static_cast<double>(g.nx) * g.ny * g.slabs * 1.4e-7;
   plan.wave = std::move(wave);
