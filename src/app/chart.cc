@@ -112,9 +112,10 @@ std::string waves_csv(const std::vector<WavePoint>& points) {
 /// Error against radius for each sample at NA 0.4, and time against error for one droplet.
 std::string waves_script(const std::vector<WavePoint>& points, const std::string& svg) {
   constexpr const char* kModels[] = {"straight", "eikonal", "split_step", "march"};
+  constexpr const char* kModelColours[] = {"#999999", "#000000", "#0072b2", "#d55e00"};
   std::string script = fmt::format(
       "set terminal svg size 1500,430 dynamic font 'sans,13' background rgb 'white'\nset output {}\nset logscale y\nset grid lc rgb '#dddddd'\n"
-      "set key top left noenhanced maxrows 2\nset multiplot layout 1,4 margins 0.055,0.99,0.14,0.9 spacing 0.055,0.1\nset yrange [0.001:6]\n",
+      "set key top left noenhanced maxrows 2 samplen 1.5 width -1\nset multiplot layout 1,4 margins 0.055,0.99,0.14,0.9 spacing 0.055,0.1\nset yrange [0.001:6]\n",
       svg);
   std::vector<std::string> samples;
   for (const WavePoint& p : points)
@@ -128,7 +129,7 @@ std::string waves_script(const std::vector<WavePoint>& points, const std::string
         if (p.sample == samples[k] && p.model == kModels[m] && p.effort.empty() && p.objective_na == 0.4 && p.error > 0) data += fmt::format("{:g} {:.4g}\n", p.radius_um, p.error);
       if (data.empty()) continue;
       script += fmt::format("$w{} << EOD\n{}EOD\n", block, data);
-      plot += fmt::format("{}$w{} with linespoints lw 2 pt 7 ps 0.5 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kColours[m], kModels[m]);
+      plot += fmt::format("{}$w{} with linespoints lw 2 pt 7 ps 0.5 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kModelColours[m], kModels[m]);
     }
     script += fmt::format("set title '{}, NA 0.4' noenhanced\nset xlabel 'radius (um)'\nset ylabel '{}' offset 1,0\nplot {}\n", samples[k],
                           k == 0 ? "RMS error of the picture" : "", plot);
@@ -140,10 +141,10 @@ std::string waves_script(const std::vector<WavePoint>& points, const std::string
       if (p.objective_na == 0.8 && p.model == kModels[m] && p.error > 0) data += fmt::format("{:.4g} {:.4g}\n", p.error, 1e3 * p.seconds);
     if (data.empty()) continue;
     script += fmt::format("$w{} << EOD\n{}EOD\n", block, data);
-    plot += fmt::format("{}$w{} with points pt 7 ps 0.8 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kColours[m], kModels[m]);
+    plot += fmt::format("{}$w{} with points pt 7 ps 0.8 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kModelColours[m], kModels[m]);
   }
   if (plot.empty()) return script + "unset multiplot\n";  // of a quick run
-  return script + "set logscale x\nset yrange [1:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS error of the picture'\nset ylabel 'ms a picture' offset 1.5,0\nplot " + plot +
+  return script + "set logscale x\nset yrange [0.3:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS error of the picture'\nset ylabel 'ms a picture' offset 1.5,0\nplot " + plot +
          "\nunset multiplot\n";
 }
 

@@ -1032,7 +1032,7 @@ Eigen::VectorXd Fit::propagation_error() {
   LeastSquares problem(job_, unknowns_, plans_, std::move(sets));
   problem.set_misfit(problem_->misfit());
   SolveOptions few;
-  few.max_iterations = 3;  // next to linear
+  few.max_iterations = 2;  // next to linear
   few.interrupted = job_.options.interrupted;
   Eigen::VectorXd searched = best_;
   problem.solve(searched, few);
