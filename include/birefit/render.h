@@ -22,7 +22,8 @@ struct RenderPlan {
   std::string method;               ///< transport method by name
   std::string physics;              ///< the ceiling's name
   std::vector<std::string> reasons; ///< one sentence for every rung: why it stopped or went on
-  double numerical_error = 0;       ///< expected, intensity fraction of the incident
+  /// Expected, of the intensity, as a fraction of the incident; of a propagated wave picture (`wave` set) the RMS error over the picture's own RMS.
+  double numerical_error = 0;
   double model_error = 0;           ///< of what the ceiling leaves out, same unit
   std::vector<std::string> warnings;  ///< what is not modelled and may matter here
   double cost_seconds = 0;          ///< expected for one image without derivatives, one thread
@@ -101,8 +102,8 @@ struct JonesRow {
 /// Slab scenes: one row per microscope direction; others: per pixel.
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta);
 
-/// Light caught within a sphere ripples its image: how far theta[index] (a diameter, a wall) goes from one ripple to the next, where the
-/// scene is computed with reflections; else 0. A fit has a shallow minimum in each.
+/// Light caught within a sphere ripples its image: how far theta[index], its diameter (um), goes from one ripple to the next where the scene is
+/// computed by the exact series; 0 for other parameters and scenes. A fit has a shallow minimum in each, and between them.
 double ripple_period(const Scene& scene, const Theta& theta, int index);
 
 /// Largest change of retardance phase (rad) anywhere in the image per unit of theta[index]; 0 when the parameter forms

@@ -290,7 +290,7 @@ enum class Ceiling {
   one_way,  ///< E and H continuous, backward waves dropped (default)
   e_only,   ///< only tangential E continuous: the source paper's
   reflections,  ///< all of Maxwell's equations in the layers, both faces included; cells and slabs
-  wave,     ///< wave optics, reflections left out: droplets and shells. Needs Microscope::objective_na
+  wave,     ///< wave optics: radial droplets and concentric shells exactly, other spheres without reflections. Needs Microscope::objective_na
 };
 
 /// How light runs through a droplet: both modes on the refracted straight chord, or each on its own ray (geometrical optics of

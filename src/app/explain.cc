@@ -62,8 +62,8 @@ int run_explain(const Arguments& arguments) {
   if (config.scene.view.pixel_size_um > 0) std::cout << fmt::format(" of {:g} um", config.scene.view.pixel_size_um);
   std::cout << fmt::format("\nPhysics    {}\nMethod     {}\n", chosen.physics, chosen.method);
   for (const std::string& reason : chosen.reasons) std::cout << "           " << reason << "\n";
-  std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} (intensity, fraction of the incident)\n",
-                           chosen.numerical_error, chosen.model_error);
+  std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error, chosen.model_error,
+                           chosen.wave ? "RMS over the picture's own RMS" : "intensity, fraction of the incident");
   std::cout << fmt::format("Cost       {:.3g} s an image on one thread\n", chosen.cost_seconds);
   bool any = false;
   for (int i = 0; i < table.size(); ++i) {

@@ -23,6 +23,9 @@ namespace {
 
 using namespace estimation;
 
+/// Standard errors by which rays may shift a parameter before waves are worth their time, or a warning.
+constexpr double kShiftThatMatters = 0.3;
+
 /// Pixels the mask leaves and whose value and weight are numbers.
 std::vector<std::array<int, 2>> usable_pixels(const Micrograph& micrograph, const Image& sigma) {
   std::vector<std::array<int, 2>> pixels;
@@ -157,6 +160,11 @@ class Fit {
   std::optional<double> upper_limit(int unknown) const;
   void report_micrographs();
   void collect_warnings();
+  struct Shift {
+    const ParameterEstimate* of = nullptr;
+    double change = 0, standard_errors = 0;
+  };
+  Shift largest_shift(const Theta& there) const;
   void foretell_curved_rays();
   void foretell_waves();
   Eigen::VectorXd propagation_error();
@@ -906,6 +914,18 @@ void Fit::collect_warnings() {
       warn(fmt::format("The image adds nothing to the prior on {}.", estimate.name));
 }
 
+/// Of the parameters searched for but the centre, the one that another model moves most.
+Fit::Shift Fit::largest_shift(const Theta& there) const {
+  Shift most;
+  for (const int index : unknowns_.searched)
+    for (const ParameterEstimate& p : result_.parameters) {
+      if (p.name != job_.parameters[index].name || p.name.find("center_px") != std::string::npos || !(p.stderr_ > 0)) continue;
+      const double change = there[static_cast<std::size_t>(index)] - p.value;
+      if (std::abs(change) > most.standard_errors * p.stderr_) most = {&p, change, std::abs(change) / p.stderr_};
+    }
+  return most;
+}
+
 /// Straight chords shift a birefringence by percents and the residual need not show it (docs/methods.md, "Curved rays"): a short fit
 /// with curved rays from where this one ended says by how much.
 void Fit::foretell_curved_rays() {
@@ -931,24 +951,15 @@ void Fit::foretell_curved_rays() {
   few.interrupted = job_.options.interrupted;
   Eigen::VectorXd searched = best_;
   problem.solve(searched, few);
-  const ParameterEstimate* most = nullptr;
-  double there = 0;
-  for (const int index : unknowns_.searched)
-    for (const ParameterEstimate& p : result_.parameters) {
-      if (p.name != job_.parameters[index].name || p.name.find("center_px") != std::string::npos || !(p.stderr_ > 0)) continue;
-      const double change = std::abs(problem.theta()[static_cast<std::size_t>(index)] - p.value) / p.stderr_;
-      if (change <= by_curved_rays_) continue;
-      by_curved_rays_ = change;
-      most = &p;
-      there = problem.theta()[static_cast<std::size_t>(index)];
-    }
+  const Shift shift = largest_shift(problem.theta());
+  by_curved_rays_ = shift.standard_errors;
   const double ratio = problem.objective() / problem_->objective(), reduced = std::max(1.0, result_.reduced_chi_square);
   if (!(problem.objective() < problem_->objective() + 9 * reduced)) by_curved_rays_ = 0;
-  if (!most || by_curved_rays_ < 1) return;
+  if (by_curved_rays_ < 1) return;
   result_.warnings.push_back(fmt::format(
       "Rays are taken as straight. Curved ones (physics.rays: eikonal or auto) would put {} at {:.4g} ({:+.2g} %, {:.3g} standard errors), with a chi-square {:.3g} times this one. "
       "The error bars do not contain this.",
-      most->name, there, 100 * (there / most->value - 1), by_curved_rays_, ratio));
+      shift.of->name, shift.of->value + shift.change, 100 * shift.change / shift.of->value, by_curved_rays_, ratio));
 }
 
 /// Rays of any kind shift what they estimate in droplets of a few wavelengths, and with a free gain the residual need not show it: fitted
@@ -980,23 +991,13 @@ void Fit::foretell_waves() {
   few.interrupted = job_.options.interrupted;
   Eigen::VectorXd searched = best_;
   problem.solve(searched, few);
-  by_waves_ = 0;
-  const ParameterEstimate* most = nullptr;
-  double bias = 0;
-  for (const int index : unknowns_.searched)
-    for (const ParameterEstimate& p : result_.parameters) {
-      if (p.name != job_.parameters[index].name || p.name.find("center_px") != std::string::npos || !(p.stderr_ > 0)) continue;
-      const double change = problem.theta()[static_cast<std::size_t>(index)] - theta_[static_cast<std::size_t>(index)];
-      if (std::abs(change) / p.stderr_ <= by_waves_) continue;
-      by_waves_ = std::abs(change) / p.stderr_;
-      most = &p;
-      bias = change;
-    }
-  if (!most || by_waves_ < 0.3) return;
+  const Shift shift = largest_shift(problem.theta());
+  by_waves_ = shift.standard_errors;
+  if (by_waves_ < kShiftThatMatters) return;
   result_.warnings.push_back(fmt::format(
       "Rays are not the image of this sample: fitted to a wave-optical image of the parameters found here, rays return {} off by {:+.2g} ({:+.2g} %, "
       "{:.3g} standard errors). The error bars do not contain this; physics.ceiling: wave does away with it.",
-      most->name, bias, 100 * bias / most->value, by_waves_));
+      shift.of->name, shift.change, 100 * shift.change / shift.of->value, by_waves_));
 }
 
 /// Propagation is itself a hundredth to a twentieth of the image away from Maxwell's equations. A radial twin of the sphere has an exact
@@ -1165,7 +1166,8 @@ FitResult fit(const FitJob& job) {
       Fit rays(chosen);
       rays.search(kNever);
       by_rays = rays.finish(false);
-      if (by_rays.interrupted || rays.change_by_waves() < 0.3) {
+      if (by_rays.interrupted || rays.change_by_waves() < kShiftThatMatters) {
+        if (job.branches.size() > 1 && !by_rays.interrupted) return fit(chosen);  // by rays, every branch
         for (MicrographResult& m : by_rays.micrographs)
           m.plan.reasons.push_back(fmt::format("rays suffice: wave optics would shift no parameter by more than {:.2g} standard errors", rays.change_by_waves()));
         return by_rays;

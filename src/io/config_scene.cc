@@ -704,13 +704,17 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   methods.insert(methods.end(), {"series", "split_step"});
   scene.method = reader.choice(transport, "method", methods).value_or("auto");
   const bool wave_method = scene.method == "series" || scene.method == "split_step";
-  // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays.
-  reader.choose_waves = name == "auto" && sphere && scene.microscope.objective_na > 0 && !physics.find("rays") && (scene.method == "auto" || wave_method);
-  if (scene.microscope.focus_um && !(scene.ceiling == Ceiling::wave || reader.choose_waves)) {
-    const Parameter& focus = reader.table[scene.microscope.focus_um];
-    if (focus.free || focus.value != 0)
-      reader.problems.add(focus.where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics", "ceiling: wave, with objective_na, for droplets and shells");
+  const Parameter* focus = scene.microscope.focus_um ? &reader.table[scene.microscope.focus_um] : nullptr;
+  const bool defocused = focus && (focus->free || focus->value != 0);
+  // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays. Only waves know defocus.
+  if (name == "auto" && sphere && scene.microscope.objective_na > 0 && !physics.find("rays") && (scene.method == "auto" || wave_method)) {
+    if (defocused || wave_method)
+      scene.ceiling = Ceiling::wave;
+    else
+      reader.choose_waves = true;
   }
+  if (defocused && scene.ceiling != Ceiling::wave)
+    reader.problems.add(focus->where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics", "ceiling: wave, with objective_na, for droplets and shells");
 }
 
 }  // namespace

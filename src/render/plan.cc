@@ -816,9 +816,7 @@ WaveChoice wave_choice(const Scene& scene, const Theta& theta) {
 
 double ripple_period(const Scene& scene, const Theta& theta, int index) {
   if (scene.ceiling != Ceiling::wave || !has_series(scene) || scene.method == "split_step") return 0;
-  const Droplet& droplet = std::get<Droplet>(scene.sample);
-  const auto* shell = std::get_if<ShellDirector>(&droplet.director);
-  if (index != droplet.diameter_um.index && !(shell && index == shell->wall_um.index)) return 0;
+  if (index != std::get<Droplet>(scene.sample).diameter_um.index) return 0;
   const Values<double> value(theta, {});
   // Light caught under the surface: resonances follow each other by atan(s)/s of the size parameter, s^2 = m^2 - 1 (P. Chylek, J. Opt. Soc.
   // Am. A 7, 1609 (1990)); by one where the sphere is hardly denser.

@@ -88,16 +88,17 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   plan.method = "split_step";
   plan.physics = "wave";
   plan.steps = g.slabs;
-  plan.reasons.push_back(fmt::format("the sphere is {:.3g} wavelengths across: rays of any kind are not its image", 2 * o.radius_um * o.n_host / wavelength));
+  plan.reasons.push_back(fmt::format("a sphere {:.3g} wavelengths across, {}", 2 * o.radius_um * o.n_host / wavelength,
+                                     scene.method == "split_step" ? "propagation asked for by name" : "whose director has no exact series"));
   plan.reasons.push_back(fmt::format("one-way wave optics on {} x {} points {:.3g} um apart, {} slabs of {:.3g} um, {} layers of the medium each", g.nx, g.ny, g.step_um,
                                      g.slabs, (g.exit_um - g.entry_um) / g.slabs, g.layers));
-  plan.numerical_error = 0.01;
+  plan.numerical_error = 0.01;  // of the grid; half its step and slabs take no more away
   // Above all that was measured on radial balls and shells (birefit chart, tests/cross/split_step_test.cc): it grows with the contrast, with
   // the square of the aperture, and where light must leave a wall into a thinner medium.
   const double contrast = std::abs(o.n_e - o.n_o) + 2 * std::abs((2 * o.n_o + o.n_e) / 3 - o.n_host);
   const double step_out = o.has_core ? std::max(0.0, std::max(o.n_o, o.n_e) - std::min(o.n_host, o.core_index)) : 0;
   plan.model_error = (0.018 + 0.068 * na * na) * std::clamp(contrast / 0.4, 0.15, 1.6) + 0.15 * na * step_out;
-  plan.reasons.push_back("errors are relative RMS of the image under ceiling: wave; what is left out are reflections and the third order in the wave's slope");
+  plan.reasons.push_back("what is left out are reflections and the third order in the wave's slope");
   plan.cost_seconds = static_cast<double>(g.nx) * g.ny * g.slabs * 1.4e-7;
   plan.wave = std::move(wave);
   return plan;

@@ -205,6 +205,9 @@ TEST_F(Config, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
   EXPECT_EQ(ceiling(with_objective + "physics: {rays: straight}\n"), Ceiling::one_way);
   EXPECT_EQ(ceiling(with_objective + "physics: {max_seconds: 0}\n"), Ceiling::one_way);
   EXPECT_EQ(ceiling(with_objective + "transport: {method: diagonal}\n"), Ceiling::one_way);
+  // What only waves can do is no matter of cost.
+  EXPECT_EQ(ceiling(with_objective + "transport: {method: split_step}\nphysics: {max_seconds: 0}\n"), Ceiling::wave);
+  EXPECT_EQ(ceiling(replaced(with_objective, "objective_na: 0.8", "objective_na: 0.8, focus_um: 2") + "physics: {max_seconds: 0}\n"), Ceiling::wave);
 }
 
 TEST_F(Config, SaysWhatComesLater) {
