@@ -68,6 +68,7 @@ struct ParameterEstimate {
   std::string name, unit;
   double value = 0, stderr_ = 0;       ///< standard error; NaN when not identifiable
   double interval95_low = 0, interval95_high = 0;  ///< Student t with FitResult::interval_degrees_of_freedom
+  bool profiled = false;   ///< interval95 is where the profile likelihood falls as far: value +- t stderr is not that place here
   double start = 0, lower = 0, upper = 0;
   std::optional<double> prior_value, prior_sd;
   bool at_bound = false;
@@ -125,6 +126,27 @@ struct Iteration {
   double chi_square = 0, step = 0;
 };
 
+/// The objective with one parameter held and all others at their best (for the report's chart).
+struct ProfileTrace {
+  std::string name;
+  std::vector<double> value, rise;  ///< rise: above the reported minimum, as chi-square with the fit's weights
+};
+
+/// Fits of images simulated at the estimate, each from the job's own start (`fit --coverage`).
+struct Coverage {
+  int draws = 0;
+  bool of_residuals = false;  ///< the simulated noise is the fit's residual, moved about; else the noise model's
+  int answered = 0;           ///< fits with an answer; the others said that they have none
+  int wrong = 0;              ///< answered, with a searched parameter more than 5 standard errors off: what must not be
+  struct Of {
+    std::string name;
+    double inside68 = 0, inside95 = 0;  ///< fractions of the answered fits whose interval holds the value simulated with
+    double spread = 0;                  ///< standard deviation of the estimates over the mean standard error
+    double bias = 0;                    ///< mean error over the mean standard error
+  };
+  std::vector<Of> parameters;
+};
+
 struct FitResult {
   bool converged = false;
   bool interrupted = false;
@@ -144,6 +166,8 @@ struct FitResult {
   std::vector<FisherDirection> directions;
   std::vector<MicrographResult> micrographs;
   std::vector<ScanTrace> scans;
+  std::vector<ProfileTrace> profiles;  ///< of the parameters whose interval is `profiled`
+  std::optional<Coverage> coverage;    ///< filled by whoever asked for measure_coverage()
   std::vector<Iteration> iterations;
   int evaluations = 0;
   double seconds = 0;
@@ -160,5 +184,29 @@ struct FitResult {
 /// has odds above 0.01. Deterministic: same job, same bits, whatever the number of threads.
 /// A job without usable pixels throws UserError; everything about the data's quality is in the result.
 FitResult fit(const FitJob& job);
+
+/// Does the interval hold what it says? `draws` images simulated at `result`, fitted as `job` asks, on all threads. Where the fit's misfit
+/// exceeds its noise, its residuals serve as noise, shifted round the image and turned in sign, so that what neighbouring pixels share
+/// stays shared. Deterministic. Ends early, with fewer draws, when interrupted.
+Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws);
+
+/// What images of the job's scenes tell of its free parameters, at their start values: before a fit, or before the image is taken.
+struct Outlook {
+  std::vector<ParameterEstimate> parameters;  ///< value = start, stderr_ = Cramer-Rao bound (NaN: not determined)
+  std::vector<FisherDirection> directions;
+  bool identifiable = true;
+  std::string noise;                          ///< where the noise comes from, in words
+};
+/// Micrographs may be without values: then their scene's view counts, the noise model given, or else 1 % of the image's range.
+Outlook outlook(const FitJob& job);
+
+/// One more image beside the job's own, with a gain and an offset of its own.
+struct Shot {
+  std::string words;   ///< "analyser turned by 45 deg"
+  double stderr_ = 0;  ///< of the parameter asked for, with the job's images and this one
+};
+/// Which image to take next: candidates, best first; "the same again" is among them. Throws UserError when `parameter` is not a free
+/// parameter of the job (suggests the nearest) or the job is a table of signals.
+std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter);
 
 }  // namespace birefit

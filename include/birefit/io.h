@@ -30,6 +30,7 @@ struct Config {
 enum class ConfigUse {
   fit,     ///< images are required and loaded, `fit: auto` starts come from them
   render,  ///< images are not loaded; the view comes from image_size_px or from the image's header
+  plan,    ///< as for a fit; where no image is named, the view comes from image_size_px and the micrograph has no values
 };
 
 /// Reads a config (docs/configuration.md). `image` replaces the single micrograph's file.

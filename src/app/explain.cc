@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -15,6 +16,7 @@ namespace {
 
 struct Arguments {
   std::string config;
+  std::string next;
   bool json = false, check = false;
 };
 
@@ -34,28 +36,40 @@ std::string quoted(const std::vector<std::string>& list) {
   return out + "]";
 }
 
+std::string json_number(double x) { return std::isfinite(x) ? fmt::format("{}", x) : "null"; }
+
 int run_explain(const Arguments& arguments) {
-  const Config config = load_config(arguments.config, ConfigUse::render);
+  const Config config = load_config(arguments.config, ConfigUse::plan);
   const ParameterTable& table = config.job.parameters;
   const Theta theta = table.values();
   const RenderPlan chosen = plan(config.scene, theta);
   std::vector<std::string> warnings = config.job.warnings;
   warnings.insert(warnings.end(), chosen.warnings.begin(), chosen.warnings.end());
 
+  // A profile's directions and the rows of a table make no picture.
+  const bool picture = !config.job.micrographs.empty() && config.scene.microscope.directions.empty() && config.scene.view.width * config.scene.view.height > 1;
+  bool fitted = false;
+  for (int i = 0; i < table.size(); ++i) fitted = fitted || table[i].free;
+  const std::optional<Outlook> expected = picture && fitted ? std::optional(outlook(config.job)) : std::nullopt;
+  const std::vector<Shot> shots = arguments.next.empty() ? std::vector<Shot>{} : next_shots(config.job, arguments.next);
+
   if (arguments.json) {
-    std::string free;
+    std::string free, next;
+    for (const Shot& shot : shots) next += fmt::format("{}\n    {{\"shot\": {}, \"stderr\": {}}}", next.empty() ? "" : ",", quoted(shot.words), json_number(shot.stderr_));
     for (int i = 0; i < table.size(); ++i) {
       if (!table[i].free) continue;
       const double phase = table[i].linear ? 0 : fringe_phase_per_unit(config.scene, theta, i);
       free += fmt::format("{}\n    {{\"name\": {}, \"unit\": {}, \"start\": {}, \"linear\": {}, \"fringe_rad_per_unit\": {}}}",
                           free.empty() ? "" : ",", quoted(table[i].name), quoted(table[i].unit), table[i].value,
                           table[i].linear, phase);
+      for (const ParameterEstimate& p : expected ? expected->parameters : std::vector<ParameterEstimate>{})
+        if (p.name == table[i].name) free.insert(free.size() - 1, fmt::format(", \"expected_stderr\": {}", json_number(p.stderr_)));
     }
     std::cout << fmt::format(
         "{{\n  \"method\": {},\n  \"physics\": {},\n  \"reasons\": {},\n  \"numerical_error\": {},\n  \"model_error\": {},\n"
-        "  \"cost_seconds\": {},\n  \"warnings\": {},\n  \"parameters\": [{}]\n}}\n",
+        "  \"cost_seconds\": {},\n  \"warnings\": {},\n  \"identifiable\": {},\n  \"next\": [{}],\n  \"parameters\": [{}]\n}}\n",
         quoted(chosen.method), quoted(chosen.physics), quoted(chosen.reasons), chosen.numerical_error, chosen.model_error,
-        chosen.cost_seconds, quoted(warnings), free);
+        chosen.cost_seconds, quoted(warnings), expected ? (expected->identifiable ? "true" : "false") : "null", next, free);
     return kExitDone;
   }
   std::cout << fmt::format("Image      {} x {} pixels", config.scene.view.width, config.scene.view.height);
@@ -83,6 +97,18 @@ int run_explain(const Arguments& arguments) {
     std::cout << "\n";
   }
   if (!any) std::cout << "Fitted     nothing\n";
+  if (expected) {
+    std::cout << fmt::format("Expected   at the start values, noise {}:\n", expected->noise);
+    for (const ParameterEstimate& p : expected->parameters)
+      if (!p.linear)
+        std::cout << (std::isfinite(p.stderr_) ? fmt::format("           {} to +- {:.2g} {}\n", p.name, p.stderr_, p.unit) : fmt::format("           {} not determined\n", p.name));
+    for (const FisherDirection& direction : expected->directions)
+      if (!direction.identifiable && !direction.words.empty()) std::cout << "           Not identifiable: " << direction.words << "\n";
+  }
+  if (!shots.empty()) {
+    std::cout << fmt::format("Next       one more image beside this, for {}:\n", arguments.next);
+    for (const Shot& shot : shots) std::cout << fmt::format("           to +- {:.2g}  {}\n", shot.stderr_, shot.words);
+  }
   for (const std::string& warning : warnings) std::cout << "Warning    " << warning << "\n";
   if (arguments.check) {
     const Image planned = render(config.scene, chosen, theta).intensity, judge = image_by_march(config.scene, theta);
@@ -105,6 +131,7 @@ Command add_explain_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("explain", "which model and method would run, why, and what it costs and errs");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  command->add_option("--next", arguments->next, "which image to take next to know this parameter better: candidates, best first");
   command->add_flag("--json", arguments->json, "for scripts");
   command->add_flag("--check", arguments->check, "droplets and shells: compare the picture with Maxwell's equations, marched through the sample (slow)")->excludes("--json");
   return {command, [arguments] { return run_explain(*arguments); }};

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "app/commands.h"
@@ -28,7 +29,7 @@ struct Arguments {
   std::string config;
   std::string image;
   std::string out;
-  int threads = -1;
+  int threads = -1, coverage = 0;
   bool quiet = false;
   bool json = false;
 };
@@ -59,7 +60,13 @@ int run_fit(const Arguments& arguments) {
   if (terminal)
     job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
   std::signal(SIGINT, on_interrupt);
-  const FitResult result = fit(job);
+  FitResult result = fit(job);
+  if (arguments.coverage > 0 && result.has_answer()) {
+    if (terminal) std::cerr << fmt::format("\r\033[Kfitting {} simulated images", arguments.coverage) << std::flush;
+    result.coverage = measure_coverage(job, result, arguments.coverage);
+  } else if (arguments.coverage > 0) {
+    result.warnings.push_back("--coverage: this fit has no answer to simulate images at.");
+  }
   if (terminal) std::cerr << "\r\033[K" << std::flush;
   write_results(out, config, result);
   folder->keep();
@@ -82,6 +89,8 @@ Command add_fit_command(CLI::App& app) {
   command->add_option("--image", arguments->image, "use this image in place of micrograph.image");
   command->add_option("--out", arguments->out, "folder for the results; default: the config's name + \"-fit\", here");
   add_threads_option(*command, arguments->threads);
+  command->add_option("--coverage", arguments->coverage, "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
+      ->check(CLI::Range(1, 100000));
   command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
   command->add_flag("--json", arguments->json, "print fit.json in place of the summary");
   return {command, [arguments] { return run_fit(*arguments); }};

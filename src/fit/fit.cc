@@ -14,6 +14,7 @@
 
 #include "fit/least_squares.h"
 #include "fit/noise.h"
+#include "fit/profile.h"
 #include "fit/scan.h"
 #include "fit/statistics.h"
 #include "fit/verdict.h"
@@ -156,8 +157,9 @@ class Fit {
   double row_correlation(const std::vector<LeastSquares::FrameMisfit>& frames) const;
   Image fitted_image(int g) const;
   bool shows_signal(double chi_square) const;
-  void report_parameters(const Inverse& inverse);
-  std::optional<double> upper_limit(int unknown) const;
+  void report_parameters(const Inverse& inverse, const Inverse& of_noise);
+  std::optional<double> upper_limit(int unknown, const Inverse& inverse);
+  void settle_interval(ParameterEstimate& estimate, int unknown, const Inverse& of_noise);
   void report_micrographs();
   void collect_warnings();
   struct Shift {
@@ -707,55 +709,55 @@ std::string Fit::covariance_words() const {
 /// Where the profile likelihood of a searched unknown, going up from the estimate, leaves 95 % one-sided confidence; nothing when it
 /// stays below that up to the bound, or when the physical limit at its lower bound is itself excluded. Needed where the curvature at
 /// the estimate says nothing: a director below its threshold hardly answers to the voltage, above it does.
-std::optional<double> Fit::upper_limit(int unknown) const {
+std::optional<double> Fit::upper_limit(int unknown, const Inverse& inverse) {
   const int index = unknowns_.table_index(unknown);
   const Parameter& parameter = job_.parameters[index];
   const bool prior = parameter.prior_sd || (job_.prior && std::count(job_.prior->names.begin(), job_.prior->names.end(), parameter.name) > 0);
   if (prior || stopped_ || !std::isfinite(parameter.upper)) return std::nullopt;
-  FitJob job = job_;
-  job.parameters[index].free = false;
-  const Unknowns others = Unknowns::of(job);
-  Eigen::VectorXd start(static_cast<Eigen::Index>(others.searched.size()));
-  for (std::size_t j = 0; j < others.searched.size(); ++j) start[static_cast<Eigen::Index>(j)] = theta_[others.searched[j]];
-  const double allowed = problem_->objective() + std::pow(student_t_quantile(0.95, result_.interval_degrees_of_freedom), 2);
-  const auto objective_at = [&](double value, Eigen::VectorXd& x) {
-    job.parameters[index].value = value;
-    std::vector<PixelSet> sets;
-    for (int g = 0; g < frames_; ++g) sets.push_back(pixel_set(job.micrographs[g], sigma_[g], pixels_[g]));
-    LeastSquares problem(job, others, plans_, std::move(sets));
-    problem.set_misfit(problem_->misfit());
-    SolveOptions options;
-    options.max_iterations = 20;
-    options.interrupted = job_.options.interrupted;
-    problem.evaluate(x, false);
-    if (x.size() > 0 && problem.objective() > allowed) problem.solve(x, options);  // else the others' best is lower still
-    return problem.objective();
-  };
-  Eigen::VectorXd x = start;
-  if (objective_at(parameter.lower, x) > allowed) return std::nullopt;
+  const double allowed = std::pow(student_t_quantile(0.95, result_.interval_degrees_of_freedom), 2);
+  Profile profile(*problem_, job_, unknowns_, best_, inverse.covariance, unknown);
+  if (profile.rise(parameter.lower, allowed) > allowed) return std::nullopt;
   constexpr int kSteps = 40, kHalvings = 12;  // the limit to 1e-5 of the range
   double inside = theta_[index];
   const double step = (parameter.upper - inside) / kSteps;
-  x = start;
   for (int i = 1; i <= kSteps; ++i) {
     const double value = i == kSteps ? parameter.upper : inside + step;
-    const Eigen::VectorXd before = x;
-    if (objective_at(value, x) <= allowed) {
+    if (profile.rise(value, allowed) <= allowed) {
       inside = value;
       continue;
     }
     double outside = value;
     for (int k = 0; k < kHalvings; ++k) {
       const double middle = 0.5 * (inside + outside);
-      Eigen::VectorXd at = before;
-      (objective_at(middle, at) <= allowed ? inside : outside) = middle;
+      (profile.rise(middle, allowed) <= allowed ? inside : outside) = middle;
     }
     return outside;
   }
   return std::nullopt;
 }
 
-void Fit::report_parameters(const Inverse& inverse) {
+/// value +- t stderr where the objective is a parabola that far; else the places where the profile likelihood has fallen as much.
+/// `of_noise`: the covariance without what models err by, which is added to either half.
+void Fit::settle_interval(ParameterEstimate& estimate, int unknown, const Inverse& of_noise) {
+  const double t = student_t_quantile(0.975, result_.interval_degrees_of_freedom), sd = std::sqrt(of_noise.covariance(unknown, unknown));
+  if (stopped_ || !std::isfinite(t * sd) || !(sd > 0) || of_noise.undetermined[static_cast<std::size_t>(unknown)]) return;
+  const Parameter& parameter = job_.parameters[unknowns_.table_index(unknown)];
+  // A valley longer than the bounds is no interval but a verdict.
+  if (!(t * sd < parameter.upper - parameter.lower)) return;
+  constexpr double kBent = 0.1;  // 5 % of the interval
+  Profile profile(*problem_, job_, unknowns_, best_, of_noise.covariance, unknown);
+  const std::array<double, 2> straight = profile.straightness(t * t);
+  if (std::abs(straight[0] - 1) < kBent && std::abs(straight[1] - 1) < kBent) return;
+  const double low = estimate.value - profile.crossing(parameter.lower, t * t), high = profile.crossing(parameter.upper, t * t) - estimate.value;
+  if (std::abs(low / (t * sd) - 1) < 0.5 * kBent && std::abs(high / (t * sd) - 1) < 0.5 * kBent) return;  // only the way there was bent
+  const double more = t * t * (estimate.stderr_ * estimate.stderr_ - sd * sd);
+  estimate.interval95_low = estimate.value - std::sqrt(low * low + more);
+  estimate.interval95_high = estimate.value + std::sqrt(high * high + more);
+  estimate.profiled = true;
+  result_.profiles.push_back(profile.trace());
+}
+
+void Fit::report_parameters(const Inverse& inverse, const Inverse& of_noise) {
   const Eigen::VectorXd gradient = problem_->gradient();
   const double t = student_t_quantile(0.975, result_.interval_degrees_of_freedom);
   for (int j = 0; j < unknowns_.size(); ++j) {
@@ -806,15 +808,17 @@ void Fit::report_parameters(const Inverse& inverse) {
     // The curvature at the estimate need not be that of the way to nature's bound: ask there.
     const bool limited = !estimate.limit.empty() && estimate.limit_value < parameter.upper;
     if (!estimate.linear && parameter.lower == parameter.physical_lower && !limited && !at_upper)
-      if (const std::optional<double> limit = upper_limit(j)) {
+      if (const std::optional<double> limit = upper_limit(j, of_noise)) {
         estimate.limit = "upper";
         estimate.limit_value = *limit;
         estimate.interval95_low = parameter.lower;
         estimate.interval95_high = *limit;
       }
+    if (!estimate.linear && !estimate.at_bound && estimate.limit.empty()) settle_interval(estimate, j, of_noise);
     result_.names.push_back(parameter.name);
     result_.parameters.push_back(std::move(estimate));
   }
+  problem_->evaluate(best_, true);  // profiles moved it
 }
 
 void Fit::report_micrographs() {
@@ -1045,7 +1049,8 @@ Eigen::VectorXd Fit::propagation_error() {
 
 void Fit::report() {
   const Eigen::MatrixXd factor = problem_->factor();
-  Inverse inverse = invert_normal_equations(factor);
+  const Inverse of_noise = invert_normal_equations(factor);
+  Inverse inverse = of_noise;
   const Eigen::VectorXd shift = propagation_error();
   inverse.covariance += shift * shift.transpose();
   result_.theta = theta_;
@@ -1076,7 +1081,7 @@ void Fit::report() {
   result_.correlation.diagonal().setOnes();
   result_.covariance_kind = covariance_words();
   if (!shift.isZero(0)) result_.covariance_kind += ", and the error of wave propagation by the exact image of a radial twin";
-  report_parameters(inverse);
+  report_parameters(inverse, of_noise);
   judge_identifiability(result_, job_, unknowns_, factor, inverse);
   const bool signal = shows_signal(data_chi_square);
   if (!signal) result_.identifiable = false;

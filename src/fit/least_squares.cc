@@ -500,7 +500,7 @@ class Watch : public ceres::IterationCallback {
 SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& options) {
   SolveSummary result;
   const int p = searched_size();
-  if (p == 0) {
+  if (p == 0 || (p == 1 && options.held == 0)) {
     evaluate(searched, true);
     if (options.iterations)
       options.iterations->push_back({static_cast<int>(options.iterations->size()), objective(), 0});
@@ -521,6 +521,7 @@ SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& 
   problem_options.evaluation_callback = &evaluation;
   ceres::Problem problem(problem_options);
   problem.AddParameterBlock(x.data(), p);
+  if (options.held >= 0) problem.SetManifold(x.data(), new ceres::SubsetManifold(p, {options.held}));
   for (const Tile& tile : tiles_)
     problem.AddResidualBlock(new TileCost(*this, tile, scaling, evaluation), nullptr, x.data());
   for (int j = 0; j < p; ++j) {

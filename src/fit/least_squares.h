@@ -48,6 +48,7 @@ struct Misfit {
 struct SolveOptions {
   int max_iterations = 100;
   double function_tolerance = 1e-12;  ///< relative change of the objective
+  int held = -1;                      ///< a searched unknown that stays where it is
   const std::atomic<bool>* interrupted = nullptr;
   std::function<void(const std::string&)> progress;
   std::vector<Iteration>* iterations = nullptr;  ///< appended to

@@ -144,7 +144,7 @@ void read_center(ConfigReader& reader, const Block& block, const Scene& scene, M
                                            (node->is_sequence() ? std::to_string(node->items.size()) + " items"
                                                                 : node->describe()));
     // Where a droplet lies is hardly ever known, and its image shows it.
-    if (automatic || (!node && droplet && reader.use == ConfigUse::fit)) {
+    if (automatic || (!node && droplet && reader.use != ConfigUse::render)) {
       make_automatic(reader, settings.center_x);
       make_automatic(reader, settings.center_y);
     }
@@ -529,7 +529,7 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
   const auto center = [&](ParameterRef ref, double found, double middle, int size) {
     Parameter& parameter = reader.table[ref];
     const bool unset = !std::isfinite(parameter.value);
-    if (unset) parameter.value = parameter.automatic && reader.use == ConfigUse::fit ? found : middle;
+    if (unset) parameter.value = parameter.automatic && reader.use != ConfigUse::render ? found : middle;
     if (parameter.automatic && !std::isfinite(parameter.lower)) {
       parameter.lower = parameter.value - kCenterBoundFraction * size;
       parameter.upper = parameter.value + kCenterBoundFraction * size;
@@ -541,7 +541,7 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
   Parameter& diameter = reader.table[droplet->diameter_um];
   if (!diameter.automatic) return;
   if (!std::isfinite(diameter.value)) {
-    if (!values && reader.use == ConfigUse::render)
+    if (!values && reader.use != ConfigUse::fit)
       reader.problems.add(diameter.where, "diameter_um has no value to render", "write {value: .., fit: auto}");
     diameter.value = 2 * disc.radius_px * view.pixel_size_um;
   }
@@ -802,7 +802,9 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
   }
   for (std::size_t i = 0; i < items.size(); ++i) micrographs.push_back(apply_set(reader, shared, items[i], i));
 
-  if (use == ConfigUse::fit) {
+  // Without an image to look at there is only the view.
+  const bool view_only = use == ConfigUse::render || (use == ConfigUse::plan && !image && signals.empty() && std::none_of(items.begin(), items.end(), [](const Item& i) { return i.image.has_value(); }));
+  if (use != ConfigUse::render) {
     // A shared parameter that every image replaces by its own is no unknown of the fit.
     std::set<int> used;
     for (Micrograph& micrograph : micrographs) {
@@ -823,7 +825,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
 
   if (use == ConfigUse::render && !signals.empty()) {
     if (!micrographs.empty()) config.scene = micrographs[0].scene;  // of the first row
-  } else if (use == ConfigUse::render) {
+  } else if (view_only) {
     Scene& scene = micrographs[0].scene;
     const Item& item = items[0];
     const std::string name = item.image.value_or("the image");
@@ -854,6 +856,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       reader.problems.add({reader.file}, "needs image_size_px: [width, height] or micrograph.image");
     }
     config.scene = scene;
+    if (use == ConfigUse::plan) config.job.micrographs = {micrographs[0]};
   } else {
     if (!list && signals.empty() && !items[0].image && !image) {
       const Block micrograph{root.find("micrograph"), "micrograph",
@@ -929,6 +932,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       config.job.options.choose_waves = true;
     } else if (const WaveChoice choice = wave_choice(config.scene, theta); choice.seconds_an_image <= reader.max_seconds) {
       config.scene.ceiling = Ceiling::wave;
+      for (Micrograph& m : config.job.micrographs) m.scene.ceiling = Ceiling::wave;
     } else {
       reader.warnings.push_back(choice.words + " Rays are taken instead: physics.max_seconds and ceiling: wave change that.");
     }

@@ -512,6 +512,8 @@ std::string parameter_table(const FitResult& result) {
           fmt::format("<br><span class=\"flag\">95 % {} limit {}</span>", escape_html(p.limit), plain(p.limit_value));
     else if (p.at_bound)
       flags = "<br><span class=\"flag\">at its bound</span>";
+    else if (p.profiled)
+      flags = "<br><small>interval by profile likelihood</small>";
     out += "<tr><td class=\"name\">" + escape_html(brief) +
            (brief != p.name ? "<small>" + escape_html(p.name) + "</small>" : "") + "</td>";
     out += "<td class=\"value\">" + value_html(p.value, error) + flags + "</td>";
@@ -569,6 +571,30 @@ std::string correlation_table(const FitResult& result) {
   return out + "</table></div>\n";
 }
 
+/// How the branches of the sample compare.
+std::string branch_table(const FitResult& result) {
+  if (result.branches.empty()) return {};
+  std::string out = "<h2>Branches</h2>\n<div class=\"scroll\"><table>\n<tr><th>branch</th><th>chi-square</th><th>parameters</th><th>odds</th></tr>\n";
+  for (const BranchResult& b : result.branches)
+    out += fmt::format("<tr><td class=\"name\">{}{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(b.name), b.reported ? " (reported)" : "", plain(b.chi_square), b.parameters,
+                       b.odds < 1e-30 ? std::string("&lt; 10<sup>\u221230</sup>") : html_number(fmt::format("{:.2g}", b.odds)));
+  return out + "</table></div>\n<p>Odds by the Bayesian information criterion, all branches weighed by the noise of the best.</p>\n";
+}
+
+std::string coverage_table(const FitResult& result) {
+  if (!result.coverage) return {};
+  const Coverage& c = *result.coverage;
+  std::string out = fmt::format(
+      "<h2>Do the intervals hold?</h2>\n<p>{} images were simulated at this result ({}) and fitted from scratch: {} gave an answer, {} of these more than 5 standard errors off.</p>\n", c.draws,
+      c.of_residuals ? "with the fit\u2019s own residuals as noise, moved about" : "with the noise as modelled", c.answered, c.wrong);
+  if (c.answered == 0) return out;
+  out += "<div class=\"scroll\"><table>\n<tr><th>parameter</th><th>in 68 % interval</th><th>in 95 % interval</th><th>spread / std. error</th><th>bias / std. error</th></tr>\n";
+  for (const Coverage::Of& p : c.parameters)
+    out += fmt::format("<tr><td class=\"name\">{}</td><td>{:.1f} %</td><td>{:.1f} %</td><td>{:.2f}</td><td>{}</td></tr>\n", escape_html(short_name(p.name)), 100 * p.inside68, 100 * p.inside95,
+                       p.spread, html_number(fmt::format("{:+.2f}", p.bias)));
+  return out + fmt::format("</table></div>\n<p>Of {} fits: a fraction of 95 % is known to \u00b1{:.1g} %.</p>\n", c.answered, 100 * std::sqrt(0.95 * 0.05 / c.answered));
+}
+
 // ---- diagnostics ----------------------------------------------------------------------------------------------------
 
 const ParameterEstimate* find(const FitResult& result, const std::string& name) {
@@ -606,6 +632,32 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
         "<figure>{}<figcaption><b>Figure {}.</b> The scan before the solver: chi-square against {}, the other "
         "parameters as the scan had them.</figcaption></figure>\n",
         svg(chart), figure++, escape_html(short_name(scan.name))));
+  }
+  for (const ProfileTrace& trace : result.profiles) {
+    const ParameterEstimate* p = find(result, trace.name);
+    if (p == nullptr || trace.value.size() < 3) continue;
+    Chart chart;
+    chart.title = "profile of " + trace.name;
+    chart.x_label = short_name(trace.name) + (p->unit.empty() ? "" : " (" + std::string(p->unit == "um" ? "\u00b5m" : p->unit) + ")");
+    Panel panel;
+    panel.y_label = "rise of chi-square";
+    Series line{Series::Kind::line, "profile", trace.value, trace.rise, kBlue, 1.5}, normal{Series::Kind::line, "parabola", {}, {}, "#8a919b", 1.0};
+    const double from = trace.value.front(), to = trace.value.back(), highest = *std::max_element(trace.rise.begin(), trace.rise.end());
+    for (int i = 0; i <= 60; ++i) {
+      const double x = from + (to - from) * i / 60, y = std::pow((x - p->value) / p->stderr_, 2);
+      if (y <= 1.3 * highest) normal.x.push_back(x), normal.y.push_back(y);
+    }
+    Series dots = line;
+    dots.kind = Series::Kind::points;
+    dots.label = "";
+    dots.width = 4.5;
+    panel.series = {normal, line, dots};
+    panel.markers = {{p->interval95_low, "95 %", kFitted, true}, {p->value, "optimum", kFitted, false}, {p->interval95_high, "", kFitted, true}};
+    chart.panels = {panel};
+    cells.push_back(fmt::format(
+        "<figure>{}<figcaption><b>Figure {}.</b> Profile likelihood of {}, all others at their best for each of its values. It is no parabola (grey: the standard error\u2019s): "
+        "the interval is where the profile has risen by t\u00b2.</figcaption></figure>\n",
+        svg(chart), figure++, escape_html(short_name(trace.name))));
   }
   if (result.iterations.size() > 1) {
     Chart chart;
@@ -828,6 +880,8 @@ std::string report_html(const Config& config, const FitResult& result) {
   for (const Frame& frame : frames) out += frame_section(frame, result, figure, largest_side);
 
   out += "<h2>Parameters</h2>\n" + parameter_table(result) + statistics_section(config, result);
+  out += branch_table(result);
+  out += coverage_table(result);
   out += correlation_table(result);
   out += diagnostics(result, frames, figure);
   out += identifiability(config, result);

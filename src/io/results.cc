@@ -44,6 +44,7 @@ Json parameter_json(const ParameterEstimate& p) {
                {"at_bound", p.at_bound},
                {"limit", nullptr},
                {"interval_95", {number(p.interval95_low), number(p.interval95_high)}},
+               {"interval_kind", p.profiled ? "profile likelihood" : !p.limit.empty() ? "one-sided" : "normal"},
                {"prior", nullptr},
                {"linear", p.linear}};
   if (!p.limit.empty()) json["limit"] = {{"side", p.limit}, {"value", number(p.limit_value)}};
@@ -112,9 +113,22 @@ std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
                         format_value(p.interval95_low, p.stderr_), format_value(p.interval95_high, p.stderr_));
   else
     line += fmt::format("{:.6g}{} +/- not known", p.value, unit_suffix(p.unit));
+  if (p.profiled) line += " by profile";
   if (!p.linear) line += fmt::format(" (start {:.6g})", p.start);
   if (p.at_bound && p.limit.empty()) line += " AT ITS BOUND";
   return line;
+}
+
+std::string coverage_text(const Coverage& c) {
+  std::string text = fmt::format("  {} images simulated at this result ({}) and fitted from scratch: {} with an answer, {} of them more than 5 standard errors off\n", c.draws,
+                                 c.of_residuals ? "noise: the fit's own residuals, moved about" : "noise as modelled", c.answered, c.wrong);
+  if (c.answered == 0) return text;
+  std::size_t width = 0;
+  for (const Coverage::Of& p : c.parameters) width = std::max(width, p.name.size());
+  for (const Coverage::Of& p : c.parameters)
+    text += fmt::format("    {:<{}}  68 % interval holds {:.1f} %, 95 % interval {:.1f} %; spread {:.2f}, bias {:+.2f} standard errors\n", p.name, width, 100 * p.inside68,
+                        100 * p.inside95, p.spread, p.bias);
+  return text + fmt::format("    (of {} fits; a fraction of 95 % is known to {:.1g} %)\n", c.answered, 100 * std::sqrt(0.95 * 0.05 / c.answered));
 }
 
 std::string log_text(const Config& config, const FitResult& result) {
@@ -183,6 +197,13 @@ std::string fit_json(const Config& config, const FitResult& result) {
   }
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
+  json["coverage"] = nullptr;
+  if (const auto& c = result.coverage) {
+    Json of = Json::object();
+    for (const Coverage::Of& p : c->parameters)
+      of[p.name] = {{"inside68", number(p.inside68)}, {"inside95", number(p.inside95)}, {"spread_over_stderr", number(p.spread)}, {"bias_over_stderr", number(p.bias)}};
+    json["coverage"] = {{"draws", c->draws}, {"noise", c->of_residuals ? "residuals" : "model"}, {"answered", c->answered}, {"confidently_wrong", c->wrong}, {"parameters", of}};
+  }
   json["correlation"] = matrix(result.names, result.correlation);
   json["covariance"] = matrix(result.names, result.covariance);
   json["covariance_kind"] = result.covariance_kind;
@@ -268,6 +289,7 @@ std::string summary(const FitResult& result) {
         fmt::format("    and {} more above {} in fit.json\n", pairs.size() - kListedCorrelations, kNotableCorrelation);
 
   if (!result.verdict.empty()) text += result.verdict + "\n";
+  if (result.coverage) text += coverage_text(*result.coverage);
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
   return text;
 }

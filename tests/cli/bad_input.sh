@@ -3,6 +3,7 @@
 # usage: bad_input.sh BIREFIT SOURCE_DIR
 set -u
 birefit=$(realpath "$1")
+source_dir=$(realpath "$2")
 work=$(mktemp -d)
 trap 'chmod -R u+w "$work"; rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -289,6 +290,10 @@ for arguments in '--help' '--version' 'fit --help' 'new droplet' 'new cell' 'new
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 0 ] && [ -s stdout.txt ] || fail "arguments: $arguments"
 done
+# A parameter to look at next that the config does not fit: the message lists those it does.
+checks=$((checks + 1))
+"$birefit" explain "$source_dir/fit_configs/e12_droplet.yaml" --next birefringense > stdout.txt 2> stderr.txt
+[ $? -eq 2 ] && grep -q 'sample.material.birefringence' stderr.txt || fail "explain --next of an unknown parameter"
 # What `new` prints has no mistake but the files it cannot know.
 for kind in droplet cell plate crystal slab volume; do
   checks=$((checks + 1))

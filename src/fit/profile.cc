@@ -1,0 +1,93 @@
+#include "fit/profile.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace birefit::estimation {
+
+Profile::Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best, const Eigen::MatrixXd& covariance, int unknown)
+    : problem_(problem), job_(job), unknowns_(unknowns), best_(best), unknown_(unknown) {
+  const Eigen::Index p = best.size();
+  const double variance = covariance(unknown, unknown);
+  sd_ = std::sqrt(variance);
+  direction_ = variance > 0 ? Eigen::VectorXd(covariance.col(unknown).head(p) / variance) : Eigen::VectorXd(Eigen::VectorXd::Unit(p, unknown));
+  problem_.evaluate(best_, false);
+  least_ = problem_.objective();
+  places_.push_back({best_[unknown_], 0, best_});
+}
+
+Eigen::VectorXd Profile::along(const Eigen::VectorXd& from, double value) const {
+  Eigen::VectorXd x = from + (value - from[unknown_]) * direction_;
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(j)]];
+    x[j] = std::clamp(x[j], parameter.lower, parameter.upper);
+  }
+  x[unknown_] = value;
+  return x;
+}
+
+double Profile::rise(double value, double enough) {
+  const auto nearest = std::min_element(places_.begin(), places_.end(),
+                                        [&](const Place& a, const Place& b) { return std::abs(a.value - value) < std::abs(b.value - value); });
+  Eigen::VectorXd x = along(nearest->searched, value);
+  problem_.evaluate(x, false);
+  if (problem_.objective() - least_ > enough) {
+    SolveOptions options;
+    options.max_iterations = 20;
+    options.function_tolerance = 1e-9;  // some 1e-4 of a chi-square unit
+    options.held = unknown_;
+    options.interrupted = job_.options.interrupted;
+    problem_.solve(x, options);
+  }
+  places_.push_back({value, problem_.objective() - least_, x});
+  return places_.back().rise;
+}
+
+double Profile::crossing(double end, double allowed) {
+  const double from = best_[unknown_], wanted = std::sqrt(allowed), sign = end < from ? -1 : 1;
+  const auto limited = [&](double v) { return sign * (end - v) < 0 ? end : v; };
+  double inside = from, root_inside = 0, outside = end, root_outside = -1;  // root of the rise; -1: not known
+  double value = limited(from + sign * wanted * sd_);
+  for (int i = 0; i < 16; ++i) {
+    const double root = std::sqrt(std::max(0.0, rise(value)));
+    if (std::abs(root - wanted) < 0.01 * wanted) return value;
+    if (root < wanted) {
+      if (value == end) return end;
+      inside = value, root_inside = root;
+    } else {
+      outside = value, root_outside = root;
+    }
+    if (root_outside < 0) {  // the root grows next to linearly: on by its slope, at most twice as far
+      const double factor = root > 0 ? std::min(2.0, wanted / root * 1.02) : 2.0;
+      value = limited(from + (value - from) * std::max(1.05, factor));
+    } else {
+      const double fraction = (wanted - root_inside) / (root_outside - root_inside);
+      value = inside + (outside - inside) * std::clamp(fraction, 0.05, 0.95);
+    }
+  }
+  return value;
+}
+
+std::array<double, 2> Profile::straightness(double allowed) {
+  std::array<double, 2> ratio{1, 1};
+  const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(unknown_)]];
+  for (const int side : {0, 1}) {
+    const double value = std::clamp(best_[unknown_] + (side ? 1 : -1) * std::sqrt(allowed) * sd_, parameter.lower, parameter.upper);
+    const double share = (value - best_[unknown_]) / sd_;
+    if (!(share * share > 0.01 * allowed)) continue;
+    problem_.evaluate(along(best_, value), false);
+    ratio[static_cast<std::size_t>(side)] = (problem_.objective() - least_) / (share * share);
+  }
+  return ratio;
+}
+
+ProfileTrace Profile::trace() const {
+  std::vector<Place> places = places_;
+  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.value < b.value; });
+  ProfileTrace trace;
+  trace.name = job_.parameters[unknowns_.searched[static_cast<std::size_t>(unknown_)]].name;
+  for (const Place& place : places) trace.value.push_back(place.value), trace.rise.push_back(place.rise);
+  return trace;
+}
+
+}  // namespace birefit::estimation

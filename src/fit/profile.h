@@ -1,0 +1,45 @@
+#pragma once
+// Profile likelihood: where an interval is not value +- t standard errors.
+
+#include <atomic>
+#include <vector>
+
+#include "fit/least_squares.h"
+
+namespace birefit::estimation {
+
+/// How the objective rises when one searched unknown is held away from its best value and all others follow (D. J. Venzon &
+/// S. H. Moolgavkar, Appl. Statist. 37, 87 (1988)). Moves `problem`; whoever needs it at the optimum evaluates it there again.
+class Profile {
+ public:
+  /// `covariance` of the searched unknowns at `best`: along it the others start.
+  Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best, const Eigen::MatrixXd& covariance, int unknown);
+
+  /// Above the objective at the optimum; not minimised further where that is below `enough` already.
+  double rise(double value, double enough = -1);
+  /// The place between the estimate and `end` where the rise is `allowed`, to 1 % of its root; `end` where it stays below.
+  double crossing(double end, double allowed);
+  /// The rise `allowed`^(1/2) standard errors up and down, the others following along straight lines, over `allowed`: both 1 where the
+  /// objective is a parabola. Clipped at the bounds.
+  std::array<double, 2> straightness(double allowed);
+
+  /// Places that rise() was asked for, in order of value.
+  ProfileTrace trace() const;
+
+ private:
+  struct Place {
+    double value, rise;
+    Eigen::VectorXd searched;
+  };
+  Eigen::VectorXd along(const Eigen::VectorXd& from, double value) const;
+
+  LeastSquares& problem_;
+  const FitJob& job_;
+  const Unknowns& unknowns_;
+  Eigen::VectorXd best_, direction_;  ///< direction_: change of all per change of the one
+  double sd_, least_;
+  int unknown_;
+  std::vector<Place> places_;
+};
+
+}  // namespace birefit::estimation
