@@ -25,6 +25,8 @@ struct Config {
   FitJob job;             ///< micrographs empty for render-only configs
   std::vector<SignalTable> signals;  ///< empty when the job is of images
   Scene scene;            ///< of the first micrograph, or of `image_size_px`
+  std::vector<std::filesystem::path> inputs;  ///< every file that was read beside the config
+  std::string fingerprint;  ///< of a frame of a series: all that determines its fit (birefit/series.h); goes into fit.json
 };
 
 enum class ConfigUse {

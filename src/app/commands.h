@@ -15,6 +15,7 @@ struct Command {
 };
 
 Command add_fit_command(CLI::App& app);
+Command add_series_command(CLI::App& app);
 Command add_render_command(CLI::App& app);
 Command add_jones_command(CLI::App& app);
 Command add_explain_command(CLI::App& app);

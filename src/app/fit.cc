@@ -1,7 +1,5 @@
 // birefit fit: estimates the parameters that the config marks `fit`.
 
-#include <atomic>
-#include <csignal>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -10,20 +8,12 @@
 #include <unistd.h>
 
 #include "app/commands.h"
+#include "app/interrupt.h"
 #include "app/output.h"
 #include "birefit/io.h"
 
 namespace birefit {
 namespace {
-
-std::atomic<bool> g_interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
-
-void on_interrupt(int) {
-  g_interrupted = true;
-  // The first Ctrl-C ends the fit with what it has; a second one ends the program.
-  std::signal(SIGINT, SIG_DFL);
-}
 
 struct Arguments {
   std::string config;
@@ -55,11 +45,11 @@ int run_fit(const Arguments& arguments) {
 
   FitJob& job = config.job;
   if (arguments.threads >= 0) job.options.threads = arguments.threads;
-  job.options.interrupted = &g_interrupted;
+  const Interrupt interrupt;
+  job.options.interrupted = &interrupt.flag();
   const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
   if (terminal)
     job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
-  std::signal(SIGINT, on_interrupt);
   FitResult result = fit(job);
   if (arguments.coverage > 0 && result.has_answer()) {
     if (terminal) std::cerr << fmt::format("\r\033[Kfitting {} simulated images", arguments.coverage) << std::flush;
@@ -70,7 +60,6 @@ int run_fit(const Arguments& arguments) {
   if (terminal) std::cerr << "\r\033[K" << std::flush;
   write_results(out, config, result);
   folder->keep();
-  std::signal(SIGINT, SIG_DFL);
 
   if (arguments.json) {
     std::cout << fit_json(config, result) << "\n";

@@ -14,13 +14,13 @@
 #include "io/config_pixels.h"
 #include "io/config_reader.h"
 #include "io/config_scene.h"
+#include "io/config_series.h"
 #include "io/config_signal.h"
 #include "io/prior.h"
 
 namespace birefit {
 namespace {
 
-constexpr std::uintmax_t kMaxConfigBytes = 4u << 20;
 /// More messages than this say no more.
 constexpr std::size_t kMaxProblemsShown = 50;
 /// Below this find_disc saw no disc (DiscGuess::contrast).
@@ -30,27 +30,6 @@ constexpr double kCenterBoundFraction = 0.15;
 /// A frame's pixel whose light is below this fraction of the typical one says nothing about transmission.
 constexpr double kLeastLightFraction = 0.05;
 constexpr int kMaxImageSide = 16384;
-
-std::string read_text(const std::filesystem::path& path) {
-  const Where where{path.string()};
-  std::error_code code;
-  const auto status = std::filesystem::status(path, code);
-  if (!std::filesystem::exists(status)) throw UserError(where, "does not exist");
-  if (std::filesystem::is_directory(status)) throw UserError(where, "is a folder, expected a config file");
-  if (std::filesystem::is_regular_file(status) && std::filesystem::file_size(path, code) > kMaxConfigBytes)
-    throw UserError(where, "is larger than 4 MB", "is this a config file?");
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw UserError(where, "cannot be read");
-  // A pipe has no size beforehand, so the limit is kept while reading too.
-  std::string text;
-  std::array<char, 65536> buffer;
-  while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
-    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kMaxConfigBytes) throw UserError(where, "is larger than 4 MB", "is this a config file?");
-  }
-  if (stream.bad()) throw UserError(where, "cannot be read to its end");
-  return text;
-}
 
 /// What the `micrograph:` block gives to every image.
 struct MicrographSettings {
@@ -80,6 +59,7 @@ struct Item {
   std::optional<int> page;
   std::vector<std::pair<std::string, const YamlNode*>> set;
   std::vector<Where> set_where;
+  std::string axis;  ///< of `set`, may be no parameter: a column that a series is only drawn along
 };
 
 NumberSpec linear_spec() {
@@ -245,13 +225,25 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   return settings;
 }
 
+/// The image of a frame with its row of the table; `cells` holds the row's nodes, in the order of the columns.
+Item item_of(const ImageSeries& series, const SeriesFrame& frame, const std::vector<YamlNode>& cells) {
+  Item item;
+  item.image = frame.file;
+  item.image_where = frame.where;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    item.set.emplace_back(series.columns[c].name, &cells[c]);
+    item.set_where.push_back(series.columns[c].where);
+  }
+  if (series.along) item.axis = series.columns[*series.along].name;
+  return item;
+}
+
 std::vector<Item> read_items(ConfigReader& reader, const Block& root) {
   std::vector<Item> items;
   const YamlNode* list = root.find("micrographs");
   if (!list) return items;
-  if (list->is_map() && (list->find("files") || list->find("set_from"))) {
-    reader.problems.add(list->where, "micrographs with files belongs to birefit series, which comes later",
-                        "list the images: - {image: .., set: {..}}");
+  if (is_series(*list)) {
+    reader.problems.add(list->where, "micrographs with files are a series of fits", "run birefit series " + reader.file);
     return items;
   }
   if (!list->is_sequence() || list->items.empty()) {
@@ -492,6 +484,7 @@ Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item&
     const auto& [path, node] = item.set[k];
     const auto spec = shared_specs.find(path);
     if (spec == shared_specs.end()) {
+      if (path == item.axis) continue;
       std::vector<std::string> known;
       for (const auto& [name, unused] : shared_specs) known.push_back(name);
       const std::string near = nearest_word(path, known);
@@ -713,12 +706,13 @@ void read_prior(ConfigReader& reader, const Block& root, FitJob& job) {
   throw UserError(std::move(problems));
 }
 
-}  // namespace
-
-Config load_config(const std::filesystem::path& path, ConfigUse use, const std::optional<std::filesystem::path>& image) {
+/// `image` replaces the single micrograph's file; with `series` the micrograph is one of its frames. Without `starts` nothing is looked
+/// for in the image: enough to know that a config is sound.
+Config load(const std::filesystem::path& path, std::string text, ConfigUse use, const std::optional<std::filesystem::path>& image,
+            const ImageSeries* series = nullptr, std::size_t frame = 0, bool starts = true) {
   Config config;
   config.path = path;
-  config.text = read_text(path);
+  config.text = std::move(text);
   ConfigReader reader(path.string(), path.parent_path(), use);
   const YamlNode tree = parse_yaml(config.text, reader.file, reader.problems);
   const Block root{&tree, "", {reader.file}};
@@ -726,7 +720,8 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
                                "accuracy", "physics", "transport", "prior", "fit", "signal"});
 
   const YamlNode* list = root.find("micrographs");
-  std::vector<Item> items = read_items(reader, root);
+  const std::vector<YamlNode> cells = series ? cell_nodes(series->frames[frame]) : std::vector<YamlNode>{};
+  std::vector<Item> items = series ? std::vector<Item>{item_of(*series, series->frames[frame], cells)} : read_items(reader, root);
   if (!items.empty()) {
     for (const auto& [name, node] : items[0].set) {
       const bool everywhere = std::all_of(items.begin(), items.end(), [&](const Item& item) {
@@ -902,7 +897,7 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
       if (!fill_pixels(reader, settings, calibration ? &*calibration : nullptr, user_mask ? &*user_mask : nullptr, *loaded,
                        where, micrograph))
         continue;
-      if (!sound || !reader.problems.empty()) continue;
+      if (!sound || !reader.problems.empty() || !starts) continue;
       resolve_automatic(reader, micrograph.scene, &micrograph.values, &micrograph.mask, micrograph.name);
       check_overlap(reader, micrograph.scene, micrograph.name);
       mask_stressed_disc(reader, micrograph);
@@ -939,7 +934,28 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
   }
   config.job.parameters = std::move(reader.table);
   config.job.warnings = std::move(reader.warnings);
+  config.inputs.assign(reader.inputs.begin(), reader.inputs.end());
   return config;
+}
+
+}  // namespace
+
+Config load_config(const std::filesystem::path& path, ConfigUse use, const std::optional<std::filesystem::path>& image) {
+  std::string text = read_text(path);
+  if (use == ConfigUse::render && holds_series(text)) {
+    // What the frames have in common shows in the first.
+    const ImageSeries series = read_series(path, std::move(text));
+    return load(path, series.text, use, image, &series, 0);
+  }
+  return load(path, std::move(text), use, image);
+}
+
+Config load_frame(const ImageSeries& series, std::size_t frame) {
+  return load(series.path, series.text, ConfigUse::fit, std::nullopt, &series, frame);
+}
+
+void check_frame(const ImageSeries& series, std::size_t frame) {
+  load(series.path, series.text, ConfigUse::fit, std::nullopt, &series, frame, false);
 }
 
 }  // namespace birefit

@@ -1,8 +1,10 @@
 #include "io/config_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
+#include <fstream>
 
 #include <fmt/format.h>
 
@@ -25,7 +27,31 @@ std::string lower_case(std::string text) {
   return text;
 }
 
+/// More is no config.
+constexpr std::uintmax_t kMaxConfigBytes = 4u << 20;
+
 }  // namespace
+
+std::string read_text(const std::filesystem::path& path) {
+  const Where where{path.string()};
+  std::error_code code;
+  const auto status = std::filesystem::status(path, code);
+  if (!std::filesystem::exists(status)) throw UserError(where, "does not exist");
+  if (std::filesystem::is_directory(status)) throw UserError(where, "is a folder, expected a config file");
+  if (std::filesystem::is_regular_file(status) && std::filesystem::file_size(path, code) > kMaxConfigBytes)
+    throw UserError(where, "is larger than 4 MB", "is this a config file?");
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw UserError(where, "cannot be read");
+  // A pipe has no size beforehand, so the limit is kept while reading too.
+  std::string text;
+  std::array<char, 65536> buffer;
+  while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > kMaxConfigBytes) throw UserError(where, "is larger than 4 MB", "is this a config file?");
+  }
+  if (stream.bad()) throw UserError(where, "cannot be read to its end");
+  return text;
+}
 
 std::string show(double value) { return fmt::format("{:.10g}", value); }
 

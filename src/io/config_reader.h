@@ -62,6 +62,8 @@ class ConfigReader {
   /// Range of every number of the config by path, given or defaulted: what `set:` of a micrograph may name.
   std::map<std::string, NumberSpec> specs;
   std::map<std::string, ParameterRef> refs;
+  /// Every file that was asked for.
+  std::set<std::filesystem::path> inputs;
   /// Paths that an unknown key was probably meant for: not also reported as missing.
   std::set<std::string> misspelt;
   /// Paths that every micrograph sets for itself: the shared blocks need not give them.
@@ -98,14 +100,19 @@ class ConfigReader {
   /// A finite number within the spec's range, else nothing and a problem. `name` is the key shown.
   std::optional<double> value_of(const YamlNode& node, const std::string& name, const NumberSpec& spec);
 
-  std::filesystem::path resolve(const std::string& path) const {
+  /// A file that the config names; noted among `inputs`.
+  std::filesystem::path resolve(const std::string& path) {
     const std::filesystem::path given(path);
+    inputs.insert(given.is_absolute() ? given : folder / given);
     return given.is_absolute() ? given : folder / given;
   }
 
  private:
   std::optional<double> finite(const YamlNode& node, const std::string& name);
 };
+
+/// A config as text; UserError when it cannot be one.
+std::string read_text(const std::filesystem::path& path);
 
 /// "a, b and c".
 std::string list_words(const std::vector<std::string>& words);

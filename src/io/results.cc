@@ -166,6 +166,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
   Json json;
   json["version"] = BIREFIT_VERSION;
   json["config"] = {{"file", config.path.string()}, {"text", config.text}};
+  if (!config.fingerprint.empty()) json["fingerprint"] = config.fingerprint;
   json["has_answer"] = result.has_answer();
   json["verdict"] = result.verdict;
   json["converged"] = result.converged;

@@ -13,13 +13,11 @@ namespace {
 /// Larger files are not profiles; reading them would only be a slow way to an error.
 constexpr std::uintmax_t kMaxTableBytes = 64u << 20;
 
-struct Field {
-  std::string text;
-  int column;  // from 1
-};
+/// More are a file of another kind, not slips.
+constexpr std::size_t kMostProblems = 20;
 
-std::vector<Field> split(const std::string& line) {
-  std::vector<Field> cells;
+std::vector<TableCell> split(const std::string& line) {
+  std::vector<TableCell> cells;
   std::size_t start = 0;
   for (;;) {
     std::size_t end = line.find(',', start);
@@ -55,7 +53,7 @@ std::optional<double> parse_number(std::string_view text) {
   return value;
 }
 
-PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where, bool numbered) {
+TextTable load_text_table(const std::filesystem::path& path, const Where& where, Problems& problems, bool numbered) {
   std::error_code code;
   if (!std::filesystem::exists(path, code)) throw UserError(where, path.string() + " does not exist");
   if (!std::filesystem::is_regular_file(path, code)) throw UserError(where, path.string() + " is not a file");
@@ -65,8 +63,8 @@ PlacedTable load_placed_table(const std::filesystem::path& path, const Where& wh
   if (!stream) throw UserError(where, path.string() + " cannot be read");
 
   const std::string file = path.string();
-  PlacedTable placed;
-  Problems problems;
+  TextTable table;
+  Problems header;
   std::string line;
   int number = 0;
   while (std::getline(stream, line)) {
@@ -75,45 +73,61 @@ PlacedTable load_placed_table(const std::filesystem::path& path, const Where& wh
     const std::size_t first = line.find_first_not_of(" \t\r");
     if (first == std::string::npos || line[first] == '#') continue;
     if (line.find('\0') != std::string::npos) throw UserError({file, number}, "is not a text table");
-    std::vector<Field> cells = split(line);
-    if (placed.header_line == 0) {
-      placed.header_line = number;
-      for (Field& cell : cells) {
-        for (const std::string& earlier : placed.table.columns)
-          if (earlier == cell.text) problems.add({file, number, cell.column}, "duplicate column " + cell.text);
-        if (cell.text.empty() && !(numbered && placed.table.columns.empty())) problems.add({file, number, cell.column}, "a column has no name");
+    std::vector<TableCell> cells = split(line);
+    if (table.header_line == 0) {
+      table.header_line = number;
+      for (TableCell& cell : cells) {
+        for (const TableCell& earlier : table.header)
+          if (earlier.text == cell.text) header.add({file, number, cell.column}, "duplicate column " + cell.text);
+        if (cell.text.empty() && !(numbered && table.header.empty())) header.add({file, number, cell.column}, "a column has no name");
         if (parse_number(cell.text))
-          problems.add({file, number, cell.column}, "the first line must name the columns, found " + cell.text);
-        placed.header_columns.push_back(cell.column);
-        placed.table.columns.push_back(std::move(cell.text));
+          header.add({file, number, cell.column}, "the first line must name the columns, found " + cell.text);
+        table.header.push_back(std::move(cell));
       }
-      problems.throw_if_any();
+      header.throw_if_any();
       continue;
     }
-    if (cells.size() != placed.table.columns.size()) {
+    if (cells.size() != table.header.size()) {
       problems.add({file, number}, "has " + std::to_string(cells.size()) + " fields, the header names " +
-                                       std::to_string(placed.table.columns.size()));
+                                       std::to_string(table.header.size()));
     } else {
-      std::vector<double> row;
-      std::vector<int> columns;
-      for (std::size_t i = 0; i < cells.size(); ++i) {
-        const std::optional<double> value = parse_number(cells[i].text);
-        if (!value || !std::isfinite(*value))
-          problems.add({file, number, cells[i].column},
-                       placed.table.columns[i] + " = " + (cells[i].text.empty() ? "nothing" : cells[i].text.substr(0, 40)) +
-                           " is not a finite number");
-        row.push_back(value.value_or(0));
-        columns.push_back(cells[i].column);
-      }
-      placed.table.rows.push_back(std::move(row));
-      placed.cell_columns.push_back(std::move(columns));
-      placed.lines.push_back(number);
+      table.rows.push_back(std::move(cells));
+      table.lines.push_back(number);
     }
-    if (problems.all().size() >= 20) break;  // a file of another kind, not twenty slips
+    if (problems.all().size() >= kMostProblems) break;
+  }
+  if (table.header_line == 0) throw UserError({file}, "is empty", "expected a line of column names, then numbers");
+  if (table.rows.empty() && problems.empty()) throw UserError({file, table.header_line}, "has column names but no rows");
+  return table;
+}
+
+PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where, bool numbered) {
+  Problems problems;
+  TextTable text = load_text_table(path, where, problems, numbered);
+  const std::string file = path.string();
+  PlacedTable placed;
+  placed.header_line = text.header_line;
+  placed.lines = std::move(text.lines);
+  for (TableCell& cell : text.header) {
+    placed.header_columns.push_back(cell.column);
+    placed.table.columns.push_back(std::move(cell.text));
+  }
+  for (std::size_t r = 0; r < text.rows.size() && problems.all().size() < kMostProblems; ++r) {
+    std::vector<double> row;
+    std::vector<int> columns;
+    for (std::size_t i = 0; i < text.rows[r].size(); ++i) {
+      const TableCell& cell = text.rows[r][i];
+      const std::optional<double> value = parse_number(cell.text);
+      if (!value || !std::isfinite(*value))
+        problems.add({file, placed.lines[r], cell.column},
+                     placed.table.columns[i] + " = " + (cell.text.empty() ? "nothing" : cell.text.substr(0, 40)) + " is not a finite number");
+      row.push_back(value.value_or(0));
+      columns.push_back(cell.column);
+    }
+    placed.table.rows.push_back(std::move(row));
+    placed.cell_columns.push_back(std::move(columns));
   }
   problems.throw_if_any();
-  if (placed.header_line == 0) throw UserError({file}, "is empty", "expected a line of column names, then numbers");
-  if (placed.table.rows.empty()) throw UserError({file, placed.header_line}, "has column names but no rows");
   return placed;
 }
 

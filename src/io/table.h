@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +15,21 @@ namespace birefit {
 /// A number too large for a double is returned as infinity.
 std::optional<double> parse_number(std::string_view text);
 
+struct TableCell {
+  std::string text;
+  int column = 0;  ///< character column, from 1
+};
+/// A comma-separated table as text.
+struct TextTable {
+  std::vector<TableCell> header;
+  int header_line = 0;
+  std::vector<std::vector<TableCell>> rows;  ///< each as long as the header
+  std::vector<int> lines;                    ///< of each row
+};
+/// Rows of another length are added to `problems` and left out. `numbered`: the first column may lack a name (row numbers, as
+/// programs write them).
+TextTable load_text_table(const std::filesystem::path& path, const Where& where, Problems& problems, bool numbered = false);
+
 struct PlacedTable {
   Table table;
   std::vector<int> header_columns;             ///< character column of each header field, from 1
@@ -21,7 +37,7 @@ struct PlacedTable {
   std::vector<int> lines;                      ///< line of each row
   std::vector<std::vector<int>> cell_columns;  ///< character column of each cell
 };
-/// `numbered`: the first column may lack a name (row numbers, as programs write them).
+/// Of numbers alone.
 PlacedTable load_placed_table(const std::filesystem::path& path, const Where& where, bool numbered = false);
 
 }  // namespace birefit

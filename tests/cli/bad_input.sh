@@ -242,6 +242,81 @@ expect 'missing calibration frames' bad.yaml:4:40: 'does not exist'
 config; echo 'prior: {from: none.json, parameters: [sample.droplet.diameter_um]}' >> bad.yaml
 expect_one 'missing prior' bad.yaml:18:15: 'does not exist'
 
+# ---- series ------------------------------------------------------------------------------------------------------------
+
+# series MICROGRAPHS [SED_EXPRESSION...]: the sound config with this in place of its image. expect_series NAME PLACE WORDS.
+series() {
+  local block=$1
+  shift
+  config '/image: good.tif/d' "1i micrographs: $block" "$@"
+}
+expect_series() {
+  checks=$((checks + 1))
+  rm -rf out
+  timeout 60 "$birefit" series bad.yaml --out out > stdout.txt 2> stderr.txt
+  local code=$?
+  [ $code -eq 2 ] || { fail "$1: exit code $code, expected 2"; return; }
+  grep -F -- "$2" stderr.txt | grep -q -E -- "$3" || { fail "$1: no message at $2 with /$3/"; return; }
+  [ "$(wc -l < stderr.txt)" -eq 1 ] || fail "$1: more than one message"
+  [ -e out ] && fail "$1: a folder was written"
+  return 0
+}
+mkdir -p frames other
+cp good.tif frames/f1.tif
+cp good.tif frames/f2.tif
+cp good.tif other/f1.tif
+table() { printf '%s\n' "$@" > frames.csv; }
+both='{files: "frames/*.tif", set_from: frames.csv}'
+
+config
+expect_series 'series of a single image' bad.yaml: 'is no series.*run birefit fit bad.yaml'
+series '{files: "frames/*.tif"}'
+expect_one 'fit of a series' bad.yaml:1:14: 'run birefit series bad.yaml'
+series '{files: "frames/*.png"}'
+expect_series 'no file matches' bad.yaml:1:22: 'no file matches frames/\*.png'
+series '{file: "frames/*.tif", set_from: frames.csv}'
+table 'file' 'frames/f1.tif'
+expect_series 'unknown key of a series' bad.yaml:1:15: 'unknown key file in micrographs; did you mean files'
+series '{files: "*/f1.tif"}'
+expect_series 'two frames of a name' bad.yaml:1:22: 'frames/f1.tif and other/f1.tif are both called f1'
+series '{files: "frames/*.tif", set_from: none.csv}'
+expect_series 'missing table' bad.yaml:1:48: 'none.csv does not exist'
+series "$both"
+table 'name,surround.index' 'f1.tif,1.43' 'f2.tif,1.44'
+expect_series 'table without files' frames.csv:1:1: 'has no column file'
+table 'file,sample.surround.indx' 'f1.tif,1.43' 'f2.tif,1.44'
+expect_series 'unknown path in the header' frames.csv:1:6: 'sample.surround.indx is no parameter.*did you mean sample.surround.index'
+table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,wide'
+expect_series 'text in the table' frames.csv:3:8: 'index must be a number, found wide'
+table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,143'
+expect_series 'number out of range in the table' frames.csv:3:8: 'index = 143 is outside'
+table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,'
+expect_series 'empty cell' frames.csv:3:8: 'index must be a number, found nothing'
+table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,1.44,1'
+expect_series 'row too long' frames.csv:3: 'has 3 fields'
+table 'file,sample.surround.index' 'f1.tif,1.43'
+expect_series 'file without a row' bad.yaml:1:22: 'frames/f2.tif has no row in frames.csv'
+table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,1.43' 'f3.tif,1.43'
+expect_series 'row without a file' frames.csv:4:1: 'f3.tif is not among the files.*did you mean f'
+table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,1.43' 'f1.tif,1.43'
+expect_series 'file with two rows' frames.csv:4:1: 'f1.tif has a row already, in line 2'
+table 'file,time_s' 'f1.tif,1' 'f2.tif,soon'
+series '{files: "frames/*.tif", set_from: frames.csv, along: time_s}'
+expect_series 'text along the axis' frames.csv:3:8: 'time_s must be a number, found soon'
+series '{files: "frames/*.tif", set_from: frames.csv, along: times}'
+expect_series 'axis that is no column' bad.yaml:1:67: 'times, which is no column of frames.csv; did you mean time_s'
+series '{files: "frames/*.tif", shared: [sample.droplet.diamter_um]}'
+expect_series 'unknown shared parameter' bad.yaml:1:47: 'no parameter of this config; did you mean sample.droplet.diameter_um'
+series '{files: "frames/*.tif", shared: [microscope.polarizer_deg]}'
+expect_series 'shared parameter that is known' bad.yaml:1:47: 'is not fitted here'
+cp truncated.tif frames/f3.tif
+series '{files: "frames/*.tif"}'
+expect_series 'truncated frame' bad.yaml:1:22: 'f3.tif'
+bytes 2304 '\252' | tiff 48 48 8 1 1 1 2304 > frames/f3.tif
+bytes 1024 '\377' | tiff 32 32 8 1 1 1 1024 > all.tif
+series '{files: "frames/*.tif"}' '/pixel_size_um/i\  mask: all.tif'
+expect_series 'frame of another size than the mask' bad.yaml:3:9: 'all.tif is 32 x 32 pixels, f3.tif is 48 x 48'
+
 # ---- output ----------------------------------------------------------------------------------------------------------
 
 config
@@ -280,12 +355,12 @@ fi
 
 # ---- command line ----------------------------------------------------------------------------------------------------
 
-for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml --nonsense' 'new teapot' 'new' ''; do
+for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml --nonsense' 'new teapot' 'new' 'series' ''; do
   checks=$((checks + 1))
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 2 ] && [ -s stderr.txt ] || fail "arguments: $arguments"
 done
-for arguments in '--help' '--version' 'fit --help' 'new droplet' 'new cell' 'new plate' 'new crystal' 'new slab' 'new volume'; do
+for arguments in '--help' '--version' 'fit --help' 'series --help' 'new droplet' 'new cell' 'new plate' 'new crystal' 'new slab' 'new volume'; do
   checks=$((checks + 1))
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 0 ] && [ -s stdout.txt ] || fail "arguments: $arguments"

@@ -1,0 +1,82 @@
+#pragma once
+// A series: many images of one setup, each fitted by itself from where its neighbour ended, with parameters of its own and
+// shared ones (docs/configuration.md, "A series").
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "birefit/combine.h"
+#include "birefit/io.h"
+
+namespace birefit {
+
+/// One image, and what its row of the table sets.
+struct SeriesFrame {
+  struct Cell {
+    std::string text;
+    Where where;
+  };
+  std::string name;         ///< the file's name without extension, of which there is no second: the folder of its results
+  std::string file;         ///< as found, from the config's folder on
+  Where where;              ///< of the table's row, else of `files`
+  std::vector<Cell> cells;  ///< one for each of ImageSeries::columns
+};
+
+struct ImageSeries {
+  struct Column {
+    std::string name;  ///< a parameter's path
+    Where where;
+  };
+  std::filesystem::path path;
+  std::string text;                  ///< the config as read
+  std::vector<SeriesFrame> frames;   ///< by rows of the table, else by name with numbers counted as such
+  std::vector<Column> columns;       ///< of the table, `file` left out
+  std::optional<std::size_t> along;  ///< column to draw the estimates against, which then may be no parameter
+  std::vector<std::pair<std::string, Where>> shared;
+};
+
+/// Reads and checks a series completely, every image of it; throws UserError with every mistake found.
+ImageSeries load_series(const std::filesystem::path& path);
+
+/// The config of one frame, as if it were alone: it can be fitted.
+Config load_frame(const ImageSeries& series, std::size_t frame);
+
+/// Starts a frame where its neighbour ended. What has a start of its own keeps it: the centre of a prior, what is found in the image, and
+/// what the neighbour left at a bound, where derivatives may vanish.
+void start_from(Config& frame, const FitResult& neighbour);
+
+/// All that determines a frame's fit, in 16 hexadecimal digits: program, config, row, starts and the content of every file read.
+std::string fingerprint_of(const Config& frame);
+
+/// A fit as its fit.json tells it: estimates, covariance, verdicts and warnings, no images.
+struct RecordedFit {
+  std::string fingerprint;
+  FitResult result;
+};
+/// Nothing where there is no such file or it is no complete fit.json of a series.
+std::optional<RecordedFit> load_recorded_fit(const std::filesystem::path& fit_json);
+
+/// "answer", or why there is none: "ambiguous", "not identifiable", "at a bound", "not converged".
+std::string verdict_word(const FitResult& result);
+
+/// All frames with what they share settled.
+struct SeriesResult {
+  std::vector<std::optional<FitResult>> alone;  ///< each frame by itself; nothing for those not fitted yet
+  /// The same, informed about the shared parameters by all other frames. Frames without an answer stay as they were: they inform none.
+  std::vector<std::optional<FitResult>> frames;
+  std::optional<SharedEstimate> shared;
+  std::vector<std::string> warnings;
+
+  bool has_answer() const;  ///< every frame has one and they agree on what they share
+};
+SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<FitResult>> fits);
+
+/// One row a frame: file, the table's columns, every parameter with its errors, reduced chi-square and verdict.
+std::string series_csv(const ImageSeries& series, const SeriesResult& result);
+/// One row for each shared parameter; empty without any.
+std::string shared_csv(const SeriesResult& result);
+
+}  // namespace birefit

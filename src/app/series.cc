@@ -1,0 +1,227 @@
+// birefit series: fits every frame of a series, each from where its neighbour ended, and settles what they share.
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "app/output.h"
+#include "app/plot.h"
+#include "birefit/series.h"
+
+namespace birefit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string config;
+  std::string out;
+  int threads = -1;
+  bool resume = false;
+  bool quiet = false;
+};
+
+/// What a killed run left half written in a folder.
+void remove_parts(const fs::path& folder) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+    if (entry.path().extension() == ".part") fs::remove(entry.path(), ignored);
+}
+
+/// Text between double quotes of a gnuplot script.
+std::string plot_text(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+  return quoted + "\"";
+}
+
+/// "diameter (um)".
+std::string axis_label(const std::string& path, const std::string& unit) {
+  std::string name = path.substr(path.rfind('.') + 1);
+  if (name.size() == 1) name = path.substr(path.rfind('.', path.rfind('.') - 1) + 1);  // center_px.x
+  const std::string suffix = "_" + unit;
+  if (!unit.empty() && name.size() > suffix.size() && name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0) name.resize(name.size() - suffix.size());
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name + (unit.empty() ? "" : " (" + unit + ")");
+}
+
+/// Column of the table to draw against; nothing: the frames' numbers.
+std::optional<std::size_t> abscissa(const ImageSeries& series) {
+  if (series.along) return series.along;
+  return series.columns.size() == 1 ? std::optional<std::size_t>(0) : std::nullopt;
+}
+
+/// A panel for every searched parameter: estimates with 95 % intervals; limits as triangles that point to what is allowed; frames without
+/// an answer as open circles. Of a shared parameter each frame's own estimate, and the common one as a band.
+std::string script_of(const ImageSeries& series, const SeriesResult& result, const fs::path& svg) {
+  std::vector<const ParameterEstimate*> drawn;  // one frame's, for name and unit
+  for (const auto& fit : result.alone)
+    if (fit)
+      for (const ParameterEstimate& p : fit->parameters)
+        if (!p.linear && std::none_of(drawn.begin(), drawn.end(), [&](const ParameterEstimate* d) { return d->name == p.name; })) drawn.push_back(&p);
+  if (drawn.empty()) return {};
+  const auto x_column = abscissa(series);
+  const std::size_t columns = drawn.size() > 3 ? 2 : 1, rows = (drawn.size() + columns - 1) / columns;
+  const int width = columns == 1 ? 760 : 1160, height = static_cast<int>(60 + 230 * rows);
+  // Margins in pixels: the same whatever the number of panels.
+  std::string script = fmt::format(
+      "set terminal svg size {},{} dynamic font 'sans,13' background rgb 'white'\nset output {}\n"
+      "set grid lc rgb '#e4e4e4' lt 1\nset border lw 1.1\nset tics nomirror\nunset key\nset offsets graph 0.02, graph 0.02, graph 0.06, graph 0.06\n"
+      "set bars 0.6\nset multiplot layout {},{} margins {:.4f},{:.4f},{:.4f},{:.4f} spacing {:.4f},{:.4f}\n",
+      width, height, plot_path(svg), rows, columns, 95.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 100.0 / width, 34.0 / height);
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    const std::string& name = drawn[k]->name;
+    const bool shared = result.shared && std::find(result.shared->posterior.names.begin(), result.shared->posterior.names.end(), name) != result.shared->posterior.names.end();
+    std::string points, limits[2], doubtful;
+    double low_x = std::numeric_limits<double>::infinity(), high_x = -low_x;
+    for (std::size_t i = 0; i < series.frames.size(); ++i) {
+      const auto& fit = shared ? result.alone[i] : result.frames[i];
+      const double x = x_column ? std::stod(series.frames[i].cells[*x_column].text) : static_cast<double>(i + 1);
+      low_x = std::min(low_x, x), high_x = std::max(high_x, x);
+      if (!fit) continue;
+      for (const ParameterEstimate& p : fit->parameters) {
+        if (p.name != name || !std::isfinite(p.value)) continue;
+        if (!fit->has_answer() || (p.limit.empty() && !std::isfinite(p.interval95_low))) doubtful += fmt::format("{:.10g} {:.10g}\n", x, p.value);
+        else if (!p.limit.empty()) limits[p.limit == "lower"] += fmt::format("{:.10g} {:.10g}\n", x, p.limit_value);
+        else points += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, p.value, p.interval95_low, p.interval95_high);
+      }
+    }
+    std::string plot;
+    const auto add = [&](const std::string& label, const std::string& data, const std::string& style) {
+      if (data.empty()) return;
+      script += fmt::format("${}{} << EOD\n{}EOD\n", label, k, data);
+      plot += fmt::format("{}${}{} {}", plot.empty() ? "" : ", ", label, k, style);
+    };
+    if (shared) {
+      const Posterior& all = result.shared->posterior;
+      const auto at = std::find(all.names.begin(), all.names.end(), name) - all.names.begin();
+      const double value = all.mean[at], half = interval95_factor(all.degrees_of_freedom) * std::sqrt(all.covariance(at, at));
+      std::string band;
+      for (const double x : {low_x, high_x}) band += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, value, value - half, value + half);
+      add("band", band, "using 1:3:4 with filledcurves fc rgb '#56B4E9' fs transparent solid 0.4 noborder");
+      plot += fmt::format(", $band{} using 1:2 with lines lc rgb '#0072B2' lw 1.4", k);
+    }
+    add("doubtful", doubtful, "with points pt 6 ps 0.7 lw 1.3 lc rgb '#999999'");
+    add("points", points, "with yerrorbars pt 7 ps 0.5 lw 1.2 lc rgb '#000000'");
+    add("below", limits[0], "with points pt 11 ps 0.8 lc rgb '#D55E00'");
+    add("above", limits[1], "with points pt 9 ps 0.8 lc rgb '#D55E00'");
+    const bool lowest = k + columns >= drawn.size();
+    const std::string x_label = x_column ? axis_label(series.columns[*x_column].name, "") : "frame";
+    script += fmt::format("set ylabel {} noenhanced offset 1,0\nset xlabel {} noenhanced\n", plot_text(axis_label(name, drawn[k]->unit) + (shared ? ", shared" : "")),
+                          plot_text(lowest ? x_label : ""));
+    // A panel without a point keeps its place.
+    script += plot.empty() ? "set multiplot next\n" : "plot " + plot + "\n";
+  }
+  return script + "unset multiplot\n";
+}
+
+/// Counts of verdicts and warnings, and what is shared.
+std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
+  std::map<std::string, std::size_t> verdicts, warnings;
+  for (const auto& fit : result.frames) {
+    ++verdicts[fit ? verdict_word(*fit) : "not done"];
+    if (fit)
+      for (const std::string& warning : fit->warnings) ++warnings[warning];
+  }
+  std::string text = fmt::format("{} frames:", series.frames.size());
+  std::string separator = " ";
+  for (const auto& [verdict, count] : verdicts) text += fmt::format("{}{} {}", separator, count, verdict), separator = ", ";
+  text += "\n";
+  if (result.shared) {
+    const SharedEstimate& shared = *result.shared;
+    const double t = interval95_factor(shared.posterior.degrees_of_freedom);
+    for (std::size_t i = 0; i < shared.posterior.names.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(i);
+      const double value = shared.posterior.mean[at], error = std::sqrt(shared.posterior.covariance(at, at));
+      const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 12);
+      text += fmt::format("  {} = {:.{}f} +/- {:.2g} [95%: {:.{}f} .. {:.{}f}], shared by {} frames\n", shared.posterior.names[i], value, digits, error, value - t * error,
+                          digits, value + t * error, digits, shared.fits);
+    }
+    text += fmt::format("  the frames' own values about the shared ones: chi-square {:.4g} for {} degrees of freedom\n", shared.chi_square, shared.chi_square_degrees);
+  }
+  for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
+  constexpr std::size_t kListed = 8;
+  std::size_t listed = 0;
+  for (const auto& [warning, count] : warnings) {
+    if (listed++ == kListed) return text + fmt::format("and {} more warnings, in the frames' reports\n", warnings.size() - kListed);
+    text += fmt::format("warning ({}): {}\n", count == 1 ? "1 frame" : fmt::format("{} frames", count), warning);
+  }
+  return text;
+}
+
+int run_series(const Arguments& arguments) {
+  const ImageSeries series = load_series(arguments.config);
+  const fs::path out = arguments.out.empty() ? fs::path(arguments.config).stem().string() + "-series" : arguments.out;
+  std::error_code code;
+  if (!arguments.resume && (fs::exists(out / "frames", code) || fs::exists(out / "series.csv", code)))
+    throw UserError({out.string()}, "holds a series already", "--resume goes on with it and keeps what is up to date; another --out leaves it alone");
+  OutputFolder folder(out);
+
+  remove_parts(out);
+
+  const Interrupt interrupt;
+  const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
+  std::vector<std::optional<FitResult>> fits(series.frames.size());
+  const FitResult* neighbour = nullptr;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < series.frames.size() && !interrupt.flag(); ++i) {
+    Config config = load_frame(series, i);
+    if (neighbour) start_from(config, *neighbour);
+    config.fingerprint = fingerprint_of(config);
+    const fs::path place = out / "frames" / series.frames[i].name;
+    remove_parts(place);
+    std::optional<RecordedFit> record = load_recorded_fit(place / "fit.json");
+    if (record && record->fingerprint == config.fingerprint) {
+      ++kept;
+    } else {
+      if (arguments.threads >= 0) config.job.options.threads = arguments.threads;
+      config.job.options.interrupted = &interrupt.flag();
+      const std::string at = fmt::format("{} of {}: {}", i + 1, series.frames.size(), series.frames[i].name);
+      if (terminal) config.job.options.progress = [&](const std::string& line) { std::cerr << "\r\033[K" << at << ": " << line << std::flush; };
+      const FitResult result = fit(config.job);
+      if (result.interrupted) break;  // the next run does it whole
+      write_results(place, config, result);
+      // What is read back is all that later runs will know of it.
+      record = load_recorded_fit(place / "fit.json");
+      if (!record) throw std::logic_error("fit.json cannot be read back");
+    }
+    fits[i] = std::move(record->result);
+    if (fits[i]->has_answer()) neighbour = &*fits[i];
+  }
+  if (terminal) std::cerr << "\r\033[K" << std::flush;
+
+  const SeriesResult result = settle_series(series, std::move(fits));
+  write_file(out / "series.csv", series_csv(series, result));
+  if (const std::string shared = shared_csv(result); !shared.empty()) write_file(out / "shared.csv", shared);
+  folder.keep();
+  const fs::path drawing = out / ".series.svg.part";
+  if (const std::string script = script_of(series, result, drawing); !script.empty() && draw(script)) fs::rename(drawing, out / "series.svg", code);
+  if (!arguments.quiet) {
+    if (kept > 0) std::cout << kept << " frames were up to date\n";
+    std::cout << summary_of(series, result) << "Table: " << (out / "series.csv").string() << "\n";
+  }
+  return result.has_answer() ? kExitDone : kExitNoAnswer;
+}
+
+}  // namespace
+
+Command add_series_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("series", "fit every image of a series, with parameters of its own and shared ones");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("CONFIG", arguments->config, "the config (YAML), with micrographs: {files: ..}")->required();
+  command->add_option("--out", arguments->out, "folder for the results; default: the config's name + \"-series\", here");
+  command->add_flag("--resume", arguments->resume, "go on with the series in that folder: frames that are up to date stay");
+  add_threads_option(*command, arguments->threads);
+  command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
+  return {command, [arguments] { return run_series(*arguments); }};
+}
+
+}  // namespace birefit

@@ -1,0 +1,343 @@
+#include "birefit/series.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "io/config_reader.h"
+#include "io/config_series.h"
+
+namespace birefit {
+namespace {
+
+using nlohmann::json;
+constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+
+/// FNV-1a (Fowler, Noll, Vo): tells accidental changes apart, which is all that is asked.
+class Digest {
+ public:
+  void add(std::string_view bytes) {
+    add_number(bytes.size());
+    for (const char c : bytes) add_byte(static_cast<unsigned char>(c));
+  }
+  void add(double value) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &value, sizeof bits);
+    add_number(bits);
+  }
+  void add_file(const std::filesystem::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    std::uint64_t size = 0;
+    std::array<char, 65536> buffer;
+    while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
+      for (std::streamsize i = 0; i < stream.gcount(); ++i) add_byte(static_cast<unsigned char>(buffer[static_cast<std::size_t>(i)]));
+      size += static_cast<std::uint64_t>(stream.gcount());
+    }
+    add_number(size);
+  }
+  std::string text() const { return fmt::format("{:016x}", state_); }
+
+ private:
+  void add_number(std::uint64_t number) {
+    for (int i = 0; i < 8; ++i) add_byte(static_cast<unsigned char>(number >> (8 * i)));
+  }
+  void add_byte(unsigned char byte) { state_ = (state_ ^ byte) * 1099511628211u; }
+  std::uint64_t state_ = 14695981039346656037u;
+};
+
+/// JSON's null is what has no value.
+double number(const json& value) { return value.is_null() ? kNotKnown : value.get<double>(); }
+
+Posterior posterior_of(const FitResult& fit) {
+  Posterior all{fit.names, Eigen::VectorXd::Constant(std::ssize(fit.names), kNotKnown), fit.covariance, fit.interval_degrees_of_freedom};
+  for (const ParameterEstimate& p : fit.parameters)
+    for (std::size_t i = 0; i < fit.names.size(); ++i)
+      if (fit.names[i] == p.name) all.mean[static_cast<Eigen::Index>(i)] = p.value;
+  return all;
+}
+
+/// What the config itself knows of the shared parameters, the same in every frame.
+std::optional<Posterior> shared_prior(const Config& frame, const std::vector<std::string>& names) {
+  const std::optional<JointPrior>& joint = frame.job.prior;
+  Posterior prior;
+  prior.degrees_of_freedom = std::numeric_limits<double>::infinity();
+  std::vector<double> mean, variance;
+  for (const std::string& name : names) {
+    const Parameter& parameter = frame.job.parameters[frame.job.parameters.find(name)];
+    if (!parameter.prior_sd) continue;
+    prior.names.push_back(name);
+    mean.push_back(parameter.value);
+    variance.push_back(*parameter.prior_sd * *parameter.prior_sd);
+  }
+  const auto single = std::ssize(mean);
+  const bool correlated = joint && std::find(names.begin(), names.end(), joint->names.front()) != names.end();
+  const Eigen::Index all = single + (correlated ? joint->mean.size() : 0);
+  if (all == 0) return std::nullopt;
+  prior.mean.resize(all);
+  prior.covariance = Eigen::MatrixXd::Zero(all, all);
+  for (Eigen::Index i = 0; i < single; ++i) prior.mean[i] = mean[static_cast<std::size_t>(i)], prior.covariance(i, i) = variance[static_cast<std::size_t>(i)];
+  if (correlated) {
+    prior.names.insert(prior.names.end(), joint->names.begin(), joint->names.end());
+    prior.mean.tail(joint->mean.size()) = joint->mean;
+    prior.covariance.bottomRightCorner(joint->mean.size(), joint->mean.size()) = joint->covariance;
+    prior.degrees_of_freedom = joint->degrees_of_freedom;
+  }
+  return prior;
+}
+
+void check_shared(const ImageSeries& series, const Config& frame) {
+  Problems problems;
+  std::vector<std::string> fitted;
+  const ParameterTable& table = frame.job.parameters;
+  for (int i = 0; i < table.size(); ++i)
+    if (table[i].free) fitted.push_back(table[i].name);
+  for (const auto& [name, where] : series.shared) {
+    if (std::find(fitted.begin(), fitted.end(), name) != fitted.end()) continue;
+    const std::string near = nearest_word(name, fitted);
+    const bool known = static_cast<bool>(table.find(name));
+    problems.add(where, name + (known ? " is not fitted here" : " is no parameter of this config"),
+                 known          ? "give it {value: .., fit: [low, high]}"
+                 : near.empty() ? "fitted here: " + list_words(fitted)
+                                : "did you mean " + near + "?");
+  }
+  // A prior between a shared parameter and one of each frame's own would be counted once a frame.
+  if (frame.job.prior) {
+    const auto is_shared = [&](const std::string& name) {
+      return std::any_of(series.shared.begin(), series.shared.end(), [&](const auto& s) { return s.first == name; });
+    };
+    const auto& names = frame.job.prior->names;
+    const auto shared = std::find_if(names.begin(), names.end(), is_shared), own = std::find_if_not(names.begin(), names.end(), is_shared);
+    if (shared != names.end() && own != names.end())
+      problems.add({series.path.string()}, "prior connects " + *shared + ", which is shared, with " + *own + ", which each frame has for itself",
+                   "share both or neither");
+  }
+  problems.throw_if_any();
+}
+
+std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.10g}", value) : std::string(); }
+
+/// Text as a field of CSV (RFC 4180).
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+/// value, stderr, low95, high95; of a limit only the side that is known.
+std::string cells(const ParameterEstimate& p) {
+  const bool limited = !p.limit.empty();
+  return cell(p.value) + "," + (limited ? "" : cell(p.stderr_)) + "," +
+         (!limited ? cell(p.interval95_low) : p.limit == "lower" ? cell(p.limit_value) : "") + "," +
+         (!limited ? cell(p.interval95_high) : p.limit == "upper" ? cell(p.limit_value) : "");
+}
+
+}  // namespace
+
+ImageSeries load_series(const std::filesystem::path& path) {
+  ImageSeries series = read_series(path, read_text(path));
+  // What is wrong with the config shows in the first frame; once that is sound, the others' mistakes are their own.
+  check_shared(series, load_frame(series, 0));
+  constexpr std::size_t kMostProblems = 50;
+  Problems problems;
+  for (std::size_t i = 1; i < series.frames.size() && problems.all().size() < kMostProblems; ++i) {
+    try {
+      check_frame(series, i);
+    } catch (const UserError& error) {
+      problems.add(error);
+    }
+  }
+  problems.throw_if_any();
+  return series;
+}
+
+void start_from(Config& frame, const FitResult& neighbour) {
+  for (const ParameterEstimate& p : neighbour.parameters) {
+    const ParameterRef ref = frame.job.parameters.find(p.name);
+    if (!ref || p.at_bound || !p.limit.empty() || !std::isfinite(p.value)) continue;
+    Parameter& parameter = frame.job.parameters[ref];
+    const auto& joint = frame.job.prior;
+    const bool prior = parameter.prior_sd || (joint && std::find(joint->names.begin(), joint->names.end(), p.name) != joint->names.end());
+    if (!parameter.free || parameter.linear || parameter.automatic || prior) continue;
+    parameter.value = std::clamp(p.value, parameter.lower, parameter.upper);
+  }
+}
+
+std::string fingerprint_of(const Config& frame) {
+  Digest digest;
+  digest.add(BIREFIT_VERSION);
+  digest.add(frame.text);
+  const ParameterTable& table = frame.job.parameters;  // the row's numbers and the starts are in it
+  for (int i = 0; i < table.size(); ++i) {
+    digest.add(table[i].name);
+    for (const double number : {table[i].value, table[i].lower, table[i].upper, table[i].free ? 1.0 : 0.0}) digest.add(number);
+  }
+  for (const std::filesystem::path& file : frame.inputs) {
+    digest.add(file.string());
+    digest.add_file(file);
+  }
+  return digest.text();
+}
+
+std::optional<RecordedFit> load_recorded_fit(const std::filesystem::path& fit_json) {
+  std::ifstream stream(fit_json, std::ios::binary);
+  if (!stream) return std::nullopt;
+  try {
+    const json root = json::parse(stream);
+    RecordedFit record;
+    record.fingerprint = root.at("fingerprint");
+    FitResult& fit = record.result;
+    fit.converged = root.at("converged");
+    fit.interrupted = root.at("interrupted");
+    fit.ambiguous = root.at("ambiguous");
+    fit.identifiable = root.at("identifiable");
+    fit.pinned = root.at("pinned");
+    fit.verdict = root.at("verdict");
+    fit.interval_degrees_of_freedom = root.at("interval_degrees_of_freedom").is_null() ? std::numeric_limits<double>::infinity()
+                                                                                       : root.at("interval_degrees_of_freedom").get<double>();
+    fit.chi_square = number(root.at("chi_square"));
+    fit.reduced_chi_square = number(root.at("reduced_chi_square"));
+    fit.degrees_of_freedom = root.at("degrees_of_freedom");
+    fit.warnings = root.at("warnings");
+    fit.names = root.at("covariance").at("names");
+    const json& matrix = root.at("covariance").at("matrix");
+    const auto n = static_cast<Eigen::Index>(fit.names.size());
+    fit.covariance.resize(n, n);
+    for (std::size_t i = 0; i < fit.names.size(); ++i)
+      for (std::size_t j = 0; j < fit.names.size(); ++j)
+        fit.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = number(matrix.at(i).at(j));
+    for (const std::string& name : fit.names) {
+      const json& entry = root.at("parameters").at(name);
+      ParameterEstimate p;
+      p.name = name;
+      p.unit = entry.at("unit");
+      p.value = number(entry.at("value"));
+      p.stderr_ = number(entry.at("stderr"));
+      p.interval95_low = number(entry.at("interval_95").at(0));
+      p.interval95_high = number(entry.at("interval_95").at(1));
+      p.at_bound = entry.at("at_bound");
+      p.linear = entry.at("linear");
+      if (!entry.at("limit").is_null()) {
+        p.limit = entry.at("limit").at("side");
+        p.limit_value = number(entry.at("limit").at("value"));
+      }
+      fit.parameters.push_back(std::move(p));
+    }
+    return record;
+  } catch (const json::exception&) {
+    return std::nullopt;
+  }
+}
+
+std::string verdict_word(const FitResult& result) {
+  if (!result.converged || result.interrupted) return "not converged";
+  if (result.ambiguous) return "ambiguous";
+  if (!result.identifiable) return "not identifiable";
+  return result.pinned ? "at a bound" : "answer";
+}
+
+bool SeriesResult::has_answer() const {
+  return std::all_of(frames.begin(), frames.end(), [](const auto& fit) { return fit && fit->has_answer(); });
+}
+
+SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<FitResult>> fits) {
+  SeriesResult result;
+  result.frames = fits;
+  result.alone = std::move(fits);
+  if (series.shared.empty()) return result;
+  std::vector<std::string> names;
+  for (const auto& [name, unused] : series.shared) names.push_back(name);
+
+  std::vector<Posterior> posteriors;
+  std::vector<bool> heard(result.alone.size(), false);
+  std::size_t done = 0;
+  for (std::size_t i = 0; i < result.alone.size(); ++i) {
+    if (!result.alone[i]) continue;
+    ++done;
+    const FitResult& fit = *result.alone[i];
+    const bool limited = std::any_of(fit.parameters.begin(), fit.parameters.end(), [&](const ParameterEstimate& p) {
+      return !p.limit.empty() && std::find(names.begin(), names.end(), p.name) != names.end();
+    });
+    if (!fit.has_answer() || limited) continue;
+    if (auto one = marginal(posterior_of(fit), names)) {
+      posteriors.push_back(std::move(*one));
+      heard[i] = true;
+    }
+  }
+  if (posteriors.size() < done)
+    result.warnings.push_back(fmt::format("{} of {} frames say nothing of the shared parameters: they have no answer, or only a limit.",
+                                          done - posteriors.size(), done));
+  if (posteriors.empty()) return result;
+  const SharedEstimate shared = combine(posteriors, shared_prior(load_frame(series, 0), names));
+  if (!shared.consistent)
+    result.warnings.push_back(fmt::format("The frames disagree on what they share: chi-square {:.4g} for {} degrees of freedom. Its error is enlarged by the root of their "
+                                          "ratio; a parameter of each frame's own, or a model error that differs between frames, may be the cause.",
+                                          shared.chi_square, shared.chi_square_degrees));
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    if (!heard[i]) continue;
+    FitResult& fit = *result.frames[i];
+    const Posterior all = informed(posterior_of(fit), shared);
+    const double t = interval95_factor(all.degrees_of_freedom);
+    fit.covariance = all.covariance;
+    for (ParameterEstimate& p : fit.parameters) {
+      if (!p.limit.empty()) continue;
+      const auto at = std::find(all.names.begin(), all.names.end(), p.name) - all.names.begin();
+      p.value = all.mean[at];
+      p.stderr_ = std::sqrt(all.covariance(at, at));
+      p.interval95_low = p.value - t * p.stderr_;
+      p.interval95_high = p.value + t * p.stderr_;
+    }
+  }
+  result.shared = shared;
+  return result;
+}
+
+std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
+  // A frame may lack a parameter that others have: of several branches each takes its own.
+  std::vector<std::string> names;
+  for (const auto& fit : result.frames)
+    if (fit)
+      for (const ParameterEstimate& p : fit->parameters)
+        if (std::find(names.begin(), names.end(), p.name) == names.end()) names.push_back(p.name);
+  std::string text = "file";
+  for (const ImageSeries::Column& column : series.columns) text += "," + field(column.name);
+  for (const std::string& name : names) text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", name);
+  text += ",reduced_chi_square,verdict\n";
+  for (std::size_t i = 0; i < series.frames.size(); ++i) {
+    const auto& fit = result.frames[i];
+    text += field(series.frames[i].file);
+    for (const SeriesFrame::Cell& given : series.frames[i].cells) text += "," + field(given.text);
+    for (const std::string& name : names) {
+      const ParameterEstimate* estimate = nullptr;
+      if (fit)
+        for (const ParameterEstimate& p : fit->parameters)
+          if (p.name == name) estimate = &p;
+      text += "," + (estimate ? cells(*estimate) : ",,,");
+    }
+    text += fit ? fmt::format(",{},{}\n", cell(fit->reduced_chi_square), verdict_word(*fit)) : ",,not done\n";
+  }
+  return text;
+}
+
+std::string shared_csv(const SeriesResult& result) {
+  if (!result.shared) return {};
+  const SharedEstimate& shared = *result.shared;
+  const double t = interval95_factor(shared.posterior.degrees_of_freedom);
+  std::string text = "parameter,value,stderr,low95,high95,frames,chi_square,chi_square_degrees,consistent\n";
+  for (std::size_t i = 0; i < shared.posterior.names.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double value = shared.posterior.mean[at], error = std::sqrt(shared.posterior.covariance(at, at));
+    text += fmt::format("{},{},{},{},{},{},{},{},{}\n", shared.posterior.names[i], cell(value), cell(error), cell(value - t * error), cell(value + t * error),
+                        shared.fits, cell(shared.chi_square), shared.chi_square_degrees, shared.consistent ? "yes" : "no");
+  }
+  return text;
+}
+
+}  // namespace birefit

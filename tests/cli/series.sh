@@ -1,0 +1,153 @@
+#!/usr/bin/env bash
+# A series from outside: a killed and resumed run leaves what an uninterrupted one does, nothing is fitted twice or lost.
+# usage: series.sh BIREFIT SOURCE_DIR
+set -u
+birefit=$(realpath "$1")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+fail() { echo "FAIL $1"; failures=$((failures + 1)); }
+
+# A crystal of half-wave voltage 1500 V between crossed polarizers, its field 40 % stronger at one electrode and weaker at the
+# other: sin^2(pi/2 V/1500 (1 + 0.4 t)), 8 bit, gain 200, offset 20, noise 3.
+expose() { # FILE VOLTS SEED
+  {
+    # TIFF, 48 x 48, one strip behind the header
+    printf 'II*\0\10\0\0\0\11\0\0\1\4\0\1\0\0\0\60\0\0\0\1\1\4\0\1\0\0\0\60\0\0\0\2\1\3\0\1\0\0\0\10\0\0\0\3\1\3\0\1\0\0\0\1\0\0\0'
+    printf '\6\1\3\0\1\0\0\0\1\0\0\0\21\1\4\0\1\0\0\0\172\0\0\0\25\1\3\0\1\0\0\0\1\0\0\0\26\1\4\0\1\0\0\0\60\0\0\0\27\1\4\0\1\0\0\0\0\11\0\0\0\0\0\0'
+    printf "$(awk -v volts="$2" -v seed="$3" 'BEGIN {
+      srand(seed)
+      for (y = 0; y < 48; ++y) for (x = 0; x < 48; ++x) {
+        s = sin(1.5707963268 * volts / 1500 * (1 + 0.4 * (2 * (y + 0.5) / 48 - 1)))
+        noise = -6
+        for (k = 0; k < 12; ++k) noise += rand()
+        printf "\\%03o", int(20.5 + 200 * s * s + 3 * noise)
+      }
+    }')"
+  } > "$1"
+}
+mkdir frames
+echo 'file,time_s,sample.crystal.bias_v' > frames.csv
+for i in 1 2 3 4 5 6 7 8 9 10; do
+  volts=$((600 + 30 * i))
+  expose frames/f$i.tif $volts $i
+  echo "f$i.tif,$((10 * i)),$volts" >> frames.csv
+done
+cat > series.yaml <<'YAML'
+micrographs: {files: "frames/*.tif", set_from: frames.csv, along: time_s, shared: ["sample.crystal.field_legendre[1]"]}
+micrograph:
+  gain: {fit: auto}
+  offset: {fit: auto}
+sample:
+  crystal:
+    half_wave_voltage_v: {value: 1400, fit: [1000, 2500]}
+    bias_v: 700
+    field_along: y
+    electrodes_px: [-0.5, 47.5]
+    field_legendre: [{value: 0.3, fit: [0.1, 0.7]}]
+microscope:
+  light: {wavelength_nm: 1550}
+  polarizer_deg: 0
+  analyzer_deg: 90
+YAML
+
+run() { "$birefit" series series.yaml --threads 1 "$@" > stdout.txt 2> stderr.txt; }
+same() { cmp -s whole/series.csv "$1/series.csv" && cmp -s whole/shared.csv "$1/shared.csv" && cmp -s whole/series.svg "$1/series.svg"; }
+done_in() { find "$1/frames" -name fit.json 2> /dev/null | wc -l; }
+
+# ---- a whole run -----------------------------------------------------------------------------------------------------
+
+run --out whole || { fail "exit code $?"; cat stdout.txt stderr.txt; }
+[ "$(wc -l < whole/series.csv)" -eq 11 ] || fail 'not a row for each frame'
+[ "$(done_in whole)" -eq 10 ] || fail 'not a fit.json for each frame'
+# Every estimate within five of its errors of what the images were made with, and f10 behind f9.
+awk -F, '
+  NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; next }
+  function off(name, truth, d) { d = ($(at[name]) - truth) / $(at[name "_stderr"]); return !($(at[name "_stderr"]) > 0) || d > 5 || d < -5 }
+  $1 != "frames/f" NR - 1 ".tif" || $(at["time_s"]) != 10 * (NR - 1) || $NF != "answer" { print; bad = 1 }
+  off("sample.crystal.half_wave_voltage_v", 1500) || off("sample.crystal.field_legendre[1]", 0.4) { print; bad = 1 }
+  !($(at["sample.crystal.half_wave_voltage_v_low95"]) < $(at["sample.crystal.half_wave_voltage_v"])) { print; bad = 1 }
+  NR > 2 && $(at["sample.crystal.field_legendre[1]"]) != before { print "not shared: " $0; bad = 1 }
+  { before = $(at["sample.crystal.field_legendre[1]"]) }
+  END { exit bad || NR != 11 }' whole/series.csv || fail 'series.csv'
+if command -v gnuplot > /dev/null; then
+  grep -q '</svg>' whole/series.svg || fail 'no series.svg'
+  [ -s stderr.txt ] && fail "something on stderr: $(cat stderr.txt)"
+fi
+
+# ---- a second run does not touch it -----------------------------------------------------------------------------------
+
+find whole -type f -exec md5sum {} + | sort > before.txt
+run --out whole
+[ $? -eq 2 ] && grep -q '^whole: holds a series already; --resume' stderr.txt || fail 'a folder in use'
+find whole -type f -exec md5sum {} + | sort | cmp -s - before.txt || fail 'a refused run changed something'
+run --out whole --resume || fail 'resume of a whole run'
+grep -q '^10 frames were up to date' stdout.txt || fail 'a whole run was fitted again'
+find whole -type f -exec md5sum {} + | sort | cmp -s - before.txt || fail 'resuming a whole run changed something'
+
+# ---- killed, then resumed ---------------------------------------------------------------------------------------------
+
+"$birefit" series series.yaml --threads 1 --out killed > /dev/null 2>&1 &
+pid=$!
+for ((k = 0; k < 2000; ++k)); do
+  [ "$(done_in killed)" -ge 2 ] && break
+  sleep 0.005
+done
+kill -9 $pid
+wait $pid 2> /dev/null
+finished=$(done_in killed)
+[ "$finished" -ge 2 ] && [ "$finished" -lt 10 ] || fail "killed after $finished frames"
+find killed -name fit.json -exec stat -c '%n %i %y' {} + | sort > before.txt
+# What a kill between two system calls may leave.
+echo '{"version": ' > killed/frames/f1/.fit.json.1.0.part
+run --out killed --resume || fail "resume: exit code $?"
+same killed || fail 'a resumed run differs from an uninterrupted one'
+grep -q "^$finished frames were up to date" stdout.txt || fail "of $finished finished frames: $(head -1 stdout.txt)"
+find killed -name fit.json -exec stat -c '%n %i %y' {} + | sort > after.txt
+[ "$(comm -12 before.txt after.txt | wc -l)" -eq "$finished" ] || fail 'a finished frame was written again'
+find killed -name '*.part' | grep -q . && fail 'leftovers of the killed run'
+
+# ---- half a record is no record ---------------------------------------------------------------------------------------
+
+cp -r whole damaged
+head -c 1000 whole/frames/f4/fit.json > damaged/frames/f4/fit.json
+rm damaged/frames/f9/fit.json damaged/series.csv
+run --out damaged --resume || fail 'resume of a damaged run'
+same damaged && grep -q '^8 frames were up to date' stdout.txt || fail "damaged records: $(head -1 stdout.txt)"
+
+# ---- Ctrl-C -----------------------------------------------------------------------------------------------------------
+
+"$birefit" series series.yaml --threads 1 --out stopped > /dev/null 2>&1 &
+pid=$!
+for ((k = 0; k < 2000; ++k)); do
+  [ "$(done_in stopped)" -ge 2 ] && break
+  sleep 0.005
+done
+kill -INT $pid
+wait $pid
+[ $? -eq 1 ] || fail 'exit code after Ctrl-C'
+finished=$(done_in stopped)
+[ "$(wc -l < stopped/series.csv)" -eq 11 ] && [ "$(grep -c ',not done$' stopped/series.csv)" -eq $((10 - finished)) ] || fail 'series.csv after Ctrl-C'
+run --out stopped --resume && same stopped || fail 'resume after Ctrl-C'
+
+# ---- what changed is fitted again -------------------------------------------------------------------------------------
+
+cp -r whole changed
+expose frames/f10.tif 900 77
+run --out changed --resume || fail 'resume with another image'
+grep -q '^9 frames were up to date' stdout.txt || fail "another image: $(head -1 stdout.txt)"
+cmp -s whole/series.csv changed/series.csv && fail 'another image, the same table'
+expose frames/f11.tif 930 11
+echo 'f11.tif,110,930' >> frames.csv
+run --out changed --resume || fail 'resume with one more frame'
+grep -q '^10 frames were up to date' stdout.txt && [ "$(wc -l < changed/series.csv)" -eq 12 ] || fail "one more frame: $(head -1 stdout.txt)"
+
+# ---- frames without an answer stay ------------------------------------------------------------------------------------
+
+sed 's/fit: \[1000, 2500\]/fit: [1000, 1450]/' series.yaml > pinned.yaml
+"$birefit" series pinned.yaml --threads 1 --quiet --out pinned > stdout.txt 2> stderr.txt
+[ $? -eq 1 ] && [ "$(grep -c ',at a bound$' pinned/series.csv)" -eq 11 ] || fail 'frames at a bound'
+
+[ $failures -eq 0 ] && echo 'all as required' || echo "$failures failures"
+exit $((failures > 0))
