@@ -34,6 +34,32 @@ microscope:
   objective_na: 0.8
 )";
 
+const char* const kSeries = R"(# A time series of droplets, a fit each: birefit series THIS_FILE --out DIR [--resume]
+micrographs:
+  files: "frames/*.tif"        # in natural order: frame2 before frame10
+  # set_from: frames.csv       # columns file, then parameter paths: what is known for each frame
+  # along: time_s              # the column that the plot is drawn against; it need not be a parameter
+  # shared: [sample.droplet.diameter_um]   # fitted, the same in all frames; everything else marked `fit` is each frame's own
+micrograph:
+  pixel_size_um: 0.05          # of the sample, not of the camera
+  gain: {fit: auto}            # counts = gain * intensity + offset
+  offset: {fit: auto}
+  center_px: {fit: auto}       # found in each image
+sample:
+  droplet:
+    diameter_um: {value: 9.3, fit: [8.5, 10.0]}
+    director: {radial: {}}
+  material:
+    ordinary: 1.52
+    birefringence: {value: 0.2, fit: [0.1, 0.3]}
+  surround: {index: 1.43}
+microscope:
+  light: {wavelength_nm: 590}
+  polarizer_deg: 0
+  analyzer_deg: 90
+  objective_na: 0.8
+)";
+
 const char* const kCell = R"(# A flat cell seen along its normal, for example 90 degrees twisted nematic.
 micrograph:
   image: cell.tif
@@ -214,7 +240,7 @@ Command add_new_command(CLI::App& app) {
   command->add_option("KIND", *kind, "droplet, shell, cell, freedericksz, plate, crystal, slab, disc or volume")->required();
   return {command, [kind] {
             const std::map<std::string, const char*> templates = {
-                {"droplet", kDroplet}, {"shell", kShell}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}, {"volume", kVolume}};
+                {"droplet", kDroplet}, {"shell", kShell}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}, {"volume", kVolume}, {"series", kSeries}};
             const auto found = templates.find(*kind);
             if (found == templates.end())
               throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, shell, cell, freedericksz, plate, crystal, slab, disc, volume");

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -43,14 +44,23 @@ std::string plot_text(const std::string& text) {
   return quoted + "\"";
 }
 
-/// "diameter (um)".
-std::string axis_label(const std::string& path, const std::string& unit) {
-  std::string name = path.substr(path.rfind('.') + 1);
-  if (name.size() == 1) name = path.substr(path.rfind('.', path.rfind('.') - 1) + 1);  // center_px.x
-  const std::string suffix = "_" + unit;
-  if (!unit.empty() && name.size() > suffix.size() && name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0) name.resize(name.size() - suffix.size());
+/// "diameter (um)" of sample.droplet.diameter_um: the unit is part of every name.
+std::string axis_label(const std::string& path) {
+  const std::size_t dot = path.rfind('.');
+  std::string name = path.substr(dot + 1);
+  if (name.size() == 1 && dot != std::string::npos) return axis_label(path.substr(0, dot)) + ", " + name;  // "center (px), x"
+  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_v_per_um", "V/um"}, {"_mm2_s", "mm2/s"}, {"_per_k", "1/K"}, {"_um", "um"}, {"_nm", "nm"}, {"_cm", "cm"},
+                                                                      {"_mm", "mm"}, {"_deg", "degrees"}, {"_rad", "rad"}, {"_px", "px"}, {"_pn", "pN"}, {"_min", "min"},
+                                                                      {"_k", "K"}, {"_v", "V"}, {"_s", "s"}, {"_h", "h"}};
+  std::string unit;
+  for (const auto& [suffix, word] : kUnits)
+    if (name.size() > suffix.size() && name.ends_with(suffix)) {
+      name.resize(name.size() - suffix.size());
+      unit = fmt::format(" ({})", word);
+      break;
+    }
   std::replace(name.begin(), name.end(), '_', ' ');
-  return name + (unit.empty() ? "" : " (" + unit + ")");
+  return name + unit;
 }
 
 /// Column of the table to draw against; nothing: the frames' numbers.
@@ -62,11 +72,11 @@ std::optional<std::size_t> abscissa(const ImageSeries& series) {
 /// A panel for every searched parameter: estimates with 95 % intervals; limits as triangles that point to what is allowed; frames without
 /// an answer as open circles. Of a shared parameter each frame's own estimate, and the common one as a band.
 std::string script_of(const ImageSeries& series, const SeriesResult& result, const fs::path& svg) {
-  std::vector<const ParameterEstimate*> drawn;  // one frame's, for name and unit
+  std::vector<std::string> drawn;
   for (const auto& fit : result.alone)
     if (fit)
       for (const ParameterEstimate& p : fit->parameters)
-        if (!p.linear && std::none_of(drawn.begin(), drawn.end(), [&](const ParameterEstimate* d) { return d->name == p.name; })) drawn.push_back(&p);
+        if (!p.linear && std::find(drawn.begin(), drawn.end(), p.name) == drawn.end()) drawn.push_back(p.name);
   if (drawn.empty()) return {};
   const auto x_column = abscissa(series);
   const std::size_t columns = drawn.size() > 3 ? 2 : 1, rows = (drawn.size() + columns - 1) / columns;
@@ -74,11 +84,11 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result, con
   // Margins in pixels: the same whatever the number of panels.
   std::string script = fmt::format(
       "set terminal svg size {},{} dynamic font 'sans,13' background rgb 'white'\nset output {}\n"
-      "set grid lc rgb '#e4e4e4' lt 1\nset border lw 1.1\nset tics nomirror\nunset key\nset offsets graph 0.02, graph 0.02, graph 0.06, graph 0.06\n"
-      "set bars 0.6\nset multiplot layout {},{} margins {:.4f},{:.4f},{:.4f},{:.4f} spacing {:.4f},{:.4f}\n",
-      width, height, plot_path(svg), rows, columns, 95.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 100.0 / width, 34.0 / height);
+      "set grid lc rgb '#e4e4e4' lt 1\nset border lw 1.1\nset tics nomirror\nunset key\nset offsets 0, 0, graph 0.06, graph 0.06\n"
+      "set multiplot layout {},{} margins {:.4f},{:.4f},{:.4f},{:.4f} spacing {:.4f},{:.4f}\n",
+      width, height, plot_path(svg), rows, columns, 100.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 110.0 / width, 22.0 / height);
   for (std::size_t k = 0; k < drawn.size(); ++k) {
-    const std::string& name = drawn[k]->name;
+    const std::string& name = drawn[k];
     const bool shared = result.shared && std::find(result.shared->posterior.names.begin(), result.shared->posterior.names.end(), name) != result.shared->posterior.names.end();
     std::string points, limits[2], doubtful;
     double low_x = std::numeric_limits<double>::infinity(), high_x = -low_x;
@@ -110,12 +120,16 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result, con
       plot += fmt::format(", $band{} using 1:2 with lines lc rgb '#0072B2' lw 1.4", k);
     }
     add("doubtful", doubtful, "with points pt 6 ps 0.7 lw 1.3 lc rgb '#999999'");
-    add("points", points, "with yerrorbars pt 7 ps 0.5 lw 1.2 lc rgb '#000000'");
+    // Bars and points apart: gnuplot leaves a white ring around the points of its error bars.
+    add("points", points, "using 1:3:(0):($4-$3) with vectors nohead lw 1.2 lc rgb '#000000'");
+    if (!points.empty()) plot += fmt::format(", $points{} using 1:2 with points pt 7 ps 0.5 lc rgb '#000000'", k);
     add("below", limits[0], "with points pt 11 ps 0.8 lc rgb '#D55E00'");
     add("above", limits[1], "with points pt 9 ps 0.8 lc rgb '#D55E00'");
     const bool lowest = k + columns >= drawn.size();
-    const std::string x_label = x_column ? axis_label(series.columns[*x_column].name, "") : "frame";
-    script += fmt::format("set ylabel {} noenhanced offset 1,0\nset xlabel {} noenhanced\n", plot_text(axis_label(name, drawn[k]->unit) + (shared ? ", shared" : "")),
+    const std::string x_label = x_column ? axis_label(series.columns[*x_column].name) : "frame";
+    const double room = high_x > low_x ? 0.03 * (high_x - low_x) : 1;
+    script += fmt::format("set xrange [{:.10g}:{:.10g}]\nset format x '{}'\nset ylabel {} noenhanced offset 1,0\nset xlabel {} noenhanced\n", low_x - room, high_x + room,
+                          lowest ? "%g" : "", plot_text(axis_label(name) + (shared ? ", shared" : "")),
                           plot_text(lowest ? x_label : ""));
     // A panel without a point keeps its place.
     script += plot.empty() ? "set multiplot next\n" : "plot " + plot + "\n";

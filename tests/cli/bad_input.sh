@@ -377,5 +377,10 @@ for kind in droplet cell plate crystal slab volume; do
   grep -v 'does not exist' stderr.txt | grep -q . && fail "new $kind has a mistake of its own"
 done
 
+checks=$((checks + 1))
+rm frames/f3.tif
+"$birefit" new series | sed 's/0.05 /0.5 /' > bad.yaml
+"$birefit" explain bad.yaml > stdout.txt 2> stderr.txt && grep -q '32 x 32 pixels' stdout.txt || fail 'new series has a mistake of its own'
+
 echo "$checks checks, $failures failures"
 [ $failures -eq 0 ]
