@@ -225,7 +225,7 @@ void SeriesFiles::compare_with_the_joint_fit(bool gains) {
     EXPECT_NEAR(shared.stderr_ / exact.stderr_, 1, 0.05);
     EXPECT_NEAR(own.value, joint_own.value, 0.1 * joint_own.stderr_);
     EXPECT_NEAR(own.stderr_ / joint_own.stderr_, 1, 0.05);
-    if (gains && i == 0) EXPECT_LT(own.stderr_, 0.9 * alone.stderr_);
+    if (gains && i == 0) { EXPECT_LT(own.stderr_, 0.9 * alone.stderr_); }
   }
 }
 
