@@ -748,7 +748,12 @@ void Fit::settle_interval(ParameterEstimate& estimate, int unknown, const Invers
   Profile profile(*problem_, job_, unknowns_, best_, of_noise.covariance, unknown);
   const std::array<double, 2> straight = profile.straightness(t * t);
   if (std::abs(straight[0] - 1) < kBent && std::abs(straight[1] - 1) < kBent) return;
-  const double low = estimate.value - profile.crossing(parameter.lower, t * t), high = profile.crossing(parameter.upper, t * t) - estimate.value;
+  // A bound that the data do not exclude is no end of the interval.
+  const auto half = [&](double end) {
+    const double to = profile.crossing(end, t * t), length = std::abs(to - estimate.value);
+    return to == end ? std::max(length, t * sd) : length;
+  };
+  const double low = half(parameter.lower), high = half(parameter.upper);
   if (std::abs(low / (t * sd) - 1) < 0.5 * kBent && std::abs(high / (t * sd) - 1) < 0.5 * kBent) return;  // only the way there was bent
   const double more = t * t * (estimate.stderr_ * estimate.stderr_ - sd * sd);
   estimate.interval95_low = estimate.value - std::sqrt(low * low + more);
