@@ -56,16 +56,16 @@ std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const 
 MethodChart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
 
 /// One method asked for 1e-6 (wei_norman: 1e-3) at one place of a sweep into a trap; in the sweeps of polarizers a planned
-/// picture asked for 1e-4.
+/// picture asked for 1e-4; in the sweeps that begin with "wave_" the picture of a sphere by wave optics.
 struct StressPoint {
   std::string sweep;
   double value = 0;
   std::string method;
-  /// Relative, Frobenius (pictures: worst pixel, infinite where negative); not a number where flagged or where the truth
-  /// itself is not known.
+  /// Relative, Frobenius (pictures: worst pixel, infinite where negative; propagation and march: RMS over that of the picture); not a number
+  /// where flagged or where the truth itself is not known.
   double error = 0;
   double estimate = 0;  ///< what the method says of its error; infinite where flagged
-  double samples = 0;   ///< of the medium
+  double samples = 0;   ///< of the medium (series: panels of its table, propagation: points of all slabs)
   std::string flag;     ///< why its answer must not be used; empty = it stands by the estimate
 };
 /// The law: error <= estimate, or flagged; never not a number, never unbounded work (tests/laws/stress_test.cc).

@@ -30,7 +30,7 @@ std::string table(const std::vector<StressPoint>& points) {
   return text;
 }
 
-/// Whole pictures are in the table only.
+/// Whole pictures have no place among the rays.
 bool of_picture(const StressPoint& p) { return p.method.find(" of a ") != std::string::npos; }
 
 /// A square for every place and method: its error where it answers, grey where it says that it cannot.
@@ -64,6 +64,25 @@ std::string script(const std::vector<StressPoint>& points, const std::string& sv
       static_cast<double>(names.size()) - 0.5, methods);
 }
 
+/// Pictures by wave optics: error against the method's own estimate. The law: no point above the diagonal.
+std::string wave_script(const std::vector<StressPoint>& points, const std::string& svg) {
+  std::string data, plots;
+  int colour = 0;
+  for (const auto& [name, rgb] : {std::pair{"series", "#0072B2"}, {"split_step", "#D55E00"}, {"march", "#009E73"}}) {
+    data += fmt::format("$p{} << EOD\n", colour);
+    for (const StressPoint& p : points)
+      if (p.sweep.starts_with("wave_") && p.method == fmt::format("{} of a ball", name) && p.flag.empty() && p.error > 1e-12)
+        data += fmt::format("{:.4g} {:.4g}\n", p.estimate, p.error);
+    data += "EOD\n";
+    plots += fmt::format(", $p{} using 1:2 with points pt 7 ps 0.6 lc rgb '{}' title '{}' noenhanced", colour++, rgb, name);
+  }
+  return fmt::format(
+      "set terminal svg size 640,560 dynamic font 'sans,13' background rgb 'white'\nset output {}\n{}set logscale xy\nset format xy '10^{{%T}}'\n"
+      "set xrange [1e-12:10]\nset yrange [1e-13:10]\nset key top left\nset xlabel 'what the method says of its error'\nset ylabel 'error of the picture'\nset grid lc rgb '#dddddd'\n"
+      "plot x with lines lc rgb 'black' title 'the law: not above'{}\n",
+      svg, data, plots);
+}
+
 int run_stress(const Arguments& arguments) {
   const std::filesystem::path out = arguments.out;
   make_folder(arguments.out);
@@ -72,6 +91,7 @@ int run_stress(const Arguments& arguments) {
   });
   write_file(out / "stress.csv", table(points));
   draw(script(points, plot_path(out / "stress.svg")));
+  draw(wave_script(points, plot_path(out / "stress_waves.svg")));
   int broken = 0, flagged = 0, unknown = 0;
   for (const StressPoint& p : points) {
     if (!p.flag.empty()) ++flagged;
@@ -89,7 +109,7 @@ int run_stress(const Arguments& arguments) {
 Command add_stress_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("stress", "sweeps into the places where transport methods fail: error, own estimate, flag");
-  command->add_option("--out", arguments->out, "folder for stress.csv and stress.svg")->capture_default_str();
+  command->add_option("--out", arguments->out, "folder for stress.csv, stress.svg and stress_waves.svg")->capture_default_str();
   command->add_flag("--quick", arguments->quick, "fewer places");
   command->add_flag("-q,--quiet", arguments->quiet, "say nothing");
   return {command, [arguments] { return run_stress(*arguments); }};

@@ -18,6 +18,7 @@
 #include "fit/scan.h"
 #include "fit/statistics.h"
 #include "fit/verdict.h"
+#include "render/wave.h"
 
 namespace birefit {
 namespace {
@@ -1016,12 +1017,9 @@ Eigen::VectorXd Fit::propagation_error() {
   if (stopped_ || std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) return shift;
   std::vector<PixelSet> sets;
   for (int g = 0; g < frames_; ++g) {
-    Scene twin = job_.micrographs[g].scene;
-    Droplet& droplet = std::get<Droplet>(twin.sample);
-    if (auto* shell = std::get_if<ShellDirector>(&droplet.director))
-      shell->offset_um = {};
-    else
-      droplet.director = RadialDirector{};
+    std::optional<Scene> with_series = radial_twin(job_.micrographs[g].scene);
+    if (!with_series) return shift;
+    Scene& twin = *with_series;
     PixelSet set = pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]);
     const Image fitted = fitted_image(g);
     Image exact, propagated;

@@ -7,6 +7,7 @@
 
 #include "birefit/render.h"
 #include "render/pilots.h"
+#include "render/pixel_mean.h"
 #include "render/sampling.h"
 #include "render/volume.h"
 
@@ -16,47 +17,6 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr int kMost = 8;        ///< points per pixel side
 constexpr int kReference = 10;  ///< what they are measured against
-
-/// The means over chosen pixels, lanes filled with points of one pixel after the other.
-class PixelMeans {
- public:
-  PixelMeans(const Scene& scene, const RenderPlan& plan, const Values<double>& value) : lanes_(value.as<Pack>()), model_(make_volume_model<Pack>(scene, plan, lanes_)) {}
-  /// n = 1: the point value with the correction that render() makes.
-  double mean(double column, double row, int n) {
-    std::vector<double> c, r, w;
-    if (n == 1) {
-      for (const auto& [x, y] : {std::pair{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-        c.push_back(column + x);
-        r.push_back(row + y);
-        w.push_back(x == 0 && y == 0 ? 1 - 4.0 / 24 : 1.0 / 24);
-      }
-    } else {
-      const PixelRule rule = pixel_rule(n);
-      for (std::size_t i = 0; i < rule.x.size(); ++i)
-        for (std::size_t j = 0; j < rule.x.size(); ++j) {
-          c.push_back(column + rule.x[i]);
-          r.push_back(row + rule.x[j]);
-          w.push_back(rule.w[i] * rule.w[j]);
-        }
-    }
-    double sum = 0;
-    const std::size_t lanes = static_cast<std::size_t>(kLanes);
-    for (std::size_t first = 0; first < c.size(); first += lanes) {
-      alignas(64) double x[kLanes], y[kLanes];
-      for (std::size_t k = 0; k < lanes; ++k) {
-        x[k] = c[std::min(first + k, c.size() - 1)];
-        y[k] = r[std::min(first + k, c.size() - 1)];
-      }
-      const Pack light = model_->intensity(Pack::load_aligned(x), Pack::load_aligned(y));
-      for (std::size_t k = 0; k < lanes && first + k < c.size(); ++k) sum += w[first + k] * lane(light, static_cast<int>(k));
-    }
-    return sum;
-  }
-
- private:
-  Values<Pack> lanes_;
-  std::unique_ptr<PixelModel<Pack>> model_;
-};
 
 /// plan.samples by distance from the box's middle: in each of a few rings the fewest points whose means hold `target` on a
 /// few pixels. Returns the largest error left.
@@ -68,7 +28,8 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
   const double most = std::max(1.0, std::min(box, view));
   if (most > 100000) throw UserError(Where{}, "the volume is more than 200000 pixels across", "check the spacing, scale and pixel_size_um");
   const double near_edge = 0.5 * std::min((grid.nx - 1) / o.nodes_per_px_x, (grid.ny - 1) / o.nodes_per_px_y);
-  PixelMeans means(scene, plan, value);
+  const Values<Pack> lanes = value.as<Pack>();
+  const auto model = make_volume_model<Pack>(scene, plan, lanes);
   const auto within = [&](double column, double row) {
     double x, y;
     o.place(column, row, x, y);
@@ -86,11 +47,11 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
       bool whole = column >= 0 && row >= 0 && column < w && row < h;
       for (const auto& [x, y] : {std::pair{-1.5, -1.5}, {-1.5, 1.5}, {1.5, -1.5}, {1.5, 1.5}}) whole = whole && within(column + x, row + y);
       if (!whole) continue;
-      const double exact = means.mean(column, row, kReference);
+      const double exact = pixel_mean(*model, column, row, kReference);
       double error = 0;
       int n = 1;
       for (; n <= kMost; n += n < 4 ? 1 : 2) {
-        error = std::abs(means.mean(column, row, n) - exact);
+        error = std::abs(pixel_mean(*model, column, row, n) - exact);
         if (error <= target || n == kMost) break;
       }
       left = std::max(left, error);

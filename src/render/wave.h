@@ -1,6 +1,8 @@
 #pragma once
 // Pictures by wave optics: droplets and shells, Ceiling::wave.
 
+#include <optional>
+
 #include "render/pixel_model.h"
 #include "wave/imaging.h"
 #include "wave/sphere.h"
@@ -16,6 +18,17 @@ struct WavePlan {
 
 /// Throws UserError where wave optics has no aperture to work with: none given, or one above the host's index.
 void check_objective(const Scene& scene, double n_host);
+
+/// The same scene with a sphere of the same size and indices whose axis is radial (shells: concentric): its picture is exact by the series.
+/// None where the sample is no sphere.
+std::optional<Scene> radial_twin(const Scene& scene);
+
+/// RMS of the difference from the exact picture over the RMS of that; where it is darker than 1e-12 of the incident light, which nothing tells from
+/// darkness, over 1e-12.
+double picture_error(const Image& image, const Image& exact);
+
+/// What image_by_march errs by on the scene's radial twin (picture_error); it leaves out light reflected twice.
+double march_error(const Scene& scene, const Theta& theta, int threads = 0);
 
 /// The plan of one picture. Throws UserError when the scene is no sphere, the numerical aperture is missing or above the host's index,
 /// or the propagation would need more memory than there should be.

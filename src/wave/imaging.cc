@@ -88,13 +88,14 @@ struct PixelWeights {
 WaveImaging plan_imaging(const WaveGrid& g, double k0, double na, double reach_x_um, double reach_y_um) {
   WaveImaging r;
   const double box = std::max(g.nx, g.ny) * g.step_um;
-  // The picture's period is three boxes: what the objective spreads from one does not meet the next.
-  r.pupil_step_per_um = 2 * kPi / (3 * box);
+  // The picture's period is three boxes, and more where the objective is weak: what it spreads from one does not meet the next.
+  const double period = std::max(3 * box, box + 24 * kPi / (k0 * na));
+  r.pupil_step_per_um = 2 * kPi / period;
   r.pupil_half = static_cast<int>(std::ceil(1.05 * k0 * na / r.pupil_step_per_um)) + 1;  // 5 %: the wavelength may be fitted
   // Intensity carries twice the field's wavevectors.
   r.spacing_um = kPi / (2 * 1.05 * k0 * na * kOversampling);
   const auto half = [&](double reach, int n) {
-    return n == 1 ? 0 : static_cast<int>(std::ceil(std::min(reach, 0.75 * n * g.step_um) / r.spacing_um)) + kTaps / 2;
+    return n == 1 ? 0 : static_cast<int>(std::ceil(std::min(reach, std::max(0.75 * n * g.step_um, 0.25 * period)) / r.spacing_um)) + kTaps / 2;
   };
   r.half_x = half(reach_x_um, g.nx);
   r.half_y = half(reach_y_um, g.ny);

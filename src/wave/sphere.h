@@ -40,22 +40,20 @@ class SphereMedium final : public WaveMedium<S> {
     const Vec3<P> normal{inverse_r * x, inverse_r * y, inverse_r * P(z)};
     const S eo = o_.n_o * o_.n_o, ee = o_.n_e * o_.n_e, eh = o_.n_host * o_.n_host;
     Vec3<S> place{S(x), S(y), S(P(z))};
-    if (!o_.has_core) {
-      const Vec3<S> n = axis(place);
-      return mixed(n, Vec3<S>{S(normal.x), S(normal.y), S(normal.z)}, eo, ee, eh, inside);
-    }
+    const S outside = 1.0 - inside;
+    if (!o_.has_core) return mixed(axis(place), Vec3<S>{S(normal.x), S(normal.y), S(normal.z)}, eo, ee, inside, outside * eh, outside * inverse(eh));
     const Vec3<S>& d = o_.core_offset_um;
     const Vec3<S> away{place.x - d.x, place.y - d.y, place.z - d.z};
     const S away2 = away.x * away.x + away.y * away.y + away.z * away.z + 1e-12, inverse_away = inverse_root(away2), distance = away2 * inverse_away;
     // Inside the core the axis does not matter: that of the nearest point outside.
     const S out = max_of(S(1.0), o_.core_um * inverse_away);
     const Vec3<S> n = axis({d.x + out * away.x, d.y + out * away.y, d.z + out * away.z});
-    const S beyond_core = ramped(distance - o_.core_um), ec = o_.core_index * o_.core_index;
-    // A wall thicker than the ramp: only one surface is near.
+    const S in_core = 1.0 - ramped(distance - o_.core_um), ec = o_.core_index * o_.core_index;
+    // Both surfaces are near only in a wall thinner than the ramp, where they are as good as parallel: any of their normals will do.
     const auto outer = plain(inside) < P(1.0);
     const Vec3<S> face{select(outer, S(normal.x), inverse_away * away.x), select(outer, S(normal.y), inverse_away * away.y),
                        select(outer, S(normal.z), inverse_away * away.z)};
-    return mixed(n, face, eo, ee, select(outer, eh, ec), select(outer, inside, beyond_core));
+    return mixed(n, face, eo, ee, inside - in_core, outside * eh + in_core * ec, outside * inverse(eh) + in_core * inverse(ec));
   }
 
  private:
@@ -68,17 +66,17 @@ class SphereMedium final : public WaveMedium<S> {
     const S u = min_of(max_of(depth_um * (1 / width_) + 0.5, S(0.0)), S(1.0));
     return u * u * (3.0 - 2.0 * u);
   }
-  /// Fraction c of the uniaxial medium, the rest isotropic.
-  static OpticalPoint<S> mixed(const Vec3<S>& n, const Vec3<S>& face, const S& eo, const S& ee, const S& other, const S& c) {
-    const S de = ee - eo, rest = 1.0 - c;
+  /// Fraction c of the uniaxial medium; rest and inverse_rest: permittivities of what is isotropic and their inverses, each times its fraction.
+  static OpticalPoint<S> mixed(const Vec3<S>& n, const Vec3<S>& face, const S& eo, const S& ee, const S& c, const S& rest, const S& inverse_rest) {
+    const S de = ee - eo;
     const S u = n.x * face.x + n.y * face.y + n.z * face.z, u2 = u * u, w2 = 1.0 - u2;
     // In the plane of axis and normal r, with t across: e_rr, e_rt = de u w, e_tt.
     const S rr = eo + de * u2, inverse_rr = inverse(rr), rt_over_uw = de;
-    const S new_rr = inverse(S(c * inverse_rr + rest * inverse(other)));
+    const S new_rr = inverse(S(c * inverse_rr + inverse_rest));
     const S bend = c * rt_over_uw * inverse_rr;  // times u w
     const S new_rt = bend * new_rr;              // times u w
-    const S new_tt = c * (eo + de * w2 - rt_over_uw * rt_over_uw * u2 * w2 * inverse_rr) + rest * other + bend * bend * u2 * w2 * new_rr;
-    const S new_ss = c * eo + rest * other;
+    const S new_tt = c * (eo + de * w2 - rt_over_uw * rt_over_uw * u2 * w2 * inverse_rr) + rest + bend * bend * u2 * w2 * new_rr;
+    const S new_ss = c * eo + rest;
     const S along = u2 * new_rr + 2.0 * u2 * w2 * new_rt + w2 * new_tt;
     return {n, 0.5 * (new_rr + new_tt + new_ss - along), along, S(0.0), S(0.0), S(0.0)};
   }
