@@ -226,10 +226,13 @@ sample:
   material:
     ordinary: 1.52
     birefringence: {value: 0.1, fit: [0.05, 0.15]}
+  # surround: {index: 1.5}     # around the box, and in it where there is no liquid crystal; for waves only
 microscope:
   light: {wavelength_nm: 590}
   polarizer_deg: 0
   analyzer_deg: 90
+  # objective_na: 0.6
+# physics: {ceiling: wave}     # wave optics in place of straight rays; needs objective_na and surround
 )";
 
 }  // namespace

@@ -559,7 +559,8 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   } else {
     scene.material = read_material(reader, block, scene.sample);
   }
-  if (*kind == "crystal" || *kind == "disc" || *kind == "volume") {
+  if (*kind == "volume" && !block.find("surround")) return;  // rays have no use for it
+  if (*kind == "crystal" || *kind == "disc") {
     if (const YamlNode* node = block.find("surround"))
       reader.problems.add(node->where, "unknown key surround: a " + *kind + " needs none");
     scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
@@ -680,14 +681,16 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   const YamlNode* ceiling = physics.find("ceiling");
   const Slab* slab = std::get_if<Slab>(&scene.sample);
   const bool layered = std::holds_alternative<Cell>(scene.sample) || (slab && !slab->half_angle_deg);
-  const bool sphere = std::holds_alternative<Droplet>(scene.sample);
+  const bool sphere = std::holds_alternative<Droplet>(scene.sample), sampled = std::holds_alternative<SampledVolume>(scene.sample);
   const std::string name = reader.choice(physics, "ceiling", {"one_way", "e_only", "reflections", "wave", "auto"}).value_or("auto");
   if (name == "reflections" && !layered)
     reader.problems.add(ceiling->where, "ceiling: reflections is for cells and slabs",
                         "use one_way: its model error says how large reflections are here");
-  if (name == "wave" && !sphere)
-    reader.problems.add(ceiling->where, "ceiling: wave is for droplets and shells", "use one_way or, for cells and slabs, reflections");
-  if (name == "wave" && sphere && scene.microscope.objective_na == 0)
+  if (name == "wave" && !sphere && !sampled)
+    reader.problems.add(ceiling->where, "ceiling: wave is for droplets, shells and sampled fields", "use one_way or, for cells and slabs, reflections");
+  if (name == "wave" && sampled && !scene.surround_index && !scene.surround_dispersion)
+    reader.problems.add(ceiling->where, "ceiling: wave needs sample.surround", "the index of what is around the box, and in it where the file has no liquid crystal");
+  if (name == "wave" && (sphere || sampled) && scene.microscope.objective_na == 0)
     reader.problems.add(ceiling->where, "ceiling: wave needs microscope.objective_na", "the number engraved on the objective; without it use one_way");
   if (name == "wave" && physics.find("rays"))
     reader.problems.add(physics.find("rays")->where, "rays has no meaning under ceiling: wave", "give one of the two");
@@ -714,7 +717,7 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
       reader.choose_waves = true;
   }
   if (defocused && scene.ceiling != Ceiling::wave)
-    reader.problems.add(focus->where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics", "ceiling: wave, with objective_na, for droplets and shells");
+    reader.problems.add(focus->where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics", "ceiling: wave, with objective_na, for droplets, shells and sampled fields");
 }
 
 }  // namespace

@@ -8,7 +8,10 @@
 #include "medium/build.h"
 #include "render/ball.h"
 #include "render/series.h"
+#include "render/volume.h"
 #include "wave/march.h"
+#include "wave/sampled.h"
+#include "wave/sphere.h"
 
 namespace birefit {
 namespace {
@@ -46,6 +49,48 @@ SphereOptics<S> sphere_optics(const Scene& scene, const Values<S>& value) {
   if (const auto* nested = std::get_if<NestedField<S>>(&ball.field))
     o.core_offset_um = {o.radius_um * nested->offset.x, o.radius_um * nested->offset.y, o.radius_um * nested->offset.z};
   return o;
+}
+
+template <class S>
+SampledOptics<S> sampled_optics(const Scene& scene, const Values<S>& value) {
+  const VolumeOptics<S> v(scene, value);
+  SampledOptics<S> o;
+  o.grid = v.grid.get();
+  o.scale = value.get(std::get<SampledVolume>(scene.sample).scale, 1.0);
+  o.cos_turn = v.cos_turn, o.sin_turn = v.sin_turn;
+  o.n_o = v.n_o, o.n_e = v.n_o + v.birefringence, o.n_host = host_index(scene, value);
+  return o;
+}
+
+template <class S>
+std::unique_ptr<WaveMedium<S>> wave_medium(const Scene& scene, const Values<S>& value, double ramp_um) {
+  if (std::holds_alternative<SampledVolume>(scene.sample)) return std::make_unique<SampledMedium<S>>(sampled_optics(scene, value), ramp_um);
+  return std::make_unique<SphereMedium<S>>(sphere_optics(scene, value), ramp_um);
+}
+
+/// What planning needs to know of a sphere or box.
+struct WaveObject {
+  double n_o, n_e, n_host, core_index;
+  double radius_um;  ///< of WavePlan
+  WaveGrid grid;
+  std::string what;
+};
+WaveObject wave_object(const Scene& scene, const Values<double>& value) {
+  const double k0 = wavenumber_per_um(scene, value), na = scene.microscope.objective_na;
+  if (!scene.surround_index && !scene.surround_dispersion)
+    throw UserError(Where{}, "ceiling: wave needs sample.surround", "the index of what is around the sample, and in a sampled box where there is no liquid crystal");
+  check_objective(scene, host_index(scene, value));
+  if (std::holds_alternative<SampledVolume>(scene.sample)) {
+    const SampledOptics<double> o = sampled_optics(scene, value);
+    const VolumeGrid& v = *o.grid;
+    const auto side = [&](int nodes, std::size_t i) { return o.scale * v.spacing_um[i] * (nodes - 1); };
+    return {o.n_o, o.n_e, o.n_host, o.n_host, 0.5 * std::max({side(v.nx, 0), side(v.ny, 1), side(v.nz, 2)}), sampled_grid(o, k0, na),
+            fmt::format("box of {:.3g} x {:.3g} x {:.3g} um", side(v.nx, 0), side(v.ny, 1), side(v.nz, 2))};
+  }
+  if (!std::holds_alternative<Droplet>(scene.sample))
+    throw UserError(Where{}, "ceiling: wave is for droplets, shells and sampled fields", "use one_way or, for cells and slabs, reflections");
+  const SphereOptics<double> o = sphere_optics(scene, value);
+  return {o.n_o, o.n_e, o.n_host, o.has_core ? o.core_index : o.n_host, o.radius_um, sphere_grid(o, k0, na), fmt::format("sphere of {:.3g} um", 2 * o.radius_um)};
 }
 
 }  // namespace
@@ -100,50 +145,57 @@ double error_on_twin(const Scene& scene, const Values<double>& value, double sca
     theta.push_back(x);
     ref.index = static_cast<int>(theta.size()) - 1;
   };
-  constexpr int kPixels = 64;
   Droplet& droplet = std::get<Droplet>(twin.sample);
   const double diameter = scale * value(droplet.diameter_um);
   constant(droplet.diameter_um, diameter);
   if (auto* shell = std::get_if<ShellDirector>(&droplet.director)) constant(shell->wall_um, scale * value(shell->wall_um));
   if (twin.microscope.focus_um) constant(twin.microscope.focus_um, scale * value(twin.microscope.focus_um));
-  twin.view.width = twin.view.height = kPixels;
-  twin.view.pixel_size_um = (diameter + 4) / kPixels;
-  constant(twin.view.center_x_px, 0.5 * (kPixels - 1));
-  constant(twin.view.center_y_px, 0.5 * (kPixels - 1));
+  // Pixels as large as the scene's: what is left out need not have the sign of what is seen, and large pixels average.
+  const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * scene.view.pixel_size_um)), 2, 64);
+  twin.view.width = twin.view.height = pixels;
+  twin.view.pixel_size_um = (diameter + 4) / pixels;
+  constant(twin.view.center_x_px, 0.5 * (pixels - 1));
+  constant(twin.view.center_y_px, 0.5 * (pixels - 1));
   twin.intensity_accuracy = 1e-8;  // nearly dark pictures, too
   const Values<double> values(theta, {});
   return picture_error(model(twin, theta), render(twin, plan_series(twin, values), theta, {}, 1).intensity);
 }
 
-std::shared_ptr<const WavePlan> plan_sphere(const Scene& scene, const Values<double>& value, const SphereOptics<double>& o) {
-  const double k0 = wavenumber_per_um(scene, value);
+std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {
   auto wave = std::make_shared<WavePlan>();
-  wave->radius_um = o.radius_um;
-  const WaveGrid& g = wave->grid = sphere_grid(o, k0, scene.microscope.objective_na);
+  wave->radius_um = object.radius_um;
+  const WaveGrid& g = wave->grid = object.grid;
   wave->ramp_um = g.step_um;
-  if (g.nx > 2000)
-    throw UserError(Where{}, fmt::format("wave optics of a sphere of {:.3g} um would need {} x {} points in {} slabs, about {:.1f} GB and {:.0f} min an image",
-                                         2 * o.radius_um, g.nx, g.ny, g.slabs, 4e-7 * g.nx * g.ny, 3e-6 / 60 * g.nx * g.ny * g.slabs),
-                    "use ceiling: one_way, which becomes better with size only for weak birefringence, or check diameter_um");
+  if (static_cast<double>(g.nx) * g.ny > 4e6)
+    throw UserError(Where{}, fmt::format("wave optics of a {} would need {} x {} points in {} slabs, about {:.1f} GB and {:.0f} min an image", object.what, g.nx, g.ny, g.slabs,
+                                         4e-7 * g.nx * g.ny, 3e-6 / 60 * g.nx * g.ny * g.slabs),
+                    "use ceiling: one_way, which becomes better with size only for weak birefringence, or check its size");
   wave->imaging = imaging_of(scene, value, g);
   return wave;
+}
+
+/// picture_error of propagation on the radial twin; of spheres that take longer than half a second, on a smaller one.
+double propagation_error_on_twin(const Scene& scene, const Values<double>& value, double seconds) {
+  return error_on_twin(scene, value, std::min(1.0, std::cbrt(0.5 / seconds)), [](const Scene& twin, const Theta& theta) {
+    const Values<double> values(theta, {});
+    Rendering rendering;
+    render_wave(twin, *plan_grids(twin, values, wave_object(twin, values)), theta, {}, 1, rendering);
+    return rendering.intensity;
+  });
 }
 
 }  // namespace
 
 RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
-  if (!std::holds_alternative<Droplet>(scene.sample))
-    throw UserError(Where{}, "ceiling: wave is for droplets and shells", "use one_way or, for cells and slabs, reflections");
-  const SphereOptics<double> o = sphere_optics(scene, value);
-  const double na = scene.microscope.objective_na, wavelength = wavelength_um(scene, value);
-  check_objective(scene, o.n_host);
+  const WaveObject o = wave_object(scene, value);
+  const double na = scene.microscope.objective_na;
   RenderPlan plan;
-  plan.wave = plan_sphere(scene, value, o);
+  plan.wave = plan_grids(scene, value, o);
   const WaveGrid& g = plan.wave->grid;
   plan.method = "split_step";
   plan.physics = "wave";
   plan.steps = g.slabs;
-  plan.reasons.push_back(fmt::format("a sphere {:.3g} wavelengths across, {}", 2 * o.radius_um * o.n_host / wavelength,
+  plan.reasons.push_back(fmt::format("a {}, {:.3g} wavelengths, {}", o.what, 2 * o.radius_um * o.n_host / wavelength_um(scene, value),
                                      scene.method == "split_step" ? "propagation asked for by name" : "whose director has no exact series"));
   plan.reasons.push_back(fmt::format("one-way wave optics on {} x {} points {:.3g} um apart, {} slabs of {:.3g} um, {} layers of the medium each", g.nx, g.ny, g.step_um,
                                      g.slabs, (g.exit_um - g.entry_um) / g.slabs, g.layers));
@@ -152,22 +204,24 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   // contrast, with the square of the aperture, and where light must leave a wall into a thinner medium. 0.01 is the grid's; half its step and
   // slabs take no more away.
   const double contrast = std::abs(o.n_e - o.n_o) + 2 * std::abs((2 * o.n_o + o.n_e) / 3 - o.n_host);
-  const double step_out = o.has_core ? std::max(0.0, std::max(o.n_o, o.n_e) - std::min(o.n_host, o.core_index)) : 0;
+  const bool shell = std::holds_alternative<Droplet>(scene.sample) && std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
+  const double step_out = shell ? std::max(0.0, std::max(o.n_o, o.n_e) - std::min(o.n_host, o.core_index)) : 0;
   plan.numerical_error = 0.01;
   plan.model_error = (0.018 + 0.068 * na * na) * std::clamp(contrast / 0.4, 0.15, 1.6) + 0.15 * na * step_out;
-  // A picture may be nearly dark, and what is left out is not: then the twin knows. Spheres larger than half a second's are as good as that.
-  const double scale = std::min(1.0, std::cbrt(0.5 / plan.cost_seconds));
-  const double on_twin = error_on_twin(scene, value, scale, [](const Scene& twin, const Theta& theta) {
-    const Values<double> values(theta, {});
-    Rendering rendering;
-    render_wave(twin, *plan_sphere(twin, values, sphere_optics(twin, values)), theta, {}, 1, rendering);
-    return rendering.intensity;
-  });
+  plan.reasons.push_back("what is left out are reflections and the third order in the wave's slope");
+  if (!radial_twin(scene)) {
+    plan.warnings.push_back(fmt::format(
+        "That wave propagation errs by {:.2g} of the picture's RMS was measured on spheres with bright pictures. Of a sampled field it is not, nor is the field's own sampling "
+        "in it: a surface between nodes is known to half their spacing.",
+        plan.numerical_error + plan.model_error));
+    return plan;
+  }
+  // A picture may be nearly dark, and what is left out is not: then the twin knows.
+  const double on_twin = propagation_error_on_twin(scene, value, plan.cost_seconds);
   const double more = std::max(1.0, 1.5 * on_twin / (plan.numerical_error + plan.model_error));
   plan.numerical_error *= more;
   plan.model_error *= more;
-  plan.reasons.push_back(fmt::format("what is left out are reflections and the third order in the wave's slope; the picture of {}, which is exact by its series, is met to {:.2g} of its RMS",
-                                     scale < 1 ? "a smaller radial twin" : "its radial twin", on_twin));
+  plan.reasons.back() += fmt::format("; the picture of a radial twin, which is exact by its series, is met to {:.2g} of its RMS", on_twin);
   if (const double error = plan.numerical_error + plan.model_error; error > 0.15)
     plan.warnings.push_back(fmt::format(
         "Wave propagation is expected to err by {:.2g} of this picture's RMS: light that it leaves out (reflected, or steep at large steps of the index) is as bright as much of "
@@ -241,7 +295,7 @@ void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, c
   std::vector<WaveField> base;  // without derivatives
   const auto send = [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
     const Values<S> value(theta, chunk);
-    std::vector<WaveField> fields = propagate(plan.grid, wave_light(scene, value), SphereMedium<S>(sphere_optics(scene, value), plan.ramp_um), threads);
+    std::vector<WaveField> fields = propagate(plan.grid, wave_light(scene, value), *wave_medium(scene, value, plan.ramp_um), threads);
     picture(scene, plan.grid, plan.imaging, value, fields, threads, images);
     fields.resize(1);
     base = std::move(fields);
@@ -258,24 +312,23 @@ void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, c
 Image image_by_march(const Scene& scene, const Theta& theta, int threads) {
   const Values<double> value(theta, {});
   const Values<Pack> lanes(theta, {});
-  if (!std::holds_alternative<Droplet>(scene.sample)) throw UserError(Where{}, "Maxwell's equations are marched through droplets and shells only", "leave --check out");
-  const SphereOptics<double> o = sphere_optics(scene, value);
-  check_objective(scene, o.n_host);
-  const double k0 = wavenumber_per_um(scene, value), na = scene.microscope.objective_na;
+  const WaveObject o = wave_object(scene, value);
+  const double k0 = wavenumber_per_um(scene, value);
   // As wide as propagation asks, points and slabs where halving them changes less than what reflections leave (tests/cross/march_test.cc).
-  WaveGrid g = sphere_grid(o, k0, na);
-  const double box = g.nx * g.step_um, wavelength = 2 * std::numbers::pi / k0, depth = g.exit_um - g.entry_um;
-  g.nx = g.ny = fast_fft_size(static_cast<int>(std::ceil(box / (0.28 * wavelength))));
-  g.step_um = box / g.nx;
-  MarchGrid grid{g.nx, g.ny, box, box, g.entry_um, g.exit_um, static_cast<int>(std::ceil(depth / (0.35 * wavelength)))};
-  grid.limit = std::min(0.95, 0.98 * std::min({o.n_o, o.n_e, o.has_core ? o.core_index : o.n_o}) / o.n_host);
+  WaveGrid g = o.grid;
+  const double box_x = g.nx * g.step_um, box_y = g.ny * g.step_um, wavelength = 2 * std::numbers::pi / k0, depth = g.exit_um - g.entry_um;
+  g.nx = fast_fft_size(static_cast<int>(std::ceil(box_x / (0.28 * wavelength))));
+  g.step_um = box_x / g.nx;
+  g.ny = fast_fft_size(static_cast<int>(std::ceil(box_y / g.step_um - 1e-9)));
+  MarchGrid grid{g.nx, g.ny, box_x, g.ny * g.step_um, g.entry_um, g.exit_um, static_cast<int>(std::ceil(depth / (0.35 * wavelength)))};
+  grid.limit = std::min(0.95, 0.98 * std::min({o.n_o, o.n_e, o.core_index}) / o.n_host);
   if (static_cast<double>(g.nx) * g.ny * grid.slabs > 5e7)
     throw UserError(Where{}, fmt::format("marching Maxwell's equations through {} x {} points and {} slabs would take an hour or more", g.nx, g.ny, grid.slabs), "leave --check out");
-  const SphereMedium<double> medium(o, g.step_um);
+  const std::unique_ptr<WaveMedium<double>> medium = wave_medium(scene, value, g.step_um);
   const DielectricAt dielectric = [&](double x, double y, double z) -> std::array<double, 6> {
     const double host = o.n_host * o.n_host;
-    if (!medium.reaches(x, y, z)) return {host, host, host, 0, 0, 0};
-    const OpticalPoint<double> p = medium.at(x, y, z);
+    if (!medium->reaches(x, y, z)) return {host, host, host, 0, 0, 0};
+    const OpticalPoint<double> p = medium->at(x, y, z);
     const double eo = p.ordinary, de = p.extraordinary - eo;
     const Vec3<double>& n = p.axis;
     return {eo + de * n.x * n.x, eo + de * n.y * n.y, eo + de * n.z * n.z, de * n.x * n.y, de * n.x * n.z, de * n.y * n.z};
@@ -311,7 +364,7 @@ Image image_by_march(const Scene& scene, const Theta& theta, int threads) {
 }
 
 double march_error(const Scene& scene, const Theta& theta, int threads) {
-  if (!radial_twin(scene)) throw UserError(Where{}, "Maxwell's equations are marched through droplets and shells only", "leave --check out");
+  if (!radial_twin(scene)) throw UserError(Where{}, "only a sphere has a radial twin to measure the march on", "");
   return error_on_twin(scene, Values<double>(theta, {}), 1, [&](const Scene& twin, const Theta& values) { return image_by_march(twin, values, threads); });
 }
 

@@ -1,18 +1,17 @@
 #pragma once
-// Pictures by wave optics: droplets and shells, Ceiling::wave.
+// Pictures by wave optics: droplets, shells and sampled fields, Ceiling::wave.
 
 #include <optional>
 
 #include "render/pixel_model.h"
 #include "wave/imaging.h"
-#include "wave/sphere.h"
 
 namespace birefit {
 
 struct WavePlan {
   WaveGrid grid;
   WaveImaging imaging;
-  double radius_um = 0;  ///< of the sphere it was made for
+  double radius_um = 0;  ///< of the sphere it was made for, half the longest side of a box
   double ramp_um = 0;    ///< of its surfaces
 };
 
@@ -30,7 +29,7 @@ double picture_error(const Image& image, const Image& exact);
 /// What image_by_march errs by on the scene's radial twin (picture_error); it leaves out light reflected twice.
 double march_error(const Scene& scene, const Theta& theta, int threads = 0);
 
-/// The plan of one picture. Throws UserError when the scene is no sphere, the numerical aperture is missing or above the host's index,
+/// The plan of one picture. Throws UserError when the scene is neither sphere nor sampled field, the numerical aperture is missing or above the host's index,
 /// or the propagation would need more memory than there should be.
 RenderPlan plan_wave(const Scene& scene, const Values<double>& value);
 

@@ -114,7 +114,8 @@ void measure_wave_traps(bool quick, const std::function<void(const std::string&)
       Image image;
       try {
         image = work(p);
-        if (!std::all_of(image.values().begin(), image.values().end(), [](double x) { return std::isfinite(x) && x >= -1e-9; })) p.error = kInfinite;
+        // No light is less than none; propagated light is interpolated to 1e-5.
+        if (!std::all_of(image.values().begin(), image.values().end(), [&](double x) { return std::isfinite(x) && x >= (method == "series" ? -1e-12 : -1e-5); })) p.error = kInfinite;
       } catch (const UserError& error) {
         p.flag = error.problems().front().what;
       } catch (const std::domain_error& error) {

@@ -367,12 +367,14 @@ std::vector<Case> cases() {
     c.scene.microscope.bandwidth_nm = 60;
     all.push_back(c);
   }
-  for (bool e_only : {false, true}) {
-    Case c = base(e_only ? "sampled field, E alone" : "sampled field");
-    // One cell across, larger than the picture: no face, where trilinear interpolation has a kink, is crossed by a difference.
+  for (const std::string name : {"sampled field", "sampled field, E alone", "waves: sampled field"}) {
+    Case c = base(name);
+    const bool waves = name.starts_with("waves");
+    // One cell across, larger than the picture (waves: smaller): no face, where trilinear interpolation has a kink, is crossed by a difference.
     auto grid = std::make_shared<VolumeGrid>();
     grid->nx = grid->ny = 2, grid->nz = 6;
     grid->spacing_um = {14, 15, 0.8};
+    if (waves) grid->spacing_um = {3.1, 2.7, 0.7};
     for (int i = 0; i < 24; ++i) {
       const double tilt = 0.4 * std::sin(1.1 * i), azimuth = 0.5 * std::cos(0.7 * i) + 0.04 * i, s = 0.8 + 0.2 * std::sin(2.3 * i);
       grid->nodes.push_back(director_tensor(std::cos(tilt) * std::cos(azimuth), std::cos(tilt) * std::sin(azimuth), std::sin(tilt), s));
@@ -381,7 +383,13 @@ std::vector<Case> cases() {
     volume.grid = grid;
     volume.scale = c.t.fixed("scale", 1.1);
     c.scene.sample = volume;
-    if (e_only) c.scene.ceiling = Ceiling::e_only;
+    if (name.ends_with("alone")) c.scene.ceiling = Ceiling::e_only;
+    if (waves) {
+      grid->nodes[9] = {};  // the host: a surface inside
+      c.scene.ceiling = Ceiling::wave;
+      c.scene.microscope.objective_na = 0.6;
+      c.scene.microscope.focus_um = c.t.fixed("focus_um", 0.7);
+    }
     all.push_back(c);
   }
   // Wave optics: the exact series of a ball and of a shell, and propagation through what has none.
