@@ -280,7 +280,11 @@ std::vector<Misfit> Fit::prior_misfit() const {
 void Fit::look_near_rays() {
   FitJob by_rays = job_;
   by_rays.branches.clear();
-  for (Micrograph& m : by_rays.micrographs) m.scene.ceiling = Ceiling::one_way, m.scene.method = "auto", m.scene.microscope.focus_um = {};
+  for (Micrograph& m : by_rays.micrographs) {
+    m.scene.ceiling = Ceiling::one_way, m.scene.method = "auto", m.scene.microscope.focus_um = {};
+    // Rays through a sampled field have kinks at all its cells and are dearer than waves: good enough to start from.
+    if (std::holds_alternative<SampledVolume>(m.scene.sample)) m.scene.intensity_accuracy = std::max(m.scene.intensity_accuracy, 1e-2);
+  }
   Fit rays(by_rays);
   rays.search(std::numeric_limits<double>::infinity());
   if (!rays.stopped_) rays.find_minima();
