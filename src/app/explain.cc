@@ -10,6 +10,7 @@
 
 #include "app/commands.h"
 #include "birefit/io.h"
+#include "render/wave.h"
 
 namespace birefit {
 namespace {
@@ -119,8 +120,9 @@ int run_explain(const Arguments& arguments) {
       size += judge.values()[i] * judge.values()[i];
       worst = std::max(worst, std::abs(d));
     }
-    std::cout << fmt::format("Check      {:.2g} of the image's RMS (worst pixel {:.2g}) from Maxwell's equations marched through the sample, which leave out light reflected twice\n",
-                             std::sqrt(difference / size), worst);
+    std::cout << fmt::format("Check      {:.2g} of the image's RMS (worst pixel {:.2g}) from Maxwell's equations marched through the sample, which leave out light reflected twice{}\n",
+                             std::sqrt(difference / size), worst,
+                             radial_twin(config.scene) ? fmt::format(": {:.2g} of a radial twin's exact picture", march_error(config.scene, theta)) : "");
   }
   return kExitDone;
 }
@@ -133,7 +135,7 @@ Command add_explain_command(CLI::App& app) {
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   command->add_option("--next", arguments->next, "which image to take next to know this parameter better: candidates, best first");
   command->add_flag("--json", arguments->json, "for scripts");
-  command->add_flag("--check", arguments->check, "droplets and shells: compare the picture with Maxwell's equations, marched through the sample (slow)")->excludes("--json");
+  command->add_flag("--check", arguments->check, "droplets, shells and sampled fields: compare the picture with Maxwell's equations, marched through the sample (slow)")->excludes("--json");
   return {command, [arguments] { return run_explain(*arguments); }};
 }
 

@@ -197,6 +197,21 @@ TEST_F(Config, WavesNeedAnApertureAndASphere) {
   EXPECT_NE(mistakes(defocused + "physics: {ceiling: one_way}\n").find("defocus needs wave optics"), std::string::npos);
 }
 
+// The file is missing too: all mistakes are told at once.
+TEST_F(Config, WavesOfASampledFieldNeedApertureAndSurround) {
+  const std::string rays =
+      "image_size_px: [8, 8]\nmicrograph: {pixel_size_um: 0.1}\n"
+      "sample:\n  volume: {file: none.npy, spacing_um: [0.1, 0.1, 0.1]}\n  material: {ordinary: 1.52, birefringence: 0.1}\n"
+      "microscope: {light: {wavelength_nm: 590}, polarizer_deg: 0, analyzer_deg: 90}\n";
+  const std::string told = mistakes(rays + "physics: {ceiling: wave}\n");
+  EXPECT_NE(told.find("ceiling: wave needs sample.surround"), std::string::npos) << told;
+  EXPECT_NE(told.find("ceiling: wave needs microscope.objective_na"), std::string::npos) << told;
+  const std::string complete = replaced(replaced(rays, "0.1}\nmicroscope", "0.1}\n  surround: {index: 1.5}\nmicroscope"), "analyzer_deg: 90}", "analyzer_deg: 90, objective_na: 0.5}");
+  EXPECT_EQ(mistakes(complete + "physics: {ceiling: wave}\n").find("ceiling"), std::string::npos);
+  EXPECT_EQ(mistakes(rays).find("surround"), std::string::npos);
+  EXPECT_EQ(mistakes(complete).find("surround"), std::string::npos);  // rays leave it alone
+}
+
 TEST_F(Config, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
   const std::string without = replaced(kRender, ", objective_na: 0.8", ""), &with_objective = kRender;
   const auto ceiling = [&](const std::string& text) { return load(text).scene.ceiling; };
