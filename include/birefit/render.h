@@ -55,7 +55,7 @@ int rays_side_by_side();
 /// Throws UserError when a forced method cannot do the scene.
 RenderPlan plan(const Scene& scene, const Theta& theta);
 
-/// The picture of a droplet or shell by Maxwell's equations, marched through (src/wave/march.h): independent of the propagation of Ceiling::wave,
+/// The picture of a droplet, shell or sampled field by Maxwell's equations, marched through (src/wave/march.h): independent of the propagation of Ceiling::wave,
 /// and much slower. Throws UserError like plan().
 Image image_by_march(const Scene& scene, const Theta& theta, int threads = 0);
 

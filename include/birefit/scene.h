@@ -244,7 +244,8 @@ struct StressedDisc {
 };
 
 struct VolumeGrid;  // birefit/volume.h
-/// A director field known at the nodes of a box, seen along its z: straight parallel rays, no refraction, nothing reflected.
+/// A director field known at the nodes of a box, seen along its z: straight parallel rays, no refraction, nothing reflected; or Ceiling::wave, in a host
+/// of Scene::surround_index, which is also where a node's tensor is zero.
 /// n_e - n_o is the material's times the field's relative order. The middle of the box is seen at View::center_x_px, center_y_px.
 struct SampledVolume {
   std::shared_ptr<const VolumeGrid> grid;  ///< never null where a scene is planned or rendered
@@ -290,7 +291,7 @@ enum class Ceiling {
   one_way,  ///< E and H continuous, backward waves dropped (default)
   e_only,   ///< only tangential E continuous: the source paper's
   reflections,  ///< all of Maxwell's equations in the layers, both faces included; cells and slabs
-  wave,     ///< wave optics: radial droplets and concentric shells exactly, other spheres without reflections. Needs Microscope::objective_na
+  wave,     ///< wave optics: radial droplets and concentric shells exactly, other spheres and sampled fields without reflections. Needs Microscope::objective_na
 };
 
 /// How light runs through a droplet: both modes on the refracted straight chord, or each on its own ray (geometrical optics of

@@ -8,7 +8,8 @@
 namespace birefit {
 
 /// The tensor s n n^T at every node, n the director (unit length, sign without meaning), s the order there over the order that
-/// the material's birefringence belongs to; 0 = no liquid crystal or an isotropic one. Between nodes the tensor is
+/// the material's birefringence belongs to; 0 = no liquid crystal or an isotropic one
+/// (to wave optics all zero is the host). Between nodes the tensor is
 /// interpolated, never the vector. Light passes from the first layer of z to the last; x points right and y up in the image.
 struct VolumeGrid {
   int nx = 0, ny = 0, nz = 0;               ///< nodes, at least 2 along each
