@@ -1098,6 +1098,8 @@ void Fit::report() {
   foretell_waves();
   if (unknowns_.size() == 0) result_.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
   result_.evaluations = evaluations_ + problem_->evaluations();
+  // Since then, too: profiles and warnings may be half done.
+  if (interrupted()) result_.interrupted = true, result_.converged = false;
   result_.verdict = verdict(result_, signal);
 }
 

@@ -189,6 +189,11 @@ std::string verdict(const FitResult& result, bool signal) {
                                    unit_suffix(estimate)));
     }
   if (!values.empty()) sentences.push_back(joined(values) + " (standard errors: " + result.covariance_kind + ").");
+  for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
+    const ParameterEstimate& p = result.parameters[j];
+    if (signal && p.profiled && std::isfinite(p.stderr_))
+      sentences.push_back(fmt::format("The 95 % interval of {} is {:.4g} to {:.4g}{}, by its profile likelihood.", name_of(result, j), p.interval95_low, p.interval95_high, unit_suffix(p)));
+  }
   if (result.has_answer())
     sentences.push_back(
         fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,

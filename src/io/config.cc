@@ -820,7 +820,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
 
   if (use == ConfigUse::render && !signals.empty()) {
     if (!micrographs.empty()) config.scene = micrographs[0].scene;  // of the first row
-  } else if (view_only) {
+  } else if (view_only && !micrographs.empty()) {  // none: their list's mistake was reported
     Scene& scene = micrographs[0].scene;
     const Item& item = items[0];
     const std::string name = item.image.value_or("the image");
@@ -852,7 +852,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     }
     config.scene = scene;
     if (use == ConfigUse::plan) config.job.micrographs = {micrographs[0]};
-  } else {
+  } else if (!view_only) {
     if (!list && signals.empty() && !items[0].image && !image) {
       const Block micrograph{root.find("micrograph"), "micrograph",
                              settings.where.line > 0 ? settings.where : Where{reader.file}};
@@ -942,7 +942,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
 
 Config load_config(const std::filesystem::path& path, ConfigUse use, const std::optional<std::filesystem::path>& image) {
   std::string text = read_text(path);
-  if (use == ConfigUse::render && holds_series(text)) {
+  if (use != ConfigUse::fit && holds_series(text)) {
     // What the frames have in common shows in the first.
     const ImageSeries series = read_series(path, std::move(text));
     return load(path, series.text, use, image, &series, 0);

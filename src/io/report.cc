@@ -641,16 +641,21 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
     chart.x_label = short_name(trace.name) + (p->unit.empty() ? "" : " (" + std::string(p->unit == "um" ? "\u00b5m" : p->unit) + ")");
     Panel panel;
     panel.y_label = "rise of chi-square";
-    Series line{Series::Kind::line, "profile", trace.value, trace.rise, kBlue, 1.5}, normal{Series::Kind::line, "parabola", {}, {}, "#8a919b", 1.0};
+    Series line{Series::Kind::line, "profile", {}, {}, kBlue, 1.5}, normal{Series::Kind::line, "parabola", {}, {}, "#8a919b", 1.0};
+    const Series dots{Series::Kind::points, "", trace.value, trace.rise, kBlue, 4.5};
     const double from = trace.value.front(), to = trace.value.back(), highest = *std::max_element(trace.rise.begin(), trace.rise.end());
     for (int i = 0; i <= 60; ++i) {
       const double x = from + (to - from) * i / 60, y = std::pow((x - p->value) / p->stderr_, 2);
       if (y <= 1.3 * highest) normal.x.push_back(x), normal.y.push_back(y);
     }
-    Series dots = line;
-    dots.kind = Series::Kind::points;
-    dots.label = "";
-    dots.width = 4.5;
+    // Between the places that were fitted its root is next to straight.
+    const auto root = [&](std::size_t i) { return std::copysign(std::sqrt(std::max(0.0, trace.rise[i])), trace.value[i] - p->value); };
+    for (std::size_t i = 0; i + 1 < trace.value.size(); ++i)
+      for (int k = 0; k <= 12; ++k) {
+        const double share = k / 12.0;
+        line.x.push_back(trace.value[i] + share * (trace.value[i + 1] - trace.value[i]));
+        line.y.push_back(std::pow(root(i) + share * (root(i + 1) - root(i)), 2));
+      }
     panel.series = {normal, line, dots};
     panel.markers = {{p->interval95_low, "95 %", kFitted, true}, {p->value, "optimum", kFitted, false}, {p->interval95_high, "", kFitted, true}};
     chart.panels = {panel};
