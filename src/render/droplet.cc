@@ -37,30 +37,32 @@ RimTable::RimTable(double index_ratio, double host_index, double objective_na) :
     }
   }
   psi_max_ = inside;
-  rho_max_ = rho_over_radius(psi_max_);
+  table_.rho_max = rho_over_radius(psi_max_);
   const double sin_in = ratio_ * std::sin(psi_max_);
   end_ = inside == std::numbers::pi / 2 - kGrazing ? End::grazing
          : sin_in > 1 - 1e-9                       ? End::total_reflection
                                                    : End::turned;
   // psi against t = sqrt(1 - rho / rho_max): smooth through the rim, where rho(psi) has its square-root end.
   // Newton from the neighbour before; rho(psi) is monotone, and what little error is left is Newton's again in trace().
-  psi_[0] = psi_max_;
+  constexpr int kNodes = IncidenceTable::kNodes;
+  std::array<double, kNodes + 1>& table = table_.psi;
+  table[0] = psi_max_;
   double psi = psi_max_;
   for (int i = 1; i < kNodes; ++i) {
     const double t = static_cast<double>(i) / kNodes;
-    const double target = rho_max_ * (1 - t * t);
-    psi = std::max(psi - (i == 1 ? psi_max_ * 0.5 / kNodes : psi_[static_cast<std::size_t>(i - 2)] - psi), 0.5 * psi);
+    const double target = table_.rho_max * (1 - t * t);
+    psi = std::max(psi - (i == 1 ? psi_max_ * 0.5 / kNodes : table[static_cast<std::size_t>(i - 2)] - psi), 0.5 * psi);
     for (int k = 0; k < 6; ++k) {
       const double s1 = std::sin(psi), c1 = std::cos(psi), s2 = ratio_ * s1, c2 = std::sqrt(std::max(1e-14, 1 - s2 * s2));
       const double sd = s1 * c2 - c1 * s2, cd = c1 * c2 + s1 * s2, c = 1 - 2 * sd * sd;
       const double slope = c1 / c + 4 * s1 * sd * cd * (1 - ratio_ * c1 / c2) / (c * c);
       const double change = (s1 / c - target) / slope;
-      psi = std::clamp(psi - change, 0.5 * psi, psi_[static_cast<std::size_t>(i - 1)]);
+      psi = std::clamp(psi - change, 0.5 * psi, table[static_cast<std::size_t>(i - 1)]);
       if (std::abs(change) < 1e-9) break;
     }
-    psi_[static_cast<std::size_t>(i)] = psi;
+    table[static_cast<std::size_t>(i)] = psi;
   }
-  psi_[kNodes] = 0;
+  table[kNodes] = 0;
 }
 
 double RimTable::rho_over_radius(double psi) const {
@@ -69,27 +71,27 @@ double RimTable::rho_over_radius(double psi) const {
 }
 
 template <class P>
-P RimTable::psi_at(const P& rho_over_radius) const {
+P IncidenceTable::at(const P& rho_over_radius) const {
   using std::floor;
-  const P t = root(max_of(P(1.0) - rho_over_radius * P(1 / rho_max_), P(1e-300))) * P(static_cast<double>(kNodes));
+  const P t = root(max_of(P(1.0) - rho_over_radius * P(1 / rho_max), P(1e-300))) * P(static_cast<double>(kNodes));
   const P cell = min_of(floor(t), P(kNodes - 1.0)), f = t - cell;
   if constexpr (std::is_same_v<P, double>) {
     const std::size_t k = static_cast<std::size_t>(cell);
-    return psi_[k] + f * (psi_[k + 1] - psi_[k]);
+    return psi[k] + f * (psi[k + 1] - psi[k]);
   } else {
     alignas(64) double cells[kLanes], low[kLanes], high[kLanes];
     cell.store_aligned(cells);
     for (int i = 0; i < kLanes; ++i) {
       const std::size_t k = static_cast<std::size_t>(cells[i]);
-      low[i] = psi_[k];
-      high[i] = psi_[k + 1];
+      low[i] = psi[k];
+      high[i] = psi[k + 1];
     }
     const P from = P::load_aligned(low);
     return from + f * (P::load_aligned(high) - from);
   }
 }
-template double RimTable::psi_at<double>(const double&) const;
-template Pack RimTable::psi_at<Pack>(const Pack&) const;
+template double IncidenceTable::at<double>(const double&) const;
+template Pack IncidenceTable::at<Pack>(const Pack&) const;
 
 template <class S>
 DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho_um) {
@@ -230,7 +232,6 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       aplanatic_(scene.microscope.aplanatic),
-      eikonal_(scene.rays == Rays::eikonal),
       objective_na_(scene.microscope.objective_na),
       sum_rad_(value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg)),
       pixel_um_(scene.view.pixel_size_um),
@@ -240,6 +241,10 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       inverse_edge_(inverse(edge_um_)),
       centre_panels_(plan.centre_panels),
       rest_panels_(plan.radial_panels) {
+  if (scene.rays == Rays::eikonal) {
+    fan_p_ = std::make_shared<const EikonalFan>(eikonal_fan(optics_, true));
+    fan_s_ = std::make_shared<const EikonalFan>(eikonal_fan(optics_, false));
+  }
   sin_cos(sum_rad_, sin_sum_, cos_sum_);
   sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
   open_ = cos_between_ * cos_between_;
@@ -271,7 +276,7 @@ void DropletImage<S>::terms(Part part, const S& v, S* out) const {
 
 template <class S>
 void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
-  if (eikonal_) return eikonal_terms_at(rho_um, out);
+  if (fan_p_) return eikonal_terms_at(rho_um, out);
   const DropletRay<S> ray = trace(optics_, rim_, rho_um);
   Mat2<S> jones = droplet_jones(optics_, ray, method_, mesh_);
   // Ray tube: flux through the mid plane is b db / (rho drho) of the incident, |E|^2 = flux / cos(2 delta).
@@ -286,7 +291,7 @@ void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
 
 template <class S>
 void DropletImage<S>::eikonal_terms_at(const S& rho_um, S* out) const {
-  const EikonalRay<S> p = eikonal_ray(optics_, true, rho_um, objective_na_), s = eikonal_ray(optics_, false, rho_um, objective_na_);
+  const EikonalRay<S> p = eikonal_ray(optics_, *fan_p_, rho_um, objective_na_), s = eikonal_ray(optics_, *fan_s_, rho_um, objective_na_);
   // |E|^2 is flux over the cosine; not aplanatic, only the transverse part of the p field counts.
   const S p_field = aplanatic_ ? p.amplitude : p.amplitude * root(p.cos_turn);
   const S s_field = aplanatic_ ? s.amplitude : s.amplitude * inverse_root(s.cos_turn);

@@ -12,7 +12,18 @@
 
 namespace birefit {
 
-/// Angle of incidence against image radius for one ratio m = n_host / n_o (values only; a start for Newton).
+/// Angle of incidence against image radius, over t = sqrt(1 - rho / rho_max): smooth through the turning point in which rho(psi) may end.
+struct IncidenceTable {
+  static constexpr int kNodes = 512;
+  double rho_max = 0;                     ///< in radii, at psi[0]
+  std::array<double, kNodes + 1> psi{};   ///< at t = i / kNodes; the last is 0
+  template <class P>
+  P at(const P& rho_over_radius) const;   ///< P = double or Pack; within 5e-5 rad
+};
+
+class EikonalFan;
+
+/// Of straight rays, for one ratio m = n_host / n_o (values only; a start for Newton).
 class RimTable {
  public:
   /// objective_na 0 = no limit.
@@ -22,16 +33,15 @@ class RimTable {
   End end() const { return end_; }
   double objective_na() const { return objective_na_; }
   double psi_max() const { return psi_max_; }
-  double rho_max() const { return rho_max_; }          ///< largest image radius / R that light reaches
+  double rho_max() const { return table_.rho_max; }     ///< largest image radius / R that light reaches
   double rho_over_radius(double psi) const;
   template <class P>
-  P psi_at(const P& rho_over_radius) const;             ///< P = double or Pack; within 5e-5 rad
+  P psi_at(const P& rho_over_radius) const { return table_.at(rho_over_radius); }
 
  private:
-  static constexpr int kNodes = 512;
-  double ratio_, objective_na_, psi_max_ = 0, rho_max_ = 0;
+  double ratio_, objective_na_, psi_max_ = 0;
   End end_ = End::grazing;
-  std::array<double, kNodes + 1> psi_{};
+  IncidenceTable table_;
 };
 
 template <class S>
@@ -145,7 +155,8 @@ class DropletImage final : public PixelModel<S> {
   RimTable rim_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  bool aplanatic_, eikonal_;
+  bool aplanatic_;
+  std::shared_ptr<const EikonalFan> fan_p_, fan_s_;  ///< of curved rays; else none
   double objective_na_;
   S cos_between_, sin_between_, cos_sum_, sin_sum_, sum_rad_;  ///< of analyser - polarizer, of analyser + polarizer
   double pixel_um_;

@@ -7,45 +7,46 @@
 #include "medium/families/axial_angle.h"
 
 namespace birefit {
-namespace {
-
-/// The angle of incidence whose ray is seen at rho / R: bisection, one lane after the other; what is left of the error is one
-/// Newton step's. Negative where no ray of this mode arrives.
-double eikonal_incidence(double rho, double n_host, double n_mode, double sweep) {
+EikonalFan::EikonalFan(double n_host, double n_mode, double sweep, bool extraordinary) : extraordinary_(extraordinary) {
+  const double ratio = n_host / n_mode;
   const auto seen = [&](double psi, double& turn) {
-    turn = std::numbers::pi - 2 * psi - (std::numbers::pi - 2 * std::asin(std::min(1.0, n_host / n_mode * std::sin(psi)))) * sweep;
+    turn = std::numbers::pi - 2 * psi - (std::numbers::pi - 2 * std::asin(std::min(1.0, ratio * std::sin(psi)))) * sweep;
     return std::sin(psi) / std::cos(turn);
   };
-  double low = 0, high = std::min(std::numbers::pi / 2, n_host > n_mode ? std::asin(n_mode / n_host) : 4.0) - 1e-7, turn;
-  for (int i = 0; i < 60; ++i) {
+  // Rays turned by 80 degrees and more never reach an objective.
+  const auto arrives = [&](double psi) {
+    double turn;
+    seen(psi, turn);
+    return std::abs(turn) < 1.4;
+  };
+  double low = 0, high = std::min(std::numbers::pi / 2, ratio > 1 ? std::asin(1 / ratio) : 4.0) - 1e-7, turn;
+  if (arrives(high)) low = high;
+  for (int i = 0; i < 60 && low < high; ++i) {
     const double middle = 0.5 * (low + high);
-    const double here = seen(middle, turn);
-    // Rays turned by 80 degrees and more never reach an objective.
-    (std::abs(turn) < 1.4 && here < rho ? low : high) = middle;
+    (arrives(middle) ? low : high) = middle;
   }
-  const double found = seen(low, turn);
-  return std::abs(found - rho) < 1e-6 && std::abs(turn) < 1.4 ? low : -1;
+  table_.psi[0] = low;
+  table_.rho_max = seen(low, turn);
+  for (int i = 1; i < IncidenceTable::kNodes; ++i) {
+    const double t = static_cast<double>(i) / IncidenceTable::kNodes, target = table_.rho_max * (1 - t * t);
+    // 30 halvings of less than the last step's size: far below what interpolation leaves.
+    double below = 0, above = table_.psi[static_cast<std::size_t>(i - 1)];
+    for (int k = 0; k < 30; ++k) {
+      const double middle = 0.5 * (below + above);
+      (seen(middle, turn) < target ? below : above) = middle;
+    }
+    table_.psi[static_cast<std::size_t>(i)] = 0.5 * (below + above);
+  }
 }
 
-}  // namespace
-
 template <class S>
-EikonalRay<S> eikonal_ray(const DropletOptics<S>& o, bool extraordinary, const S& rho_um, double objective_na) {
+EikonalRay<S> eikonal_ray(const DropletOptics<S>& o, const EikonalFan& fan, const S& rho_um, double objective_na) {
   using P = PlainOf<S>;
+  const bool extraordinary = fan.extraordinary();
   const S n_mode = extraordinary ? o.n_e : o.n_o, sweep = extraordinary ? o.n_o * inverse(o.n_e) : S(1.0);
-  P start(0.0);
-  {
-    const P rho = plain(rho_um) * inverse(plain(o.radius_um));
-    alignas(64) double place[kLanes];
-    for (int i = 0; i < kLanesOf<S>; ++i)
-      place[i] = eikonal_incidence(lane(rho, i), lane(plain(o.n_host), 0), lane(plain(n_mode), 0), lane(plain(sweep), 0));
-    if constexpr (std::is_same_v<P, double>)
-      start = place[0];
-    else
-      start = P::load_aligned(place);
-  }
-  const auto arrives = start >= P(0.0);
-  start = select(arrives, start, P(0.1));  // any ray will do where none arrives
+  const P place = plain(rho_um) * inverse(plain(o.radius_um)), limit(fan.psi_max());
+  const auto arrives = place <= P(fan.rho_max());
+  P start = fan.incidence(min_of(place, P(fan.rho_max())));
   const S ratio = o.n_host * inverse(n_mode);
   S s1, c1, c2, turn, cos_turn, sin_turn, slope;
   const auto geometry = [&](const S& psi) {
@@ -57,13 +58,16 @@ EikonalRay<S> eikonal_ray(const DropletOptics<S>& o, bool extraordinary, const S
     slope = o.radius_um * inverse(cos_turn) * (c1 + s1 * sin_turn * inverse(cos_turn) * (2.0 * sweep * ratio * c1 * inverse(c2) - 2.0));
     return o.radius_um * s1 * inverse(cos_turn);
   };
-  // Value and derivatives by one Newton step each: d psi = (d rho wanted - d rho(psi; parameters)) / slope.
-  S psi(start);
+  // From the table's 5e-5 rad to rounding; no step leaves the rays that arrive.
   for (int i = 0; i < 2; ++i) {
-    const S here = geometry(S(plain(psi)));  // sets the slope
-    const S change = (rho_um - here) * inverse(S(plain(slope)));
-    psi = S(plain(psi)) + select(arrives, change, S(0.0));
+    const P here = plain(geometry(S(start)));
+    start = min_of(max_of(start + (plain(rho_um) - here) * inverse(plain(slope)), P(0.0)), limit);
   }
+  start = select(arrives, start, P(0.1));  // any ray will do where none arrives
+  // Derivatives by one step more: d psi = (d rho wanted - d rho(psi; parameters)) / slope.
+  const S here = geometry(S(start));
+  const S change = (rho_um - here) * inverse(S(plain(slope)));
+  const S psi = S(start) + select(arrives, change, S(0.0));
   geometry(psi);
   EikonalRay<S> ray;
   ray.cos_turn = cos_turn;
@@ -83,7 +87,7 @@ EikonalRay<S> eikonal_ray(const DropletOptics<S>& o, bool extraordinary, const S
   return ray;
 }
 
-#define BIREFIT_INSTANTIATE(S) template EikonalRay<S> eikonal_ray<S>(const DropletOptics<S>&, bool, const S&, double);
+#define BIREFIT_INSTANTIATE(S) template EikonalRay<S> eikonal_ray<S>(const DropletOptics<S>&, const EikonalFan&, const S&, double);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

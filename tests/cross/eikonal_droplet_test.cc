@@ -33,10 +33,10 @@ TEST(EikonalDroplet, RaysAgreeWithIndependentOnes) {
     const DropletOptics<double> o = droplet(n_o, n_e, n_o);
     const double seen = table.number(row, "apparent_b_midplane_over_R");
     if (!(seen < 0.999)) continue;
-    const EikonalRay<double> ray = eikonal_ray(o, true, seen, 0);
+    const EikonalRay<double> ray = eikonal_ray(o, eikonal_fan(o, true), seen, 0);
     ASSERT_GT(ray.amplitude, 0) << b;
     EXPECT_NEAR(std::acos(ray.cos_turn) * 180 / std::numbers::pi, std::abs(table.number(row, "exit_angle_deg")), 1e-4 + 60e-6 / (1 - seen)) << b;
-    const double difference = ray.phase_rad - eikonal_ray(o, false, seen, 0).phase_rad;
+    const double difference = ray.phase_rad - eikonal_ray(o, eikonal_fan(o, false), seen, 0).phase_rad;
     const double chord = table.number(row, "chord_retardance_over_R");
     EXPECT_NEAR(difference - chord, table.number(row, "path_error_straight_chord_over_R"), 3e-6 / (1 - seen)) << b;
   }
@@ -46,7 +46,7 @@ TEST(EikonalDroplet, RaysAgreeWithIndependentOnes) {
 TEST(EikonalDroplet, WithoutBirefringenceBothModesAreOne) {
   const DropletOptics<double> o = droplet(1.52, 1.52, 1.43);
   for (double rho : {0.05, 0.4, 0.8}) {
-    const EikonalRay<double> p = eikonal_ray(o, true, rho, 0), s = eikonal_ray(o, false, rho, 0);
+    const EikonalRay<double> p = eikonal_ray(o, eikonal_fan(o, true), rho, 0), s = eikonal_ray(o, eikonal_fan(o, false), rho, 0);
     EXPECT_NEAR(p.phase_rad, s.phase_rad, 1e-12);
     EXPECT_NEAR(p.cos_turn, s.cos_turn, 1e-12);
   }
