@@ -51,7 +51,9 @@ int run_explain(const Arguments& arguments) {
   const bool picture = !config.job.micrographs.empty() && config.scene.microscope.directions.empty() && config.scene.view.width * config.scene.view.height > 1;
   bool fitted = false;
   for (int i = 0; i < table.size(); ++i) fitted = fitted || table[i].free;
-  const std::optional<Outlook> expected = picture && fitted ? std::optional(outlook(config.job)) : std::nullopt;
+  constexpr double kMostSeconds = 60;  // images with derivatives
+  const bool quick = chosen.cost_seconds * table.size() < kMostSeconds;
+  const std::optional<Outlook> expected = picture && fitted && quick ? std::optional(outlook(config.job)) : std::nullopt;
   const std::vector<Shot> shots = arguments.next.empty() ? std::vector<Shot>{} : next_shots(config.job, arguments.next);
 
   if (arguments.json) {
@@ -98,6 +100,7 @@ int run_explain(const Arguments& arguments) {
     std::cout << "\n";
   }
   if (!any) std::cout << "Fitted     nothing\n";
+  if (picture && fitted && !quick) std::cout << "Expected   not computed: it would take more than a minute\n";
   if (expected) {
     std::cout << fmt::format("Expected   at the start values, noise {}:\n", expected->noise);
     for (const ParameterEstimate& p : expected->parameters)

@@ -51,11 +51,13 @@ int run_fit(const Arguments& arguments) {
   if (terminal)
     job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
   FitResult result = fit(job);
-  if (arguments.coverage > 0 && result.has_answer()) {
+  if (arguments.coverage > 0 && result.has_answer() && config.signals.empty()) {
+    write_results(out, config, result);  // the audit may take hours
+    folder->keep();
     if (terminal) std::cerr << fmt::format("\r\033[Kfitting {} simulated images", arguments.coverage) << std::flush;
     result.coverage = measure_coverage(job, result, arguments.coverage);
   } else if (arguments.coverage > 0) {
-    result.warnings.push_back("--coverage: this fit has no answer to simulate images at.");
+    result.warnings.push_back(config.signals.empty() ? "--coverage: this fit has no answer to simulate images at." : "--coverage is for images, not for tables of signals.");
   }
   if (terminal) std::cerr << "\r\033[K" << std::flush;
   write_results(out, config, result);

@@ -34,7 +34,7 @@ struct Arguments {
 void remove_parts(const fs::path& folder) {
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-    if (entry.path().extension() == ".part") fs::remove(entry.path(), ignored);
+    if (entry.path().extension() == ".part" && entry.path().filename().string().starts_with('.')) fs::remove(entry.path(), ignored);
 }
 
 /// Text between double quotes of a gnuplot script.

@@ -16,25 +16,35 @@ namespace {
 using namespace estimation;
 
 /// The fit's residual in units of its noise, shifted round the image by a random step and turned in sign: what neighbours share they
-/// still share (a moving-block bootstrap with one block). Only between pixels that were used.
+/// still share (a moving-block bootstrap with one block), within the box of the pixels that were used; a pixel whose source was not used
+/// keeps its own.
 Image moved_residual(const MicrographResult& of, std::mt19937_64& random) {
-  const int w = of.residual.width(), h = of.residual.height();
+  int left = of.residual.width(), right = -1, top = of.residual.height(), bottom = -1;
+  const auto whitened = [&](int x, int y) { return of.residual(x, y) / of.sigma(x, y); };
+  for (int y = 0; y < of.residual.height(); ++y)
+    for (int x = 0; x < of.residual.width(); ++x)
+      if (std::isfinite(whitened(x, y))) left = std::min(left, x), right = std::max(right, x), top = std::min(top, y), bottom = std::max(bottom, y);
+  Image noise(of.residual.width(), of.residual.height());
+  if (right < 0) return noise;
+  const int w = right - left + 1, h = bottom - top + 1;
   const int dx = static_cast<int>(random() % static_cast<std::uint64_t>(w)), dy = static_cast<int>(random() % static_cast<std::uint64_t>(h));
   const double sign = random() % 2 ? 1 : -1;
-  Image noise(w, h);
-  for (int y = 0; y < h; ++y)
-    for (int x = 0; x < w; ++x) {
-      const int from_x = (x + dx) % w, from_y = (y + dy) % h;
-      const double whitened = of.residual(from_x, from_y) / of.sigma(from_x, from_y);
-      noise(x, y) = std::isfinite(whitened) ? sign * whitened * of.sigma(x, y) : 0;
+  for (int y = top; y <= bottom; ++y)
+    for (int x = left; x <= right; ++x) {
+      double moved = whitened(left + (x - left + dx) % w, top + (y - top + dy) % h);
+      if (!std::isfinite(moved)) moved = whitened(x, y);
+      if (std::isfinite(moved)) noise(x, y) = sign * moved * of.sigma(x, y);
     }
   return noise;
 }
 
+/// More than its noise, by the fit's own measure.
+bool misfits(const MicrographResult& of) { return of.chi_square > of.used + 5 * std::sqrt(2.0 * of.used); }
+
 /// What a camera with the fit's noise would have recorded.
-Image simulated(const Micrograph& micrograph, const MicrographResult& of, bool residuals, std::mt19937_64& random) {
+Image simulated(const Micrograph& micrograph, const MicrographResult& of, std::mt19937_64& random) {
   Image values = of.fitted;
-  if (residuals) {
+  if (misfits(of)) {
     const Image noise = moved_residual(of, random);
     for (std::size_t i = 0; i < values.size(); ++i) values.values()[i] += noise.values()[i];
     return values;
@@ -44,7 +54,8 @@ Image simulated(const Micrograph& micrograph, const MicrographResult& of, bool r
   std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < values.size(); ++i) {
     double& value = values.values()[i];
-    if (photons && value > 0) {
+    // Beyond a billion photons their noise is normal, and of no matter.
+    if (photons && value > 0 && value < 1e9 * of.noise.counts_per_photon) {
       std::poisson_distribution<long> photon(value / of.noise.counts_per_photon);
       value = static_cast<double>(photon(random)) * of.noise.counts_per_photon + of.noise.read_counts * normal(random);
     } else {
@@ -54,13 +65,30 @@ Image simulated(const Micrograph& micrograph, const MicrographResult& of, bool r
   return values;
 }
 
+/// Priors are observations, too: another draw has seen other ones.
+void redraw_priors(FitJob& job, const Theta& truth, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < job.parameters.size(); ++i) {
+    Parameter& p = job.parameters[i];
+    if (p.free && p.prior_sd) p.value = std::clamp(truth[static_cast<std::size_t>(i)] + *p.prior_sd * normal(random), p.lower, p.upper);
+  }
+  if (!job.prior) return;
+  JointPrior& prior = *job.prior;
+  Eigen::VectorXd drawn(prior.mean.size());
+  for (double& x : drawn) x = normal(random);
+  const Eigen::LDLT<Eigen::MatrixXd> root(prior.covariance);
+  drawn = root.vectorD().cwiseMax(0.0).cwiseSqrt().cwiseProduct(drawn);
+  drawn = root.transpositionsP().transpose() * Eigen::VectorXd(root.matrixL() * drawn);
+  for (std::size_t k = 0; k < prior.names.size(); ++k)
+    if (const ParameterRef ref = job.parameters.find(prior.names[k]); ref && job.parameters[ref].free)
+      prior.mean[static_cast<Eigen::Index>(k)] = truth[static_cast<std::size_t>(ref.index)] + drawn[static_cast<Eigen::Index>(k)];
+}
+
 }  // namespace
 
 Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws) {
   Coverage coverage;
-  // The share of the misfit in the weights; 1.2 is a noise model that is a little off.
-  constexpr double kMoreThanNoise = 1.2;
-  coverage.of_residuals = result.reduced_chi_square > kMoreThanNoise;
+  coverage.of_residuals = std::any_of(result.micrographs.begin(), result.micrographs.end(), misfits);
   std::vector<std::optional<FitResult>> fits(static_cast<std::size_t>(std::max(0, draws)));
   const auto one = [&](int draw, int threads) {
     if (job.options.interrupted && job.options.interrupted->load()) return;
@@ -70,11 +98,17 @@ Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws)
     again.options.threads = threads;
     for (std::size_t g = 0; g < again.micrographs.size(); ++g) {
       Micrograph& m = again.micrographs[g];
-      const Image drawn = simulated(m, result.micrographs[g], coverage.of_residuals, random);
+      const Image drawn = simulated(m, result.micrographs[g], random);
       for (std::size_t i = 0; i < drawn.size(); ++i)
         if (m.mask.values()[i]) m.values.values()[i] = drawn.values()[i];
     }
-    FitResult refit = fit(again);
+    redraw_priors(again, result.theta, random);
+    FitResult refit;
+    try {
+      refit = fit(again);
+    } catch (const UserError&) {  // a model too large on the way: a draw without an answer
+      refit = {};
+    }
     for (MicrographResult& m : refit.micrographs) m = {};  // images of hundreds of draws
     if (!refit.interrupted) fits[static_cast<std::size_t>(draw)] = std::move(refit);
   };
@@ -83,7 +117,7 @@ Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws)
   parallel_for(draws, threads, [&](int draw) { one(draw, 1); });
 
   for (const ParameterEstimate& p : result.parameters) coverage.parameters.push_back({p.name, 0, 0, 0, 0});
-  std::vector<double> squares(coverage.parameters.size(), 0.0), errors(squares), sum(squares);
+  std::vector<double> squares(coverage.parameters.size(), 0.0), errors(squares), sum(squares), number(squares);
   for (const std::optional<FitResult>& refit : fits) {
     if (!refit) continue;
     ++coverage.draws;
@@ -102,13 +136,14 @@ Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws)
       Coverage::Of& of = coverage.parameters[j];
       of.inside68 += std::abs(off) <= sd * student_t_quantile(0.8413447460685429, refit->interval_degrees_of_freedom);
       of.inside95 += found->interval95_low <= truth.value && truth.value <= found->interval95_high;
-      sum[j] += off, squares[j] += off * off, errors[j] += sd;
+      sum[j] += off, squares[j] += off * off, errors[j] += sd, ++number[j];
       wrong = wrong || (!found->linear && found->limit.empty() && std::abs(off) > 5 * sd);
     }
     coverage.wrong += wrong;
   }
-  const double n = coverage.answered;
-  for (std::size_t j = 0; j < coverage.parameters.size() && n > 0; ++j) {
+  for (std::size_t j = 0; j < coverage.parameters.size(); ++j) {
+    const double n = number[j];
+    if (n == 0) continue;
     Coverage::Of& of = coverage.parameters[j];
     of.inside68 /= n;
     of.inside95 /= n;

@@ -759,6 +759,8 @@ void Fit::settle_interval(ParameterEstimate& estimate, int unknown, const Invers
     return to == end ? std::max(length, t * sd) : length;
   };
   const double low = half(parameter.lower), high = half(parameter.upper);
+  if (profile.lowest() < -1)
+    result_.warnings.push_back(fmt::format("A better fit by {:.2g} in chi-square was met on the profile of {}: the solver had not reached the minimum.", -profile.lowest(), parameter.name));
   if (std::abs(low / (t * sd) - 1) < 0.5 * kBent && std::abs(high / (t * sd) - 1) < 0.5 * kBent) return;  // only the way there was bent
   const double more = t * t * (estimate.stderr_ * estimate.stderr_ - sd * sd);
   estimate.interval95_low = estimate.value - std::sqrt(low * low + more);
@@ -1183,7 +1185,7 @@ FitResult fit(const FitJob& job) {
       if (by_rays.interrupted || rays.change_by_waves() < kShiftThatMatters) {
         if (job.branches.size() > 1 && !by_rays.interrupted) return fit(chosen);  // by rays, every branch
         for (MicrographResult& m : by_rays.micrographs)
-          m.plan.reasons.push_back(fmt::format("rays suffice: wave optics would shift no parameter by more than {:.2g} standard errors", rays.change_by_waves()));
+          if (!by_rays.interrupted) m.plan.reasons.push_back(fmt::format("rays suffice: wave optics would shift no parameter by more than {:.2g} standard errors", rays.change_by_waves()));
         return by_rays;
       }
     }

@@ -53,7 +53,7 @@ Planned planned(const FitJob& job) {
       if (m.gain && p.job.parameters[m.gain].free && range > 0) p.job.parameters[m.gain].value = (bright - dark) / range;
       if (m.offset && p.job.parameters[m.offset].free && !p.job.parameters[m.offset].prior_sd)
         p.job.parameters[m.offset].value = dark - *low * (m.gain ? p.job.parameters[m.gain].value : 1);
-    } else {
+    } else if (m.mask.empty()) {
       m.mask = Mask(light.width(), light.height(), 1);
     }
     const double gain = m.gain ? p.job.parameters[m.gain].value : 1, offset = m.offset ? p.job.parameters[m.offset].value : 0;
@@ -118,7 +118,6 @@ FitJob with_shot(const FitJob& job, const std::function<void(Scene&, ParameterTa
   Micrograph shot = job.micrographs.front();
   shot.name = "next";
   shot.values = {};
-  shot.mask = {};
   change(shot.scene, more.parameters);
   // The lamp may have changed.
   for (ParameterRef* ref : {&shot.gain, &shot.offset})

@@ -65,7 +65,11 @@ double Profile::crossing(double end, double allowed) {
       value = inside + (outside - inside) * std::clamp(fraction, 0.05, 0.95);
     }
   }
-  return value;
+  return outside;
+}
+
+double Profile::lowest() const {
+  return std::min_element(places_.begin(), places_.end(), [](const Place& a, const Place& b) { return a.rise < b.rise; })->rise;
 }
 
 std::array<double, 2> Profile::straightness(double allowed) {

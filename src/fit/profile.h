@@ -17,8 +17,11 @@ class Profile {
 
   /// Above the objective at the optimum; not minimised further where that is below `enough` already.
   double rise(double value, double enough = -1);
-  /// The place between the estimate and `end` where the rise is `allowed`, to 1 % of its root; `end` where it stays below.
+  /// The place between the estimate and `end` where the rise is `allowed`, to 1 % of its root; `end` where it stays below. Where that takes
+  /// more than sixteen places, the nearest that is beyond.
   double crossing(double end, double allowed);
+  /// Of all rises so far; clearly below zero: the estimate was not the minimum.
+  double lowest() const;
   /// The rise `allowed`^(1/2) standard errors up and down, the others following along straight lines, over `allowed`: both 1 where the
   /// objective is a parabola. Clipped at the bounds.
   std::array<double, 2> straightness(double allowed);

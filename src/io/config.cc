@@ -798,7 +798,9 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   for (std::size_t i = 0; i < items.size(); ++i) micrographs.push_back(apply_set(reader, shared, items[i], i));
 
   // Without an image to look at there is only the view.
-  const bool view_only = use == ConfigUse::render || (use == ConfigUse::plan && !image && signals.empty() && std::none_of(items.begin(), items.end(), [](const Item& i) { return i.image.has_value(); }));
+  const bool view_only = use == ConfigUse::render || (use == ConfigUse::plan && !image && signals.empty() && std::none_of(items.begin(), items.end(), [&](const Item& i) {
+    return i.image && (!size || std::filesystem::exists(reader.resolve(*i.image)));  // named, but not yet taken
+  }));
   if (use != ConfigUse::render) {
     // A shared parameter that every image replaces by its own is no unknown of the fit.
     std::set<int> used;

@@ -150,7 +150,7 @@ double error_on_twin(const Scene& scene, const Values<double>& value, double sca
   constant(droplet.diameter_um, diameter);
   if (auto* shell = std::get_if<ShellDirector>(&droplet.director)) constant(shell->wall_um, scale * value(shell->wall_um));
   if (twin.microscope.focus_um) constant(twin.microscope.focus_um, scale * value(twin.microscope.focus_um));
-  // Pixels as large as the scene's: what is left out need not have the sign of what is seen, and large pixels average.
+  // Pixels as large as the scene's, where 64 of them suffice: what is left out need not have the sign of what is seen, and large pixels average.
   const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * scene.view.pixel_size_um)), 2, 64);
   twin.view.width = twin.view.height = pixels;
   twin.view.pixel_size_um = (diameter + 4) / pixels;
