@@ -135,7 +135,7 @@ struct ProfileTrace {
 /// Fits of images simulated at the estimate, each from the job's own start (`fit --coverage`).
 struct Coverage {
   int draws = 0;
-  bool of_residuals = false;  ///< the simulated noise is the fit's residual, moved about; else the noise model's
+  bool of_residuals = false;  ///< the simulated noise is the fit's residual, drawn in blocks; else the noise model's
   int answered = 0;           ///< fits with an answer; the others said that they have none
   int wrong = 0;              ///< answered, with a searched parameter more than 5 standard errors off: what must not be
   struct Of {
@@ -186,8 +186,8 @@ struct FitResult {
 FitResult fit(const FitJob& job);
 
 /// Does the interval hold what it says? `draws` images simulated at `result`, fitted as `job` asks, on all threads. Where the fit's misfit
-/// exceeds its noise, its residuals serve as noise, shifted round the image and turned in sign, so that what neighbouring pixels share
-/// stays shared. Deterministic. Ends early, with fewer draws, when interrupted.
+/// exceeds its noise, its residuals serve as noise, in blocks drawn with replacement and turned in sign, so that what neighbouring pixels
+/// share stays shared. Deterministic. Ends early, with fewer draws, when interrupted.
 Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws);
 
 /// What images of the job's scenes tell of its free parameters, at their start values: before a fit, or before the image is taken.

@@ -586,7 +586,7 @@ std::string coverage_table(const FitResult& result) {
   const Coverage& c = *result.coverage;
   std::string out = fmt::format(
       "<h2>Do the intervals hold?</h2>\n<p>{} images were simulated at this result ({}) and fitted from scratch: {} gave an answer, {} of these more than 5 standard errors off.</p>\n", c.draws,
-      c.of_residuals ? "with the fit\u2019s own residuals as noise, moved about" : "with the noise as modelled", c.answered, c.wrong);
+      c.of_residuals ? "with the fit\u2019s own residuals as noise, drawn in blocks" : "with the noise as modelled", c.answered, c.wrong);
   if (c.answered == 0) return out;
   out += "<div class=\"scroll\"><table>\n<tr><th>parameter</th><th>in 68 % interval</th><th>in 95 % interval</th><th>spread / std. error</th><th>bias / std. error</th></tr>\n";
   for (const Coverage::Of& p : c.parameters)

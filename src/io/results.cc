@@ -121,7 +121,7 @@ std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
 
 std::string coverage_text(const Coverage& c) {
   std::string text = fmt::format("  {} images simulated at this result ({}) and fitted from scratch: {} with an answer, {} of them more than 5 standard errors off\n", c.draws,
-                                 c.of_residuals ? "noise: the fit's own residuals, moved about" : "noise as modelled", c.answered, c.wrong);
+                                 c.of_residuals ? "noise: the fit's own residuals, drawn in blocks" : "noise as modelled", c.answered, c.wrong);
   if (c.answered == 0) return text;
   std::size_t width = 0;
   for (const Coverage::Of& p : c.parameters) width = std::max(width, p.name.size());

@@ -693,6 +693,46 @@ TEST(Coverage, TakesResidualsForNoiseWhereTheModelDoesNotFit) {
   for (const Coverage::Of& p : audit.parameters) EXPECT_GT(p.inside95, 0.95 - 3 * 0.028) << p.name;
 }
 
+TEST(Coverage, HoldsForAParameterKnownByItsPriorAlone) {
+  // The half-wave voltage is known to 3 % from elsewhere, and one image of the ratio V/V_half adds nothing: estimate and error are the prior's. Held
+  // at its centre for every draw it would not scatter at all.
+  Bar bar(700, 0.4);
+  bar.free(bar.bias, 650, 300, 1400);
+  bar.free(bar.half_wave, kHalfWave, 1000, 2000);
+  bar.job.parameters[bar.half_wave].prior_sd = 45;
+  bar.free_linear();
+  Micrograph& m = bar.add_image(24, 20, bar.bias);
+  m.noise = NoiseModel{20, 0, false};
+  Gaussian gaussian(17);
+  expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
+  const FitResult result = fit(bar.job);
+  const Coverage audit = measure_coverage(bar.job, result, 200);
+  ASSERT_GT(audit.answered, 190);
+  for (const Coverage::Of& p : audit.parameters)
+    if (p.name == "sample.crystal.half_wave_voltage_v") {
+      EXPECT_NEAR(p.spread, 1, 4 * 0.05);
+      EXPECT_NEAR(p.inside95, 0.95, 4 * 0.0154);
+    }
+}
+
+TEST(Coverage, OfAMaskedImageHasItsNoise) {
+  // Residuals serve as noise; three quarters of the image are masked. Were noise lost to the mask, the refits would scatter less than they say.
+  Bar bar(700, 0.4);
+  bar.free(bar.bias, 600, 300, 1400);
+  bar.free_linear();
+  Micrograph& m = bar.add_image(40, 40, bar.bias);
+  m.noise = NoiseModel{10, 0, false};  // half the truth
+  Gaussian gaussian(19);
+  expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 40; ++x)
+      if (x >= 20 || y < 10 || y >= 30) m.mask(x, y) = 0;
+  const FitResult result = fit(bar.job);
+  const Coverage audit = measure_coverage(bar.job, result, 200);
+  EXPECT_TRUE(audit.of_residuals);
+  for (const Coverage::Of& p : audit.parameters) EXPECT_NEAR(p.spread, 1, 4 * 0.05 + 0.05) << p.name;  // one residual image stands for all
+}
+
 TEST(Outlook, IsTheStandardErrorThatTheFitThenHas) {
   Bar bar(2400, 0.9);  // one and a half fringes
   bar.free(bar.bias, 2400, 2000, 2800);
