@@ -746,6 +746,9 @@ std::optional<double> Fit::upper_limit(int unknown, const Inverse& inverse) {
 void Fit::settle_interval(ParameterEstimate& estimate, int unknown, const Inverse& of_noise) {
   const double t = student_t_quantile(0.975, result_.interval_degrees_of_freedom), sd = std::sqrt(of_noise.covariance(unknown, unknown));
   if (stopped_ || !std::isfinite(t * sd) || !(sd > 0) || of_noise.undetermined[static_cast<std::size_t>(unknown)]) return;
+  // A joint prior is itself the parabola that an earlier fit was taken for: followed far along its valley it bends where the earlier data do
+  // not (docs/methods.md, "Profiles").
+  if (job_.prior) return;
   const Parameter& parameter = job_.parameters[unknowns_.table_index(unknown)];
   // A valley longer than the bounds is no interval but a verdict.
   if (!(t * sd < parameter.upper - parameter.lower)) return;
