@@ -11,7 +11,8 @@ namespace birefit {
 
 int thread_count(int requested) {
   if (requested > 0) return requested;
-  return std::max(1u, std::thread::hardware_concurrency());
+  static const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));  // asks the system, which takes its time
+  return cores;
 }
 
 void parallel_for(int n, int threads, const std::function<void(int)>& body) {

@@ -5,12 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <set>
 
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
 #include "birefit/render.h"
+#include "core/threads.h"
 #include "fit/statistics.h"
+#include "medium/references.h"
 
 namespace birefit::estimation {
 namespace {
@@ -69,6 +72,9 @@ LeastSquares::LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vec
     frame.inverse_sigma_norm = frame.inverse_sigma.norm();
     frame.gain = job.micrographs[g].gain ? position(unknowns_.linear, job.micrographs[g].gain.index) : -1;
     frame.offset = job.micrographs[g].offset ? position(unknowns_.linear, job.micrographs[g].offset.index) : -1;
+    std::set<int> read;
+    for_each_ref(job.micrographs[g].scene, [&](const ParameterRef& ref) { read.insert(position(unknowns_.searched, ref.index)); });
+    frame.read.assign(read.lower_bound(0), read.end());
     for (Eigen::Index begin = 0; begin < frame.count; begin += kTileRows)
       tiles_.push_back({static_cast<int>(g), begin, std::min(kTileRows, frame.count - begin)});
     pixel_rows_ += frame.count;
@@ -158,39 +164,48 @@ void LeastSquares::set_priors() {
   }
 }
 
+void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
+  Frame& frame = frames_[g];
+  const Scene& scene = job_.micrographs[g].scene;
+  const std::vector<std::array<int, 2>>& pixels = frame.set.pixels;
+  std::vector<int> active;
+  if (derivatives)
+    for (const int j : frame.read) active.push_back(unknowns_.searched[static_cast<std::size_t>(j)]);
+  auto intensity = intensity_.segment(frame.begin, frame.count);
+  if (derivatives) searched_columns_.middleRows(frame.begin, frame.count).setZero();
+  const auto column = [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); };
+  // A whole image is cheaper by its symmetries and rows; a small part of it pixel by pixel.
+  if (2 * pixels.size() > static_cast<std::size_t>(scene.view.width) * scene.view.height) {
+    render(scene, plans_[g], theta_, active, threads, frame.rendering);
+    const Rendering& rendering = frame.rendering;
+    const auto gather = [&](const Image& image, auto&& out) {
+      for (Eigen::Index i = 0; i < frame.count; ++i) out[i] = image(pixels[i][0], pixels[i][1]);
+    };
+    gather(rendering.intensity, intensity);
+    for (std::size_t j = 0; j < active.size(); ++j) gather(rendering.derivatives[j], column(j));
+  } else {
+    const PixelRendering rendering = render_pixels(scene, plans_[g], theta_, pixels, active, threads);
+    intensity = rendering.intensity;
+    for (std::size_t j = 0; j < active.size(); ++j) column(j) = rendering.derivatives.col(static_cast<Eigen::Index>(j));
+  }
+  frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
+  frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
+  auto whitened = whitened_intensity_.segment(frame.begin, frame.count);
+  whitened = intensity;
+  whiten(frame, whitened);
+}
+
 void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   const Eigen::Index p = searched.size();
   for (Eigen::Index j = 0; j < p; ++j) theta_[unknowns_.searched[j]] = searched[j];
   has_derivatives_ = false;
   if (derivatives) searched_columns_.resize(residual_.size(), p);
-  const std::vector<int> active = derivatives ? unknowns_.searched : std::vector<int>{};
   ++evaluations_;
-  for (std::size_t g = 0; g < frames_.size(); ++g) {
-    Frame& frame = frames_[g];
-    const Scene& scene = job_.micrographs[g].scene;
-    const std::vector<std::array<int, 2>>& pixels = frame.set.pixels;
-    auto intensity = intensity_.segment(frame.begin, frame.count);
-    // A whole image is cheaper by its symmetries and rows; a small part of it pixel by pixel.
-    if (2 * pixels.size() > static_cast<std::size_t>(scene.view.width) * scene.view.height) {
-      render(scene, plans_[g], theta_, active, job_.options.threads, frame.rendering);
-      const Rendering& rendering = frame.rendering;
-      const auto gather = [&](const Image& image, auto&& out) {
-        for (Eigen::Index i = 0; i < frame.count; ++i) out[i] = image(pixels[i][0], pixels[i][1]);
-      };
-      gather(rendering.intensity, intensity);
-      for (std::size_t j = 0; j < active.size(); ++j)
-        gather(rendering.derivatives[j], searched_columns_.col(j).segment(frame.begin, frame.count));
-    } else {
-      const PixelRendering rendering = render_pixels(scene, plans_[g], theta_, pixels, active, job_.options.threads);
-      intensity = rendering.intensity;
-      if (derivatives && p > 0) searched_columns_.middleRows(frame.begin, frame.count) = rendering.derivatives;
-    }
-    frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
-    frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
-    auto whitened = whitened_intensity_.segment(frame.begin, frame.count);
-    whitened = intensity;
-    whiten(frame, whitened);
-  }
+  // A core a frame pays as soon as there are several a core, and for frames of a few pixels nothing else does. Waves take memory by the
+  // gigabyte: one at a time.
+  const int frames = static_cast<int>(frames_.size()), threads = thread_count(job_.options.threads);
+  const bool apart = frames >= 4 * threads && std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& plan) { return plan.wave != nullptr; });
+  parallel_for(frames, apart ? threads : 1, [&](int g) { render_frame(static_cast<std::size_t>(g), derivatives, apart ? 1 : threads); });
   solve_linear();
   if (!derivatives) return;
 

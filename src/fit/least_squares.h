@@ -117,11 +117,13 @@ class LeastSquares {
     Eigen::VectorXd inverse_sigma;
     double inverse_sigma_norm = 0;
     Eigen::Index begin = 0, count = 0;
+    std::vector<int> read;                     ///< searched unknowns that its scene reads
     int gain = -1, offset = -1;                ///< index among the linear unknowns, -1 = known
     double shape_factor = 1, mean_factor = 1;  ///< whitening of the parts across and along the mean
     double intensity_low = 0, intensity_high = 0;
     Rendering rendering;                       ///< kept for its memory
   };
+  void render_frame(std::size_t frame, bool derivatives, int threads);
   void whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const;
   void set_priors();
   void solve_linear();

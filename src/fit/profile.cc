@@ -34,7 +34,7 @@ double Profile::rise(double value, double enough) {
   if (problem_.objective() - least_ > enough) {
     SolveOptions options;
     options.max_iterations = 20;
-    options.function_tolerance = 1e-9;  // some 1e-4 of a chi-square unit
+    options.function_tolerance = std::max(1e-9, 1e-4 / std::max(1.0, least_));  // 1e-4 of a chi-square unit
     options.held = unknown_;
     options.interrupted = job_.options.interrupted;
     problem_.solve(x, options);
@@ -44,6 +44,62 @@ double Profile::rise(double value, double enough) {
 }
 
 double Profile::crossing(double end, double allowed) {
+  const std::optional<double> place = newton_crossing(end, allowed);
+  return place ? *place : bisected_crossing(end, allowed);
+}
+
+/// At each place the Gauss-Newton model of the objective says where the others want to go, how far that lowers it, and how the lowered
+/// objective goes on with the unknown: one image with derivatives instead of a whole fit. Nothing where the model leads to bounds or
+/// does not converge in a few places.
+std::optional<double> Profile::newton_crossing(double end, double allowed) {
+  constexpr int kMostPlaces = 8;
+  const Eigen::Index p = best_.size();
+  const double from = best_[unknown_], wanted = std::sqrt(allowed), sign = end < from ? -1 : 1;
+  const auto limited = [&](double v) { return sign * (end - v) < 0 ? end : v; };
+  const auto within = [&](const Eigen::VectorXd& x) {
+    for (Eigen::Index j = 0; j < p; ++j) {
+      const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(j)]];
+      if (j != unknown_ && !(x[j] > parameter.lower && x[j] < parameter.upper)) return false;
+    }
+    return true;
+  };
+  Eigen::VectorXd x = along(best_, limited(from + sign * wanted * sd_));
+  for (int i = 0; i < kMostPlaces && within(x); ++i) {
+    if (job_.options.interrupted && *job_.options.interrupted) return std::nullopt;
+    problem_.evaluate(x, true);
+    const double value = x[unknown_], here = problem_.objective() - least_;
+    // |c + R d|^2 is the objective near x but for a constant; the columns in units of their length.
+    Eigen::MatrixXd r = problem_.factor();
+    const Eigen::VectorXd c = r.transpose().triangularView<Eigen::Lower>().solve(Eigen::VectorXd(0.5 * problem_.gradient()));
+    const Eigen::VectorXd length = r.colwise().norm();
+    r.array().rowwise() /= length.transpose().array();
+    const Eigen::VectorXd own = r.col(unknown_);
+    r.col(unknown_).setZero();
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> others(r);
+    const Eigen::VectorXd wish = others.solve(-c), follow = others.solve(-own);
+    const Eigen::VectorXd rest = c + r * wish, free = own + r * follow;
+    const double fall = c.squaredNorm() - rest.squaredNorm(), rise = here - fall;
+    const double slope = rest.dot(free), curvature = free.squaredNorm();
+    if (!std::isfinite(rise + slope + curvature) || !(curvature > 0)) return std::nullopt;
+    const Eigen::VectorXd step = (wish.array() / length.array()).head(p);
+    if (std::abs(fall) < 0.02 * allowed) {
+      Eigen::VectorXd there = x + step;
+      there[unknown_] = value;
+      places_.push_back({value, rise, there});
+      if (std::abs(std::sqrt(std::max(0.0, rise)) - wanted) < 0.01 * wanted || (value == end && rise < allowed)) return value;
+    }
+    const double discriminant = slope * slope + curvature * (allowed - rise);
+    if (!(discriminant >= 0)) return std::nullopt;
+    const double forward = (-slope + sign * std::sqrt(discriminant)) / curvature / length[unknown_];
+    const double next = limited(value + std::clamp(forward, -wanted * sd_, wanted * sd_));
+    if (!(sign * (next - from) > 0)) return std::nullopt;
+    x += step + (follow.array() / length.array()).head(p).matrix() * ((next - value) * length[unknown_]);
+    x[unknown_] = next;
+  }
+  return std::nullopt;
+}
+
+double Profile::bisected_crossing(double end, double allowed) {
   const double from = best_[unknown_], wanted = std::sqrt(allowed), sign = end < from ? -1 : 1;
   const auto limited = [&](double v) { return sign * (end - v) < 0 ? end : v; };
   double inside = from, root_inside = 0, outside = end, root_outside = -1;  // root of the rise; -1: not known

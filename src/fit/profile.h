@@ -1,7 +1,7 @@
 #pragma once
 // Profile likelihood: where an interval is not value +- t standard errors.
 
-#include <atomic>
+#include <optional>
 #include <vector>
 
 #include "fit/least_squares.h"
@@ -17,8 +17,8 @@ class Profile {
 
   /// Above the objective at the optimum; not minimised further where that is below `enough` already.
   double rise(double value, double enough = -1);
-  /// The place between the estimate and `end` where the rise is `allowed`, to 1 % of its root; `end` where it stays below. Where that takes
-  /// more than sixteen places, the nearest that is beyond.
+  /// The place between the estimate and `end` where the rise is `allowed`, to 1 % of its root; `end` where it stays below. By Venzon and
+  /// Moolgavkar's iteration, by bisection where that fails; where bisection takes more than sixteen places, the nearest that is beyond.
   double crossing(double end, double allowed);
   /// Of all rises so far; clearly below zero: the estimate was not the minimum.
   double lowest() const;
@@ -35,6 +35,8 @@ class Profile {
     Eigen::VectorXd searched;
   };
   Eigen::VectorXd along(const Eigen::VectorXd& from, double value) const;
+  std::optional<double> newton_crossing(double end, double allowed);
+  double bisected_crossing(double end, double allowed);
 
   LeastSquares& problem_;
   const FitJob& job_;

@@ -17,6 +17,7 @@
 #include "io/config_series.h"
 #include "io/config_signal.h"
 #include "io/prior.h"
+#include "medium/references.h"
 
 namespace birefit {
 namespace {

@@ -540,6 +540,38 @@ TEST(Fit, GivesTheSameBitsWithOneAndTwoThreads) {
   EXPECT_EQ(one.evaluations, two.evaluations);
 }
 
+TEST(Fit, FramesWithVoltagesOfTheirOwnGiveTheSameBitsWithOneAndTwoThreads) {
+  // Ten frames, one voltage each and a tilt they share: rendered a frame a core, each with derivatives by what its own scene reads.
+  const auto run = [](int threads) {
+    Bar bar(0, 0.4);
+    bar.job.options.threads = threads;
+    bar.free(bar.tilt, 0.3, 0.1, 0.7);
+    bar.free_linear();
+    Gaussian gaussian(19);
+    for (int frame = 0; frame < 10; ++frame) {
+      const double volts = 500 + 40 * frame;
+      Parameter bias;
+      bias.name = "bias " + std::to_string(frame);
+      bias.unit = "V";
+      bias.value = volts + 15;
+      bias.lower = 300, bias.upper = 1100;
+      bias.free = true;
+      Micrograph& micrograph = bar.add_image(24, 24, bar.job.parameters.add(bias));
+      micrograph.noise = NoiseModel{20, 0, false};
+      expose(micrograph, 3000, 100, volts, 0.4, [&](int, int, double) { return 20 * gaussian(); });
+    }
+    return fit(bar.job);
+  };
+  const FitResult one = run(1), two = run(2);
+  EXPECT_EQ(one.theta, two.theta);
+  EXPECT_EQ(one.covariance, two.covariance);
+  for (int frame = 0; frame < 10; ++frame) {
+    const ParameterEstimate& bias = estimate(one, "bias " + std::to_string(frame));
+    EXPECT_NEAR(bias.value, 500 + 40 * frame, 5 * bias.stderr_) << frame;
+    EXPECT_LT(bias.stderr_, 20) << frame;  // a derivative that went to another frame's column would leave it undetermined
+  }
+}
+
 TEST(Fit, AnImageWithoutUsablePixelsIsTheUsersMistake) {
   Bar bar;
   bar.free(bar.bias, 500, 100, 4000);

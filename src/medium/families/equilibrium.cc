@@ -184,6 +184,45 @@ struct Slopes {
   std::vector<R> gradient, pull;
 };
 
+/// The part of one element in the Hessian by the inner nodes' unknowns.
+template <bool kTwisted>
+void add_element(const DirectorMesh& mesh, int e, const Density<double>* points, double electric, SymmetricBand& hessian) {
+  constexpr int kMost = 21, kEach = kTwisted ? 2 : 1;  // nodes of an element
+  // By (t'_i, t'_j), (f'_i, f'_j), (t_k, t'_j), (t_k, f'_j).
+  std::array<double, kMost * kMost> tptp{}, fpfp{}, ttp, tfp;
+  const int n = mesh.degree() + 1, inner = mesh.nodes() - 2, base = e * mesh.degree() - 1;
+  const double scale = 2 / mesh.width(e);
+  const auto at = [](int i, int j) { return static_cast<std::size_t>(i * kMost + j); };
+  for (int k = 0; k < n; ++k) {
+    const double w = mesh.weight(k) / scale;
+    std::array<double, kMost> slope;
+    for (int j = 0; j < n; ++j) slope[static_cast<std::size_t>(j)] = mesh.slope(k, j) * scale;
+    for (int i = 0; i < n; ++i) {
+      const double of_t = w * points[k].tptp * slope[static_cast<std::size_t>(i)], of_f = kTwisted ? w * points[k].fpfp * slope[static_cast<std::size_t>(i)] : 0;
+      double *t = &tptp[at(i, 0)], *f = &fpfp[at(i, 0)];
+      for (int j = 0; j < n; ++j) t[j] += of_t * slope[static_cast<std::size_t>(j)];
+      if constexpr (kTwisted)
+        for (int j = 0; j < n; ++j) f[j] += of_f * slope[static_cast<std::size_t>(j)];
+    }
+    for (int j = 0; j < n; ++j) {
+      ttp[at(k, j)] = w * points[k].ttp * slope[static_cast<std::size_t>(j)];
+      if constexpr (kTwisted) tfp[at(k, j)] = w * points[k].tfp * slope[static_cast<std::size_t>(j)];
+    }
+    ttp[at(k, k)] += 0.5 * w * (points[k].tt + electric * points[k].q_tt);
+  }
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j <= i; ++j) {
+      const int row = (base + i) * kEach, column = (base + j) * kEach;
+      if (column < 0 || row >= inner * kEach) continue;
+      hessian(row, column) += tptp[at(i, j)] + ttp[at(i, j)] + ttp[at(j, i)];
+      if constexpr (kTwisted) {
+        hessian(row + 1, column + 1) += fpfp[at(i, j)];
+        hessian(row + 1, column) += tfp[at(j, i)];
+        if (i != j) hessian(row, column + 1) += tfp[at(i, j)];
+      }
+    }
+}
+
 template <bool kTwisted, class R>
 Slopes<R> slopes(const CellForces<R>& p, const DirectorMesh& mesh, const std::vector<R>& t, const std::vector<R>& f, SymmetricBand* hessian) {
   constexpr int kEach = kTwisted ? 2 : 1;
@@ -234,30 +273,9 @@ Slopes<R> slopes(const CellForces<R>& p, const DirectorMesh& mesh, const std::ve
         r.gradient[i] = r.gradient[i] + d * point.e_tp;
         if constexpr (kTwisted) r.gradient[i + 1] = r.gradient[i + 1] + d * point.e_fp;
       }
-      if constexpr (std::is_same_v<R, double>) {
-        if (!hessian) continue;
-        SymmetricBand& h = *hessian;
-        const auto add = [&](int i, int j, double x) { h(std::max(i, j), std::min(i, j)) += x; };
-        if (row >= 0 && row < inner) add(row * kEach, row * kEach, w * (point.tt + electric * point.q_tt));
-        for (int j = 0; j < n; ++j) {
-          const int other = base + j;
-          if (other < 0 || other >= inner) continue;
-          const double d = mesh.slope(k, j) * scale;
-          if (row >= 0 && row < inner) {
-            // (t_k, t'_j): once for each order of the pair, so twice on the diagonal.
-            add(row * kEach, other * kEach, (other == row ? 2 : 1) * w * d * point.ttp);
-            if constexpr (kTwisted) add(row * kEach, other * kEach + 1, w * d * point.tfp);
-          }
-          for (int i = 0; i <= j; ++i) {
-            const int first = base + i;
-            if (first < 0) continue;
-            const double both = w * d * mesh.slope(k, i) * scale;
-            add(other * kEach, first * kEach, both * point.tptp);
-            if constexpr (kTwisted) add(other * kEach + 1, first * kEach + 1, both * point.fpfp);
-          }
-        }
-      }
     }
+    if constexpr (std::is_same_v<R, double>)
+      if (hessian) add_element<kTwisted>(mesh, e, &points[static_cast<std::size_t>(e * n)], electric, *hessian);
   }
   return r;
 }
