@@ -23,6 +23,16 @@ struct NoiseModel {
   bool estimated = false;  ///< from the image itself
 };
 
+/// What light adds across an image: `coefficient`, in units of the values, times a shape; to the gain (uneven illumination, vignetting) or
+/// to the offset (a tilted background).
+struct UnevenLight {
+  /// X right, Y up, from the middle of the image, 1 at its edge along the longer side; square: X^2 + Y^2.
+  enum class Shape { x, y, square };
+  ParameterRef coefficient;
+  Shape shape = Shape::x;
+  bool of_intensity = false;  ///< added to the gain
+};
+
 /// One image of a fit, in memory. Values are counts, or transmission when calibration frames were given.
 struct Micrograph {
   std::string name;   ///< for reports: the file name
@@ -31,6 +41,7 @@ struct Micrograph {
   Mask mask;          ///< 1 = usable; dead, saturated, non-finite, user-masked and out-of-ROI pixels are 0
   Image variance_scale;  ///< calibration: variance of a value per variance of a count, (1/(parallel - dark))^2; else empty
   ParameterRef gain, offset;  ///< linear: value = gain * intensity + offset; several micrographs may share one
+  std::vector<UnevenLight> uneven;  ///< linear as well
   std::optional<NoiseModel> noise;  ///< in counts; else estimated from the image
   /// Pixel counts by reason, for the report.
   int masked_by_user = 0, outside_roi = 0, saturated = 0, dead = 0, non_finite = 0;
@@ -41,6 +52,7 @@ struct FitOptions {
   int max_iterations = 100;
   int scan_pixels = 4000;      ///< of the coarse scan, spread over all micrographs
   int scan_candidates = 4;     ///< starts polished after the scan
+  bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
   bool choose_waves = false;   ///< Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
   double max_seconds = 60;
   bool choose_rays = false;    ///< straight or curved rays (Scene::rays) by what curved ones would change
@@ -104,10 +116,11 @@ struct FisherDirection {
 
 struct MicrographResult {
   std::string name;
-  Image fitted;     ///< gain * intensity + offset, units of the micrograph's values
+  Image fitted;     ///< in units of the micrograph's values
   Image residual;   ///< values - fitted; NaN where not used
   Image sigma;      ///< standard deviation used for whitening
   int used = 0;     ///< pixels
+  int outliers = 0; ///< pixels left out because they stood out of the residual (FitOptions::leave_out_outliers)
   double chi_square = 0;
   double residual_rms = 0;        ///< units of the values
   double signal_range = 0;        ///< of the fitted values, for judging the rms; of a one-pixel row, its table's

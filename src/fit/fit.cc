@@ -13,7 +13,9 @@
 #include <fmt/format.h>
 
 #include "fit/least_squares.h"
+#include "fit/light.h"
 #include "fit/noise.h"
+#include "fit/outliers.h"
 #include "fit/profile.h"
 #include "fit/scan.h"
 #include "fit/statistics.h"
@@ -27,6 +29,9 @@ using namespace estimation;
 
 /// Standard errors by which rays may shift a parameter before waves are worth their time, or a warning.
 constexpr double kShiftThatMatters = 0.3;
+
+/// Part of an image that dust and scratches may cover at most.
+constexpr double kMostOutliers = 0.1;
 
 /// Pixels the mask leaves and whose value and weight are numbers.
 std::vector<std::array<int, 2>> usable_pixels(const Micrograph& micrograph, const Image& sigma) {
@@ -119,6 +124,7 @@ class Fit {
     find_minima();
     settle_weights();
     settle_plans();
+    settle_outliers();
     settle_misfit();
     weigh_rivals();
     report();
@@ -138,6 +144,7 @@ class Fit {
   void find_minima();
   void settle_weights();
   void settle_plans();
+  void settle_outliers();
   void settle_misfit();
   void weigh_rivals();
   void report();
@@ -149,14 +156,11 @@ class Fit {
     const ParameterRef ref = job_.micrographs[g].gain;
     return ref ? theta_[ref.index] : 1.0;
   }
-  double offset_of(int g) const {
-    const ParameterRef ref = job_.micrographs[g].offset;
-    return ref ? theta_[ref.index] : 0.0;
-  }
   std::vector<Misfit> assess_misfit();
   std::vector<Misfit> prior_misfit() const;
   double row_correlation(const std::vector<LeastSquares::FrameMisfit>& frames) const;
   Image fitted_image(int g) const;
+  Outliers outliers_of(int g) const;
   bool shows_signal(double chi_square) const;
   void report_parameters(const Inverse& inverse, const Inverse& of_noise);
   std::optional<double> upper_limit(int unknown, const Inverse& inverse);
@@ -171,6 +175,7 @@ class Fit {
   void foretell_curved_rays();
   void foretell_waves();
   Eigen::VectorXd propagation_error();
+  double pay_for_misfit(const Inverse& of_noise, Inverse& inverse) const;
   std::string covariance_words() const;
 
   const FitJob& job_;
@@ -202,6 +207,7 @@ class Fit {
   bool misfit_ = false;          ///< more than noise in some micrograph
   double row_length_ = 1;        ///< neighbouring rows of a table that share one misfit
   bool rows_ = false;            ///< micrographs of one pixel each: rows of a table
+  std::vector<Outliers> left_out_;  ///< of each micrograph
 };
 
 void Fit::prepare() {
@@ -431,10 +437,7 @@ void Fit::find_minima() {
 }
 
 Image Fit::fitted_image(int g) const {
-  Image image = render(job_.micrographs[g].scene, plans_[g], theta_, {}, job_.options.threads).intensity;
-  const double gain = gain_of(g), offset = offset_of(g);
-  for (double& value : image.values()) value = gain * value + offset;
-  return image;
+  return lit(job_.micrographs[g], theta_, render(job_.micrographs[g].scene, plans_[g], theta_, {}, job_.options.threads).intensity);
 }
 
 /// Poisson weights from the data themselves pull a fit low (bright outliers get small weights): the variance must
@@ -484,6 +487,59 @@ void Fit::settle_plans() {
     say("the model needs finer steps here: solving once more");
     rebuild_problem();
     solve_main("replanned");
+  }
+}
+
+/// What stands out of a micrograph's residual, among all its usable pixels.
+Outliers Fit::outliers_of(int g) const {
+  const Micrograph& micrograph = job_.micrographs[g];
+  const Image fitted = fitted_image(g);
+  Image whitened(fitted.width(), fitted.height());
+  Mask used(fitted.width(), fitted.height(), 0);
+  for (const auto& [x, y] : usable_pixels(micrograph, sigma_[g])) {
+    used(x, y) = 1;
+    whitened(x, y) = (micrograph.values(x, y) - fitted(x, y)) / sigma_[g](x, y);
+  }
+  return find_outliers(whitened, used);
+}
+
+/// Leaves out what stands out and fits again until that changes no more: the loss min(z^2, limit^2), z of a pixel or of its neighbourhood.
+/// Every round judges all pixels anew, so that what a bad start made stand out comes back.
+void Fit::settle_outliers() {
+  left_out_.assign(static_cast<std::size_t>(frames_), {});
+  if (!job_.options.leave_out_outliers || rows_) return;
+  constexpr int kMostRounds = 10;
+  for (int round = 0; round < kMostRounds && !stopped_; ++round) {
+    bool changed = false;
+    for (int g = 0; g < frames_; ++g) {
+      Outliers found = outliers_of(g);
+      const std::vector<std::array<int, 2>> usable = usable_pixels(job_.micrographs[g], sigma_[g]);
+      // So much cannot be dust: then the model is wrong, and leaving out what shows it would hide that.
+      if (found.count > kMostOutliers * static_cast<double>(usable.size())) {
+        if (round == 0 || left_out_[static_cast<std::size_t>(g)].count > 0) result_.warnings.push_back(fmt::format(
+            "{}: {:.2g} % of the pixels stand out of the residual, more than dust would: none was left out. Mask what is foreign, or change the model.",
+            job_.micrographs[g].name, 100.0 * found.count / static_cast<double>(usable.size())));
+        found = {};
+      }
+      Outliers& before = left_out_[static_cast<std::size_t>(g)];
+      if (found.count == before.count && (found.count == 0 || found.pixels.values() == before.pixels.values())) continue;
+      changed = true;
+      pixels_[g].clear();
+      for (const auto& [x, y] : usable)
+        if (found.count == 0 || !found.pixels(x, y)) pixels_[g].push_back({x, y});
+      if (noise_[g].estimated) {  // a scratch looks like noise
+        Micrograph seen = job_.micrographs[g];
+        for (std::size_t i = 0; found.count > 0 && i < seen.mask.values().size(); ++i)
+          if (found.pixels.values()[i]) seen.mask.values()[i] = 0;
+        const Image fitted = fitted_image(g);
+        noise_[g] = estimate_noise(seen, &fitted);
+        sigma_[g] = standard_deviation(seen, noise_[g], fitted);
+      }
+      before = std::move(found);
+    }
+    if (!changed) return;
+    rebuild_problem();
+    solve_main("without outliers");
   }
 }
 
@@ -658,7 +714,7 @@ void Fit::weigh_rivals() {
   theta_ = problem_->theta();
 }
 
-/// Is a constant image as good? Compared in units of the misfit (an F test), with what the freedom of the model and
+/// Is an image without structure as good? Compared in units of the misfit (an F test), with what the freedom of the model and
 /// the number of places the scan looked at gain by chance.
 bool Fit::shows_signal(double chi_square) const {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -669,21 +725,32 @@ bool Fit::shows_signal(double chi_square) const {
   }
   constexpr double kUniform = 1e-9;
   if (!(high - low > kUniform)) return true;  // a uniform model is a constant image: nothing to compare
+  // Frames that share an offset share the constant; an uneven background is part of it.
   double null_chi_square = 0;
   std::set<int> done;
   for (int g = 0; g < frames_; ++g) {
     const int group = job_.micrographs[g].offset.index;
     if (!done.insert(group).second) continue;
-    double w = 0, wy = 0, wyy = 0;
+    constexpr int kShapes = 4;
+    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kShapes, kShapes);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(kShapes), shape(kShapes);
+    double squares = 0;
     for (int other = 0; other < frames_; ++other) {
-      if (job_.micrographs[other].offset.index != group) continue;
+      const Micrograph& m = job_.micrographs[other];
+      if (m.offset.index != group) continue;
       const PixelSet& set = problem_->pixels(other);
       for (Eigen::Index i = 0; i < set.value.size(); ++i) {
+        shape.setZero();
+        for (const LightTerm& term : light_terms(m))
+          if (!term.of_intensity)
+            shape[term.shape ? 1 + static_cast<int>(*term.shape) : 0] = term.shape_at(m.scene.view, set.pixels[static_cast<std::size_t>(i)][0], set.pixels[static_cast<std::size_t>(i)][1]);
         const double weight = 1 / (set.sigma[i] * set.sigma[i]);
-        w += weight, wy += weight * set.value[i], wyy += weight * set.value[i] * set.value[i];
+        gram += weight * shape * shape.transpose();
+        right += weight * set.value[i] * shape;
+        squares += weight * set.value[i] * set.value[i];
       }
     }
-    null_chi_square += std::max(0.0, wyy - wy * wy / w);
+    null_chi_square += std::max(0.0, squares - right.dot(gram.completeOrthogonalDecomposition().solve(right)));
   }
   const double reduced = std::max(1.0, chi_square / static_cast<double>(problem_->pixel_rows()));
   const double by_chance = 25 + 2 * unknowns_.size() + 2 * std::log(std::max(1, scan_points_));
@@ -846,6 +913,7 @@ void Fit::report_micrographs() {
     out.noise = noise_[g];
     out.plan = plans_[g];
     out.used = static_cast<int>(pixels_[g].size());
+    out.outliers = left_out_[static_cast<std::size_t>(g)].count;
     out.chi_square = problem_->frame_misfit(g).chi_square;
     out.residual =
         Image(micrograph.values.width(), micrograph.values.height(), std::numeric_limits<double>::quiet_NaN());
@@ -909,6 +977,21 @@ void Fit::collect_warnings() {
       rows.low = std::min(rows.low, value);
       rows.high = std::max(rows.high, value);
       continue;
+    }
+    if (micrograph.outliers > 0) {
+      const Outliers& out = left_out_[static_cast<std::size_t>(g)];
+      warn(fmt::format("{}: {} pixels in {} ({:.2g} %) stand out of the residual and were left out, the largest around column {}, row {}.", micrograph.name,
+                       out.count, out.spots == 1 ? "one spot" : fmt::format("{} spots", out.spots), 100.0 * out.count / (out.count + micrograph.used),
+                       out.largest_column, out.largest_row));
+    } else if (!job_.options.leave_out_outliers && reduced > 1.05) {
+      const Outliers out = outliers_of(g);
+      double theirs = 0;
+      for (const auto& [x, y] : pixels_[g])
+        if (out.pixels(x, y)) theirs += std::pow(micrograph.residual(x, y) / micrograph.sigma(x, y), 2);
+      if (out.count > 0 && out.count < kMostOutliers * micrograph.used && theirs > 0.2 * (micrograph.chi_square - micrograph.used))
+        warn(fmt::format("{}: {} pixels in {}, the largest around column {}, row {}, make {:.2g} % of the misfit: dust or a scratch? Mask them, or set fit: {{outliers: leave_out}}.",
+                         micrograph.name, out.count, out.spots == 1 ? "one spot" : fmt::format("{} spots", out.spots), out.largest_column, out.largest_row,
+                         100 * std::min(1.0, theirs / (micrograph.chi_square - micrograph.used))));
     }
     if (reduced > 2) {
       warn(fmt::format(
@@ -997,10 +1080,10 @@ void Fit::foretell_waves() {
     waves.rays = Rays::straight;
     const WaveChoice choice = wave_choice(waves, theta_);
     if (choice.seconds_an_image > (job_.options.choose_waves ? job_.options.max_seconds : kMostSeconds)) return;
-    const Image image = render(waves, plan(waves, theta_), theta_, {}, job_.options.threads).intensity;
+    const Image image = lit(job_.micrographs[g], theta_, render(waves, plan(waves, theta_), theta_, {}, job_.options.threads).intensity);
     PixelSet set = pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]);
     for (std::size_t i = 0; i < set.pixels.size(); ++i)
-      set.value[static_cast<Eigen::Index>(i)] = gain_of(g) * image(set.pixels[i][0], set.pixels[i][1]) + offset_of(g);
+      set.value[static_cast<Eigen::Index>(i)] = image(set.pixels[i][0], set.pixels[i][1]);
     sets.push_back(std::move(set));
   }
   LeastSquares problem(job_, unknowns_, plans_, std::move(sets));
@@ -1034,15 +1117,15 @@ Eigen::VectorXd Fit::propagation_error() {
     Image exact, propagated;
     try {
       twin.method = "series";
-      exact = render(twin, plan(twin, theta_), theta_, {}, job_.options.threads).intensity;
+      exact = lit(job_.micrographs[g], theta_, render(twin, plan(twin, theta_), theta_, {}, job_.options.threads).intensity);
       twin.method = "split_step";
-      propagated = render(twin, plan(twin, theta_), theta_, {}, job_.options.threads).intensity;
+      propagated = lit(job_.micrographs[g], theta_, render(twin, plan(twin, theta_), theta_, {}, job_.options.threads).intensity);
     } catch (const UserError&) {  // too large for the series
       return shift;
     }
     for (std::size_t i = 0; i < set.pixels.size(); ++i) {
       const auto [x, y] = set.pixels[i];
-      set.value[static_cast<Eigen::Index>(i)] = fitted(x, y) + gain_of(g) * (exact(x, y) - propagated(x, y));
+      set.value[static_cast<Eigen::Index>(i)] = fitted(x, y) + exact(x, y) - propagated(x, y);
     }
     sets.push_back(std::move(set));
   }
@@ -1059,12 +1142,26 @@ Eigen::VectorXd Fit::propagation_error() {
   return shift;
 }
 
+/// A slow misfit, like that of uneven light, may be far below the noise of a pixel and still shift a parameter by many standard errors: what
+/// the residual holds of each parameter's own pattern says by how much. It holds what `inverse` has beyond the noise as well: the larger of
+/// the two counts. Returns the largest factor on a standard error.
+double Fit::pay_for_misfit(const Inverse& of_noise, Inverse& inverse) const {
+  const Eigen::VectorXd along = problem_->misfit_along(of_noise.covariance);
+  Eigen::VectorXd factor = Eigen::VectorXd::Ones(along.size());
+  for (Eigen::Index j = 0; j < along.size(); ++j)
+    if (const double variance = inverse.covariance(j, j); variance > 0)
+      factor[j] = std::sqrt(std::max(1.0, along[j] * along[j] * of_noise.covariance(j, j) / variance));
+  inverse.covariance = factor.asDiagonal() * inverse.covariance * factor.asDiagonal();
+  return factor.size() > 0 ? factor.maxCoeff() : 1;
+}
+
 void Fit::report() {
   const Eigen::MatrixXd factor = problem_->factor();
   const Inverse of_noise = invert_normal_equations(factor);
   Inverse inverse = of_noise;
   const Eigen::VectorXd shift = propagation_error();
   inverse.covariance += shift * shift.transpose();
+  const double along = pay_for_misfit(of_noise, inverse);
   result_.theta = theta_;
   result_.interrupted = (stopped_ && !beaten_) || interrupted();
   if (result_.interrupted) result_.converged = false;
@@ -1080,6 +1177,7 @@ void Fit::report() {
     dof = frame_dof_;
     result_.frame_scatter = JointPrior::FrameScatter{frame_sd_, frame_dof_};
   }
+  if (along > 1) dof = std::min(dof, static_cast<double>(LeastSquares::kLeastModulations));
   if (job_.prior) {
     dof = std::min(dof, job_.prior->degrees_of_freedom);
     if (job_.prior->frame_scatter) dof = std::min(dof, job_.prior->frame_scatter->degrees_of_freedom);
@@ -1092,6 +1190,7 @@ void Fit::report() {
   result_.correlation = inverse_sd.asDiagonal() * inverse.covariance * inverse_sd.asDiagonal();
   result_.correlation.diagonal().setOnes();
   result_.covariance_kind = covariance_words();
+  if (along > 1) result_.covariance_kind += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters", along);
   if (!shift.isZero(0)) result_.covariance_kind += ", and the error of wave propagation by the exact image of a radial twin";
   report_parameters(inverse, of_noise);
   judge_identifiability(result_, job_, unknowns_, factor, inverse);

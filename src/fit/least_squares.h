@@ -14,13 +14,14 @@
 #include <Eigen/Dense>
 
 #include "birefit/fit.h"
+#include "fit/light.h"
 
 namespace birefit::estimation {
 
 /// Which table entries are estimated, and how.
 struct Unknowns {
   std::vector<int> searched;  ///< table indices: the solver's parameters
-  std::vector<int> linear;    ///< table indices: gains and offsets, solved exactly
+  std::vector<int> linear;    ///< table indices: gains, offsets and uneven light, solved exactly
   int size() const { return static_cast<int>(searched.size() + linear.size()); }
   /// Table index of unknown j, searched first.
   int table_index(int j) const {
@@ -95,6 +96,12 @@ class LeastSquares {
   Eigen::MatrixXd factor(bool with_priors = true) const;
   /// Gradient of the objective with respect to every unknown.
   Eigen::VectorXd gradient() const;
+  /// By how much the residual enlarges the standard error of each unknown, `covariance` being that of all unknowns after the weights; 1 where
+  /// it holds no more of what shifts the unknown than white noise does. In the whole image the fit leaves nothing of it; modulated by cosines
+  /// over the image, and along the distance from the sample's centre, the residual tells what was there: the orthonormal-series estimate of a
+  /// long-run variance (U. K. Mueller, J. Econometrics 141, 1331 (2007); Y. Sun, Econometrics J. 14, 345 (2011)). Micrographs below 32 x 32 pixels are not looked at.
+  Eigen::VectorXd misfit_along(const Eigen::MatrixXd& covariance) const;
+  static constexpr int kLeastModulations = 8;
   /// Of the model intensity over all used pixels of a micrograph.
   std::array<double, 2> intensity_range(int micrograph) const;
   /// Sum of squares of the prior rows.
@@ -112,23 +119,28 @@ class LeastSquares {
   void copy_jacobian(const Tile& tile, const Eigen::VectorXd& scale, double* row_major) const;
 
  private:
+  struct Term : LightTerm {
+    int unknown = -1;          ///< index among the linear unknowns, -1 = known
+    Eigen::VectorXd at_pixels; ///< the shape; empty where it is 1
+    Eigen::VectorXd whitened;  ///< what the coefficient stands before
+  };
   struct Frame {
     PixelSet set;
     Eigen::VectorXd inverse_sigma;
     double inverse_sigma_norm = 0;
     Eigen::Index begin = 0, count = 0;
     std::vector<int> read;                     ///< searched unknowns that its scene reads
-    int gain = -1, offset = -1;                ///< index among the linear unknowns, -1 = known
+    std::vector<Term> terms;
     double shape_factor = 1, mean_factor = 1;  ///< whitening of the parts across and along the mean
     double intensity_low = 0, intensity_high = 0;
     Rendering rendering;                       ///< kept for its memory
   };
   void render_frame(std::size_t frame, bool derivatives, int threads);
+  Eigen::VectorXd light(const Frame& frame, bool of_intensity) const;
   void whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const;
   void set_priors();
   void solve_linear();
   Eigen::MatrixXd full_rows(const Tile& tile) const;
-  double known(const ParameterRef& ref, double absent) const { return ref ? theta_[ref.index] : absent; }
 
   const FitJob& job_;
   Unknowns unknowns_;
@@ -142,9 +154,9 @@ class LeastSquares {
 
   Theta theta_;
   Eigen::VectorXd intensity_;  ///< raw
-  Eigen::VectorXd whitened_value_, whitened_intensity_, whitened_one_;
+  Eigen::VectorXd whitened_value_;
   Eigen::VectorXd residual_;
-  Eigen::MatrixXd searched_columns_;  ///< d whitened model / d searched, gain and offset held
+  Eigen::MatrixXd searched_columns_;  ///< d whitened model / d searched, linear unknowns held
   Eigen::MatrixXd projection_;        ///< linear x searched: how the linear unknowns follow the searched ones
   bool has_derivatives_ = false;
   int evaluations_ = 0;

@@ -9,6 +9,7 @@
 
 #include "birefit/fit.h"
 #include "fit/least_squares.h"
+#include "fit/light.h"
 #include "fit/noise.h"
 #include "fit/statistics.h"
 #include "fit/verdict.h"
@@ -56,10 +57,9 @@ Planned planned(const FitJob& job) {
     } else if (m.mask.empty()) {
       m.mask = Mask(light.width(), light.height(), 1);
     }
-    const double gain = m.gain ? p.job.parameters[m.gain].value : 1, offset = m.offset ? p.job.parameters[m.offset].value : 0;
+    const double gain = m.gain ? p.job.parameters[m.gain].value : 1;
     Micrograph signal = m;
-    signal.values = light;
-    for (double& v : signal.values.values()) v = gain * v + offset;
+    signal.values = lit(m, p.job.parameters.values(), light);
     Image sigma;
     std::string words;
     if (m.noise || taken) {
@@ -120,7 +120,9 @@ FitJob with_shot(const FitJob& job, const std::function<void(Scene&, ParameterTa
   shot.values = {};
   change(shot.scene, more.parameters);
   // The lamp may have changed.
-  for (ParameterRef* ref : {&shot.gain, &shot.offset})
+  std::vector<ParameterRef*> lamp{&shot.gain, &shot.offset};
+  for (UnevenLight& uneven : shot.uneven) lamp.push_back(&uneven.coefficient);
+  for (ParameterRef* ref : lamp)
     if (*ref) {
       Parameter own = more.parameters[*ref];
       own.name += ", next image";

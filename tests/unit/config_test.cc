@@ -283,6 +283,30 @@ TEST_F(Config, SharesWhatNoMicrographSets) {
   EXPECT_EQ(a.outside_roi, 32 * 32 - 28 * 24);
 }
 
+TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
+  save("a.tif", counts(100, 1));
+  save("b.tif", counts(200, 2));
+  const auto with = [](const std::string& text) { return "micrograph: {roi_px: [2, 4, 30, 28], " + text + "}\n"; };
+  const std::string plain = "micrograph: {roi_px: [2, 4, 30, 28]}\n", uneven = with("illumination: {x: {fit: auto}, square: -20}, background: {y: {fit: auto}}");
+  const std::string frame = replaced(kCrystal, "set: {sample.crystal.bias_v: 200}", "set: {sample.crystal.bias_v: 200, micrograph.background.y: {fit: auto}}");
+  const auto config = load(replaced(frame, plain, uneven), ConfigUse::fit);
+  const ParameterTable& table = config.job.parameters;
+  const auto &a = config.job.micrographs[0].uneven, &b = config.job.micrographs[1].uneven;
+  ASSERT_EQ(a.size(), 3u);
+  EXPECT_EQ(table[a[0].coefficient].name, "micrograph.illumination.x");
+  EXPECT_TRUE(a[0].of_intensity && table[a[0].coefficient].free && table[a[0].coefficient].linear);
+  EXPECT_EQ(a[0].shape, UnevenLight::Shape::x);
+  EXPECT_EQ(table[a[0].coefficient].value, 0);
+  EXPECT_EQ(a[1].shape, UnevenLight::Shape::square);
+  EXPECT_FALSE(table[a[1].coefficient].free);
+  EXPECT_EQ(table[a[1].coefficient].value, -20);
+  EXPECT_FALSE(a[2].of_intensity);
+  EXPECT_EQ(a[0].coefficient, b[0].coefficient);
+  // One of the frames has a background of its own, whichever `set` named it.
+  EXPECT_FALSE(a[2].coefficient == b[2].coefficient);
+  EXPECT_NE(mistakes(replaced(frame, plain, with("background: {z: 1}")), ConfigUse::fit).find("unknown key z in micrograph.background"), std::string::npos);
+}
+
 TEST_F(Config, KnowsTheParametersThatSetMayName) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));

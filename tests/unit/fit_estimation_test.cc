@@ -503,6 +503,63 @@ TEST(Fit, GainBoundsAreHonouredByTheExactSolution) {
   EXPECT_TRUE(result.pinned);
 }
 
+TEST(Fit, UnevenLightIsSolvedExactlyBesideGainAndOffset) {
+  using Shape = UnevenLight::Shape;
+  const std::vector<std::pair<Shape, bool>> shapes{{Shape::x, true}, {Shape::y, true}, {Shape::square, true}, {Shape::x, false}, {Shape::y, false}};
+  const std::vector<double> truth{3000, 150, 200, -120, -500, 60, -40};  // gain, offset, then the shapes
+  const auto coordinates = [](int x, int y) { return std::pair((x - 29.5) / 30, (19.5 - y) / 30); };  // of 60 x 40 pixels
+  const auto shape_at = [&](Shape shape, int column, int row) {
+    const auto [x, y] = coordinates(column, row);
+    return shape == Shape::x ? x : shape == Shape::y ? y : x * x + y * y;
+  };
+  Bar bar(700, 0.4);
+  bar.free(bar.bias, 650, 400, 1000);
+  bar.free_linear();
+  Micrograph& m = bar.add_image(60, 40, bar.bias);
+  for (const auto& [shape, of_intensity] : shapes) {
+    Parameter p;
+    p.name = "uneven " + std::to_string(m.uneven.size());
+    p.free = p.linear = true;
+    m.uneven.push_back({bar.job.parameters.add(p), shape, of_intensity});
+  }
+  m.noise = NoiseModel{20, 0, false};
+  Gaussian gaussian(23);
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 60; ++x) {
+      double gain = truth[0], offset = truth[1];
+      for (std::size_t k = 0; k < shapes.size(); ++k) (shapes[k].second ? gain : offset) += truth[k + 2] * shape_at(shapes[k].first, x, y);
+      m.values(x, y) = gain * intensity(700, 0.4, y, 40) + offset + 20 * gaussian();
+    }
+  const FitResult result = fit(bar.job);
+  ASSERT_TRUE(result.has_answer()) << result.verdict;
+  EXPECT_NEAR(result.reduced_chi_square, 1, 0.15);
+  const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
+  EXPECT_NEAR(bias.value, 700, 4 * bias.stderr_);
+  // At the voltage found, ordinary least squares of all seven. Pixels are means over their area, the model's own: from the fitted image.
+  const std::vector<std::string> names{"micrograph.gain", "micrograph.offset", "uneven 0", "uneven 1", "uneven 2", "uneven 3", "uneven 4"};
+  std::vector<double> found;
+  for (const std::string& name : names) found.push_back(estimate(result, name).value);
+  Eigen::MatrixXd design(2400, 7);
+  Eigen::VectorXd values(2400);
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 60; ++x) {
+      const int i = y * 60 + x;
+      double gain = found[0], offset = found[1];
+      for (std::size_t k = 0; k < shapes.size(); ++k) (shapes[k].second ? gain : offset) += found[k + 2] * shape_at(shapes[k].first, x, y);
+      const double light = (result.micrographs[0].fitted(x, y) - offset) / gain;
+      design(i, 0) = light, design(i, 1) = 1;
+      for (std::size_t k = 0; k < shapes.size(); ++k) design(i, static_cast<int>(k) + 2) = (shapes[k].second ? light : 1) * shape_at(shapes[k].first, x, y);
+      values[i] = bar.job.micrographs[0].values(x, y);
+    }
+  const Eigen::VectorXd expected = design.colPivHouseholderQr().solve(values);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const ParameterEstimate& p = estimate(result, names[k]);
+    EXPECT_NEAR(p.value, expected[static_cast<Eigen::Index>(k)], 1e-6 * p.stderr_) << names[k];
+    EXPECT_NEAR(p.value, truth[k], 4 * p.stderr_) << names[k];
+    EXPECT_TRUE(p.linear);
+  }
+}
+
 TEST(Fit, AnInterruptionGivesTheBestStateSoFar) {
   Bar bar;
   bar.free(bar.bias, 650, 400, 1000);
