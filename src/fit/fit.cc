@@ -989,7 +989,7 @@ void Fit::collect_warnings() {
       for (const auto& [x, y] : pixels_[g])
         if (out.pixels(x, y)) theirs += std::pow(micrograph.residual(x, y) / micrograph.sigma(x, y), 2);
       if (out.count > 0 && out.count < kMostOutliers * micrograph.used && theirs > 0.2 * (micrograph.chi_square - micrograph.used))
-        warn(fmt::format("{}: {} pixels in {}, the largest around column {}, row {}, make {:.2g} % of the misfit: dust or a scratch? Mask them, or set fit: {{outliers: leave_out}}.",
+        warn(fmt::format("{}: {} pixels in {}, the largest around column {}, row {}, make {:.0f} % of the misfit: dust or a scratch? Mask them, or set fit: {{outliers: leave_out}}.",
                          micrograph.name, out.count, out.spots == 1 ? "one spot" : fmt::format("{} spots", out.spots), out.largest_column, out.largest_row,
                          100 * std::min(1.0, theirs / (micrograph.chi_square - micrograph.used))));
     }

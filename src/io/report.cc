@@ -807,7 +807,7 @@ std::string data_section(const Config& config, const FitResult& result) {
   std::string out =
       "<h2>Data</h2>\n<p>Pixels used and left out, by reason; noise model in counts.</p>\n<div class=\"scroll\"><table "
       "class=\"full\">\n<tr><th>micrograph</th><th>used</th><th>masked</th>"
-      "<th>outside<br>ROI</th><th>satu-<br>rated</th><th>dead</th><th>not<br>finite</th><th>chi-square<br>per "
+      "<th>outside<br>ROI</th><th>satu-<br>rated</th><th>dead</th><th>not<br>finite</th><th>out-<br>liers</th><th>chi-square<br>per "
       "pixel</th>"
       "<th>read<br>noise</th><th>counts per<br>photon</th></tr>\n";
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
@@ -817,10 +817,10 @@ std::string data_section(const Config& config, const FitResult& result) {
     const Micrograph& input = i < config.job.micrographs.size() ? config.job.micrographs[i] : none;
     out += fmt::format(
         "<tr><td class=\"name "
-        "file\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+        "file\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td>{}{}</td><td>{}</td></tr>\n",
         escape_html(m.name), m.used, input.masked_by_user, input.outside_roi, input.saturated, input.dead,
-        input.non_finite, m.used > 0 ? plain(m.chi_square / m.used) : "\u2013", plain(m.noise.read_counts),
+        input.non_finite, m.outliers, m.used > 0 ? plain(m.chi_square / m.used) : "\u2013", plain(m.noise.read_counts),
         m.noise.estimated ? "*" : "", plain(m.noise.counts_per_photon));
   }
   out += "</table></div>\n";

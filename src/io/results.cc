@@ -62,12 +62,12 @@ Json plan_json(const RenderPlan& plan) {
 }
 
 struct PixelCounts {
-  long used = 0, masked = 0, saturated = 0, dead = 0, non_finite = 0, outside_roi = 0;
+  long used = 0, outliers = 0, masked = 0, saturated = 0, dead = 0, non_finite = 0, outside_roi = 0;
 };
 
 PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t i) {
   PixelCounts counts;
-  if (i < result.micrographs.size()) counts.used = result.micrographs[i].used;
+  if (i < result.micrographs.size()) counts.used = result.micrographs[i].used, counts.outliers = result.micrographs[i].outliers;
   if (i < config.job.micrographs.size()) {
     const Micrograph& m = config.job.micrographs[i];
     counts.masked = m.masked_by_user;
@@ -81,7 +81,7 @@ PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t
 
 Json pixels_json(const PixelCounts& c) {
   return {{"used", c.used}, {"masked", c.masked},         {"saturated", c.saturated},
-          {"dead", c.dead}, {"non_finite", c.non_finite}, {"outside_roi", c.outside_roi}};
+          {"dead", c.dead}, {"non_finite", c.non_finite}, {"outside_roi", c.outside_roi}, {"outliers", c.outliers}};
 }
 
 double residual_fraction(const MicrographResult& m) {
@@ -228,7 +228,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
     const MicrographResult& m = result.micrographs[i];
     const PixelCounts counts = pixels_of(config, result, i);
     total.used += counts.used, total.masked += counts.masked, total.saturated += counts.saturated;
-    total.dead += counts.dead, total.non_finite += counts.non_finite, total.outside_roi += counts.outside_roi;
+    total.dead += counts.dead, total.non_finite += counts.non_finite, total.outside_roi += counts.outside_roi, total.outliers += counts.outliers;
     if (i == 0) model = m.plan;
     model.numerical_error = std::max(model.numerical_error, m.plan.numerical_error);
     model.model_error = std::max(model.model_error, m.plan.model_error);
