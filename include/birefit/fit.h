@@ -128,6 +128,13 @@ struct MicrographResult {
   RenderPlan plan;
 };
 
+/// What the estimates hang on: an input that all micrographs share and the fit takes as exact, and what `step` more of it would do to them.
+struct InputEffect {
+  std::string name, unit;
+  double value = 0, step = 0;  ///< step: 1 deg, 1 px, else 1 % of the value
+  std::vector<double> shift;   ///< of FitResult::parameters, to first order
+};
+
 /// The scan before the solver: objective along one parameter (for the report's chart).
 struct ScanTrace {
   std::string name;
@@ -177,6 +184,7 @@ struct FitResult {
   std::vector<RivalMinimum> rivals;
   std::vector<BranchResult> branches;  ///< empty unless the job had several
   std::vector<FisherDirection> directions;
+  std::vector<InputEffect> inputs;     ///< those that shift a searched parameter by a tenth of its standard error or more; largest first
   std::vector<MicrographResult> micrographs;
   std::vector<ScanTrace> scans;
   std::vector<ProfileTrace> profiles;  ///< of the parameters whose interval is `profiled`

@@ -20,6 +20,7 @@
 #include "fit/scan.h"
 #include "fit/statistics.h"
 #include "fit/verdict.h"
+#include "medium/references.h"
 #include "render/wave.h"
 
 namespace birefit {
@@ -165,6 +166,7 @@ class Fit {
   void report_parameters(const Inverse& inverse, const Inverse& of_noise);
   std::optional<double> upper_limit(int unknown, const Inverse& inverse);
   void settle_interval(ParameterEstimate& estimate, int unknown, const Inverse& of_noise);
+  void weigh_inputs(const Inverse& of_noise);
   void report_micrographs();
   void collect_warnings();
   struct Shift {
@@ -903,6 +905,63 @@ void Fit::report_parameters(const Inverse& inverse, const Inverse& of_noise) {
   problem_->evaluate(best_, true);  // profiles moved it
 }
 
+/// What the fit takes as exact, and what the estimates owe to it.
+void Fit::weigh_inputs(const Inverse& of_noise) {
+  if (stopped_ || unknowns_.searched.empty() || std::any_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) return;
+  std::map<int, int> readers;
+  for (const Micrograph& m : job_.micrographs) {
+    std::set<int> read;
+    for_each_ref(m.scene, [&](const ParameterRef& ref) {
+      if (!ref || job_.parameters[ref].free) return;
+      const bool of_a_vector = job_.parameters[ref].name.find(".axis.") != std::string::npos;  // no quantity by itself
+      if (!of_a_vector) read.insert(ref.index);
+    });
+    for (const int index : read) ++readers[index];
+  }
+  std::vector<int> inputs;
+  for (const auto& [index, number] : readers)
+    if (number == frames_) inputs.push_back(index);
+  std::vector<InputEffect> effects;
+  const auto add = [&](const std::string& name, const std::string& unit, double value, const Eigen::VectorXd& by) {
+    InputEffect effect{name, unit, value, unit == "deg" || unit == "px" ? 1.0 : 0.01 * std::abs(value), {}};
+    const Eigen::VectorXd shift = problem_->shift_by(effect.step * by, of_noise.covariance);
+    if (shift.allFinite()) effect.shift.assign(shift.begin(), shift.end());
+    if (effect.step > 0 && !effect.shift.empty()) effects.push_back(std::move(effect));
+  };
+  const Eigen::MatrixXd columns = problem_->intensity_by(inputs);
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    const Parameter& p = job_.parameters[inputs[k]];
+    add(p.name, p.unit, theta_[static_cast<std::size_t>(inputs[k])], columns.col(static_cast<Eigen::Index>(k)));
+  }
+  // The size of a pixel is no parameter: by differences.
+  const double pixel = job_.micrographs.front().scene.view.pixel_size_um;
+  if (pixel > 0 && std::all_of(job_.micrographs.begin(), job_.micrographs.end(), [&](const Micrograph& m) { return m.scene.view.pixel_size_um == pixel; })) {
+    constexpr double kStep = 1e-4;
+    Eigen::VectorXd by(problem_->pixel_rows());
+    Eigen::Index row = 0;
+    for (int g = 0; g < frames_; ++g) {
+      std::array<Image, 2> images;
+      for (const int side : {0, 1}) {
+        Scene scene = job_.micrographs[g].scene;
+        scene.view.pixel_size_um *= 1 + (side ? kStep : -kStep);
+        images[static_cast<std::size_t>(side)] = render(scene, plans_[g], theta_, {}, job_.options.threads).intensity;
+      }
+      for (const auto& [x, y] : pixels_[g]) by[row++] = (images[1](x, y) - images[0](x, y)) / (2 * kStep * pixel);
+    }
+    add("micrograph.pixel_size_um", "um", pixel, by);
+  }
+  const auto weight = [&](const InputEffect& effect) {
+    double most = 0;
+    for (std::size_t j = 0; j < unknowns_.searched.size(); ++j)
+      if (const double sd = result_.parameters[j].stderr_; sd > 0) most = std::max(most, std::abs(effect.shift[j]) / sd);
+    return most;
+  };
+  constexpr double kOfNote = 0.1;
+  std::erase_if(effects, [&](const InputEffect& effect) { return weight(effect) < kOfNote; });
+  std::stable_sort(effects.begin(), effects.end(), [&](const InputEffect& a, const InputEffect& b) { return weight(a) > weight(b); });
+  result_.inputs = std::move(effects);
+}
+
 void Fit::report_micrographs() {
   for (int g = 0; g < frames_; ++g) {
     const Micrograph& micrograph = job_.micrographs[g];
@@ -1194,6 +1253,7 @@ void Fit::report() {
   if (!shift.isZero(0)) result_.covariance_kind += ", and the error of wave propagation by the exact image of a radial twin";
   report_parameters(inverse, of_noise);
   judge_identifiability(result_, job_, unknowns_, factor, inverse);
+  weigh_inputs(of_noise);
   const bool signal = shows_signal(data_chi_square);
   if (!signal) result_.identifiable = false;
   report_micrographs();

@@ -172,16 +172,12 @@ void LeastSquares::set_priors() {
   }
 }
 
-void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
+/// Intensity of a frame's used pixels and its derivatives by table entries.
+void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, int threads, Eigen::Ref<Eigen::VectorXd> intensity,
+                               const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative) {
   Frame& frame = frames_[g];
   const Scene& scene = job_.micrographs[g].scene;
   const std::vector<std::array<int, 2>>& pixels = frame.set.pixels;
-  std::vector<int> active;
-  if (derivatives)
-    for (const int j : frame.read) active.push_back(unknowns_.searched[static_cast<std::size_t>(j)]);
-  auto intensity = intensity_.segment(frame.begin, frame.count);
-  if (derivatives) searched_columns_.middleRows(frame.begin, frame.count).setZero();
-  const auto column = [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); };
   // A whole image is cheaper by its symmetries and rows; a small part of it pixel by pixel.
   if (2 * pixels.size() > static_cast<std::size_t>(scene.view.width) * scene.view.height) {
     render(scene, plans_[g], theta_, active, threads, frame.rendering);
@@ -190,12 +186,31 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
       for (Eigen::Index i = 0; i < frame.count; ++i) out[i] = image(pixels[i][0], pixels[i][1]);
     };
     gather(rendering.intensity, intensity);
-    for (std::size_t j = 0; j < active.size(); ++j) gather(rendering.derivatives[j], column(j));
+    for (std::size_t j = 0; j < active.size(); ++j) gather(rendering.derivatives[j], derivative(j));
   } else {
     const PixelRendering rendering = render_pixels(scene, plans_[g], theta_, pixels, active, threads);
     intensity = rendering.intensity;
-    for (std::size_t j = 0; j < active.size(); ++j) column(j) = rendering.derivatives.col(static_cast<Eigen::Index>(j));
+    for (std::size_t j = 0; j < active.size(); ++j) derivative(j) = rendering.derivatives.col(static_cast<Eigen::Index>(j));
   }
+}
+
+/// body(frame, threads). A core a frame pays as soon as there are several a core, and for frames of a few pixels nothing else does. Waves take
+/// memory by the gigabyte: one at a time.
+template <class Body>
+void LeastSquares::for_frames(const Body& body) {
+  const int frames = static_cast<int>(frames_.size()), threads = thread_count(job_.options.threads);
+  const bool apart = frames >= 4 * threads && std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& plan) { return plan.wave != nullptr; });
+  parallel_for(frames, apart ? threads : 1, [&](int g) { body(static_cast<std::size_t>(g), apart ? 1 : threads); });
+}
+
+void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
+  Frame& frame = frames_[g];
+  std::vector<int> active;
+  if (derivatives)
+    for (const int j : frame.read) active.push_back(unknowns_.searched[static_cast<std::size_t>(j)]);
+  auto intensity = intensity_.segment(frame.begin, frame.count);
+  if (derivatives) searched_columns_.middleRows(frame.begin, frame.count).setZero();
+  render_used(g, active, threads, intensity, [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
   frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
   frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
   for (Term& term : frame.terms) {
@@ -204,6 +219,29 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
     if (term.shape) term.whitened.array() *= term.at_pixels.array();
     whiten(frame, term.whitened);
   }
+}
+
+Eigen::MatrixXd LeastSquares::intensity_by(const std::vector<int>& table_indices) {
+  Eigen::MatrixXd columns(pixel_rows_, static_cast<Eigen::Index>(table_indices.size()));
+  for_frames([&](std::size_t g, int threads) {
+    const Frame& frame = frames_[g];
+    Eigen::VectorXd intensity(frame.count);
+    render_used(g, table_indices, threads, intensity, [&](std::size_t j) { return columns.col(static_cast<Eigen::Index>(j)).segment(frame.begin, frame.count); });
+  });
+  return columns;
+}
+
+Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change, const Eigen::MatrixXd& covariance) const {
+  Eigen::VectorXd pull = Eigen::VectorXd::Zero(unknowns_.size());
+  Eigen::VectorXd change = intensity_change;
+  for (const Frame& frame : frames_) {
+    auto part = change.segment(frame.begin, frame.count);
+    part.array() *= light(frame, true).array();
+    whiten(frame, part);
+  }
+  for (const Tile& tile : tiles_)
+    if (tile.micrograph >= 0) pull += full_rows(tile).transpose() * change.segment(frames_[tile.micrograph].begin + tile.begin, tile.count);
+  return -covariance * pull;
 }
 
 /// Sum of the coefficients of the intensity, or of those by themselves, at every pixel.
@@ -226,11 +264,7 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   has_derivatives_ = false;
   if (derivatives) searched_columns_.resize(residual_.size(), p);
   ++evaluations_;
-  // A core a frame pays as soon as there are several a core, and for frames of a few pixels nothing else does. Waves take memory by the
-  // gigabyte: one at a time.
-  const int frames = static_cast<int>(frames_.size()), threads = thread_count(job_.options.threads);
-  const bool apart = frames >= 4 * threads && std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& plan) { return plan.wave != nullptr; });
-  parallel_for(frames, apart ? threads : 1, [&](int g) { render_frame(static_cast<std::size_t>(g), derivatives, apart ? 1 : threads); });
+  for_frames([&](std::size_t g, int threads) { render_frame(g, derivatives, threads); });
   solve_linear();
   if (!derivatives) return;
 

@@ -102,6 +102,10 @@ class LeastSquares {
   /// long-run variance (U. K. Mueller, J. Econometrics 141, 1331 (2007); Y. Sun, Econometrics J. 14, 345 (2011)). Micrographs below 32 x 32 pixels are not looked at.
   Eigen::VectorXd misfit_along(const Eigen::MatrixXd& covariance) const;
   static constexpr int kLeastModulations = 8;
+  /// d(intensity of every pixel)/d(table entry), a column each, at the last evaluated point.
+  Eigen::MatrixXd intensity_by(const std::vector<int>& table_indices);
+  /// By how much the unknowns at the optimum change when the model's intensity does by this at every pixel; to first order.
+  Eigen::VectorXd shift_by(const Eigen::VectorXd& intensity_change, const Eigen::MatrixXd& covariance) const;
   /// Of the model intensity over all used pixels of a micrograph.
   std::array<double, 2> intensity_range(int micrograph) const;
   /// Sum of squares of the prior rows.
@@ -136,6 +140,10 @@ class LeastSquares {
     Rendering rendering;                       ///< kept for its memory
   };
   void render_frame(std::size_t frame, bool derivatives, int threads);
+  void render_used(std::size_t frame, const std::vector<int>& active, int threads, Eigen::Ref<Eigen::VectorXd> intensity,
+                   const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative);
+  template <class Body>
+  void for_frames(const Body& body);
   Eigen::VectorXd light(const Frame& frame, bool of_intensity) const;
   void whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const;
   void set_priors();

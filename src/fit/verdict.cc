@@ -198,6 +198,23 @@ std::string verdict(const FitResult& result, bool signal) {
     sentences.push_back(
         fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
                     result.reduced_chi_square > 2 ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise" : ""));
+  // The inputs whose error would be the estimates'.
+  std::vector<std::string> inputs;
+  for (const InputEffect& input : result.inputs) {
+    int most = -1;
+    double weight = 1;  // standard errors
+    for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
+      const ParameterEstimate& p = result.parameters[j];
+      const double here = p.stderr_ > 0 ? std::abs(input.shift[static_cast<std::size_t>(j)]) / p.stderr_ : 0;
+      if (!p.linear && p.unit != "px" && here > weight) most = j, weight = here;
+    }
+    if (most < 0 || inputs.size() == 3) continue;
+    const ParameterEstimate& p = result.parameters[most];
+    const double shift = input.shift[static_cast<std::size_t>(most)];
+    inputs.push_back(fmt::format("{} more of {} makes {} {}", input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %", input.name,
+                                 name_of(result, most), p.unit == "deg" || p.value == 0 ? fmt::format("{:+.2g}{}", shift, unit_suffix(p)) : fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value))));
+  }
+  if (signal && !inputs.empty()) sentences.push_back("Taken as exact: " + joined(inputs) + ".");
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
   return text;

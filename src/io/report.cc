@@ -581,6 +581,31 @@ std::string branch_table(const FitResult& result) {
   return out + "</table></div>\n<p>Odds by the Bayesian information criterion, all branches weighed by the noise of the best.</p>\n";
 }
 
+/// What the fit took as exact, and what that does to the estimates.
+std::string input_table(const FitResult& result) {
+  constexpr std::size_t kMostInputs = 10, kMostParameters = 6;
+  std::vector<std::size_t> shown;
+  for (std::size_t j = 0; j < result.parameters.size() && shown.size() < kMostParameters; ++j)
+    if (!result.parameters[j].linear && result.parameters[j].unit != "px" && std::isfinite(result.parameters[j].stderr_)) shown.push_back(j);
+  if (result.inputs.empty() || shown.empty()) return {};
+  std::string out =
+      "<h2>Taken as exact</h2>\n<p>What the estimates would change by, to first order, if an input were otherwise; in brackets over the standard error. An input with a "
+      "<code>prior_sd</code> is fitted, and its uncertainty counted.</p>\n<div class=\"scroll\"><table>\n<tr><th>input</th><th>value</th><th>more by</th>";
+  for (const std::size_t j : shown) out += "<th>" + escape_html(short_name(result.parameters[j].name)) + "</th>";
+  out += "</tr>\n";
+  for (std::size_t i = 0; i < std::min(kMostInputs, result.inputs.size()); ++i) {
+    const InputEffect& input = result.inputs[i];
+    out += fmt::format("<tr><td class=\"name\">{}</td><td>{} {}</td><td>{}</td>", escape_html(input.name), html_number(fmt::format("{:.6g}", input.value)), escape_html(input.unit),
+                       input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %");
+    for (const std::size_t j : shown) {
+      const ParameterEstimate& p = result.parameters[j];
+      out += fmt::format("<td>{} ({})</td>", html_number(fmt::format("{:+.2g}", input.shift[j])), html_number(fmt::format("{:+.{}f}", input.shift[j] / p.stderr_, std::abs(input.shift[j]) < 10 * p.stderr_ ? 1 : 0)));
+    }
+    out += "</tr>\n";
+  }
+  return out + "</table></div>\n";
+}
+
 std::string coverage_table(const FitResult& result) {
   if (!result.coverage) return {};
   const Coverage& c = *result.coverage;
@@ -885,6 +910,7 @@ std::string report_html(const Config& config, const FitResult& result) {
   for (const Frame& frame : frames) out += frame_section(frame, result, figure, largest_side);
 
   out += "<h2>Parameters</h2>\n" + parameter_table(result) + statistics_section(config, result);
+  out += input_table(result);
   out += branch_table(result);
   out += coverage_table(result);
   out += correlation_table(result);

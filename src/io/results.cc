@@ -196,6 +196,12 @@ std::string fit_json(const Config& config, const FitResult& result) {
                                   {"stderr", number(direction.stderr_)},
                                   {"weights", weights}});
   }
+  json["inputs"] = Json::array();
+  for (const InputEffect& input : result.inputs) {
+    Json shift = Json::object();
+    for (std::size_t j = 0; j < input.shift.size() && j < result.parameters.size(); ++j) shift[result.parameters[j].name] = number(input.shift[j]);
+    json["inputs"].push_back({{"name", input.name}, {"unit", input.unit}, {"value", number(input.value)}, {"step", number(input.step)}, {"shift", shift}});
+  }
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
   json["coverage"] = nullptr;

@@ -711,6 +711,36 @@ TEST(Fit, ProfileFollowsAValleyThatBends) {
   EXPECT_GT(profiled, 0);
 }
 
+TEST(Inputs, ShiftTheEstimateAsAFitWithAnotherInputDoes) {
+  // The picture depends on bias / half-wave voltage alone: one percent of the one is one percent of the other.
+  Bar bar(700, 0.4);
+  bar.free(bar.bias, 650, 400, 1000);
+  bar.free_linear();
+  Micrograph& m = bar.add_image(40, 30, bar.bias);
+  m.noise = NoiseModel{1, 0, false};
+  Gaussian gaussian(29);
+  expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return gaussian(); });
+  const FitResult result = fit(bar.job);
+  const auto effect = [&](const std::string& name) {
+    for (const InputEffect& input : result.inputs)
+      if (input.name == name) return input;
+    ADD_FAILURE() << name;
+    return InputEffect{};
+  };
+  const InputEffect half_wave = effect("sample.crystal.half_wave_voltage_v");
+  ASSERT_EQ(half_wave.shift.size(), result.parameters.size());
+  EXPECT_NEAR(half_wave.shift[0], 0.01 * result.parameters[0].value, 1e-6 * result.parameters[0].value);
+  // The field's tilt, by fitting again with another one; a thousandth of it, where the change is linear to a thousandth.
+  const InputEffect tilt = effect("sample.crystal.field_legendre.c1");
+  EXPECT_NEAR(tilt.step, 0.01 * 0.4, 1e-12);
+  FitJob other = bar.job;
+  other.parameters[bar.tilt].value = 0.4 * 1.001;
+  const FitResult there = fit(other);
+  for (std::size_t j = 0; j < result.parameters.size(); ++j)
+    EXPECT_NEAR(there.parameters[j].value - result.parameters[j].value, 0.1 * tilt.shift[j], 0.01 * std::abs(0.1 * tilt.shift[j]) + 1e-4 * result.parameters[j].stderr_) << result.parameters[j].name;
+  EXPECT_NE(result.verdict.find("1 % more of sample.crystal.half_wave_voltage_v makes bias_v +1 %"), std::string::npos) << result.verdict;
+}
+
 TEST(Coverage, OfAPlainFitIsNominalAndTheSameTwice) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 600, 300, 1400);
