@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <random>
 
 #include "birefit/fit.h"
@@ -24,7 +25,7 @@ struct Droplet96 {
   TableBuilder b;
   Scene scene;
   Micrograph m;
-  double polarizer_deg = 0, analyzer_deg = 90;
+  std::optional<Scene> nature;  ///< where it is not what the fit takes it for
   ParameterRef diameter, birefringence, center_x, center_y, polarizer, analyzer, gain, offset;
 
   Droplet96() {
@@ -47,7 +48,8 @@ struct Droplet96 {
   /// Intensity of a pixel with the table's values.
   Image light() const {
     const Theta theta = b.table.values();
-    return render(scene, plan(scene, theta), theta, {}, 1).intensity;
+    const Scene& seen = nature ? *nature : scene;
+    return render(seen, plan(seen, theta), theta, {}, 1).intensity;
   }
 };
 
@@ -282,6 +284,73 @@ TEST(DisturbedRecovery, SaturatedAndCutOff) {
   EXPECT_EQ(helped.wrong + helped.without_answer, 0);
   const Outcome half = fits("cut off", cut, false);
   EXPECT_EQ(half.wrong, 0);
+}
+
+// What the sample is not: the goodness of the fit says so, or the interval holds the truth.
+TEST(WrongModel, IsNeverAGoodFitAroundAWrongNumber) {
+  const auto with = [](auto change) {
+    Disturbance d;
+    d.truth = [change](Droplet96& droplet) {
+      droplet.nature = droplet.scene;
+      change(droplet, std::get<birefit::Droplet>(droplet.nature->sample));
+    };
+    return d;
+  };
+  const std::vector<std::pair<const char*, Disturbance>> cases{
+      {"bipolar", with([](Droplet96& d, birefit::Droplet& sample) { sample.director = BipolarDirector{d.b.fixed("azimuth", 30), {}, {}}; })},
+      {"twisted", with([](Droplet96& d, birefit::Droplet& sample) { sample.director = RadialDirector{d.b.fixed("twist", 20)}; })},
+      {"shell", with([](Droplet96& d, birefit::Droplet& sample) {
+         ShellDirector shell;
+         shell.wall_um = d.b.fixed("wall", 4);
+         sample.director = shell;
+       })},
+      {"curved rays", with([](Droplet96& d, birefit::Droplet&) { d.nature->rays = Rays::eikonal; })},
+      {"two droplets", with([](Droplet96&, birefit::Droplet&) {})}};
+  for (auto [name, what] : cases) {
+    if (std::string(name) == "two droplets")  // one above the other, to be seen through each other
+      what.light = [](Image& counts, Random&) {
+        Droplet96 other;
+        for (const auto& [ref, value] : {std::pair(other.diameter, 6.0), {other.center_x, 52.0}, {other.center_y, 40.0}}) other.b.table[ref].value = value;
+        const Image light = other.light();
+        for (std::size_t i = 0; i < light.size(); ++i) counts.values()[i] = 0.6 * counts.values()[i] + 400 * light.values()[i];
+      };
+    const Outcome outcome = fits(name, what, false, 3);
+    if (outcome.wrong > 0) {
+      EXPECT_GT(outcome.reduced, 2) << name;
+    }
+  }
+}
+
+// What no residual shows: inputs that are wrong. The result says beforehand what they do.
+TEST(WrongModel, AWrongInputDoesWhatTheResultSaysOfIt) {
+  struct Case {
+    const char* input;
+    double relative;
+    std::function<void(Droplet96&, double)> believe;
+  };
+  const std::vector<Case> cases{
+      {"wavelength_nm", 0.01, [](Droplet96& d, double factor) { d.b.table[d.scene.microscope.wavelength_nm].value *= factor; }},
+      {"surround", 0.002, [](Droplet96& d, double factor) { d.b.table[d.scene.surround_index].value *= factor; }},
+      {"ordinary", 0.002, [](Droplet96& d, double factor) { d.b.table[std::get<ConstantIndices>(d.scene.material).ordinary].value *= factor; }},
+      {"micrograph.pixel_size_um", 0.01, [](Droplet96& d, double factor) { d.scene.view.pixel_size_um *= factor; }}};
+  const FitResult right = fit_one({}, false, 1);
+  for (const Case& c : cases) {
+    Disturbance wrong;
+    wrong.help = [&](Droplet96& d, FitJob& job) {
+      c.believe(d, 1 + c.relative);
+      job.micrographs[0].scene = d.scene;
+    };
+    const FitResult there = fit_one(wrong, true, 1);
+    const auto input = std::find_if(right.inputs.begin(), right.inputs.end(), [&](const InputEffect& i) { return i.name == c.input; });
+    ASSERT_NE(input, right.inputs.end()) << c.input;
+    for (std::size_t j = 0; j < 2; ++j) {
+      const double moved = there.parameters[j].value - right.parameters[j].value, said = input->shift[j] * c.relative * input->value / input->step;
+      std::printf("  %-26s %+.1f %%: %-14s moves by %+.5f, said %+.5f (%.0f standard errors)\n", c.input, 100 * c.relative, right.parameters[j].name.c_str(), moved, said,
+                  said / right.parameters[j].stderr_);
+      // To first order: a twentieth of it, and the noise of weights that were settled again.
+      EXPECT_NEAR(moved, said, 0.05 * std::abs(said) + right.parameters[j].stderr_) << c.input;
+    }
+  }
 }
 
 }  // namespace
