@@ -1,6 +1,6 @@
 // Makes the image of data/axial_droplet: run from the repository's root,
 //   g++ -std=c++20 -O2 -Itests/support tools/make_data/axial_droplet.cc -o make_axial && ./make_axial
-//   oiiotool axial_droplet.pgm -o axial_droplet.png
+//   oiiotool --nosoftwareattrib axial_droplet.pgm -o axial_droplet.png
 // The equilibrium of a hedgehog in a field along its axis, by finite differences and successive over-relaxation on a grid of
 // radius and polar angle: theta_rr + 2/r theta_r + (theta_vv + cot v theta_v)/r^2 = sin theta cos theta (1/(r sin v)^2 + e^2).
 
