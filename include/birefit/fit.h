@@ -51,7 +51,7 @@ struct FitOptions {
   int threads = 0;             ///< 0 = all cores
   int max_iterations = 100;
   int scan_pixels = 4000;      ///< of the coarse scan, spread over all micrographs
-  int scan_candidates = 4;     ///< starts polished after the scan
+  int scan_candidates = 12;    ///< starts polished after the scan, of four times as many looked at; more where the image is described badly
   bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
   bool choose_waves = false;   ///< Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
   double max_seconds = 60;
@@ -89,6 +89,9 @@ struct ParameterEstimate {
   std::string limit;
   double limit_value = 0;
 };
+
+/// Odds of another minimum, or branch, above which the answer is called ambiguous.
+inline constexpr double kAmbiguousOdds = 0.01;
 
 /// Another minimum the data cannot exclude.
 struct RivalMinimum {
@@ -202,7 +205,7 @@ struct FitResult {
 };
 
 /// Estimates every free parameter; of several branches, those of the one with the best odds, and `ambiguous` when another
-/// has odds above 0.01. Deterministic: same job, same bits, whatever the number of threads.
+/// has odds above kAmbiguousOdds. Deterministic: same job, same bits, whatever the number of threads.
 /// A job without usable pixels throws UserError; everything about the data's quality is in the result.
 FitResult fit(const FitJob& job);
 

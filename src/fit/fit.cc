@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "fit/centre.h"
 #include "fit/least_squares.h"
 #include "fit/light.h"
 #include "fit/noise.h"
@@ -141,6 +142,7 @@ class Fit {
 
   void prepare();
   double look_for_minima(double hopeless_above);
+  std::optional<Eigen::VectorXd> start_at_symmetry() const;
   void look_near_rays();
   void find_minima();
   void settle_weights();
@@ -333,6 +335,33 @@ void Fit::look_near_rays() {
   sample_rows_ = static_cast<double>(all.pixel_rows());
 }
 
+/// The start with the centre where the images show it, within its bounds; nothing where no centre is searched or the images disagree.
+std::optional<Eigen::VectorXd> Fit::start_at_symmetry() const {
+  Eigen::VectorXd centred = start_;
+  std::array<int, 2> at{-1, -1};
+  for (int g = 0; g < frames_; ++g) {
+    const View& view = job_.micrographs[g].scene.view;
+    const auto unknown = [&](ParameterRef ref) {
+      const auto found = ref ? std::find(unknowns_.searched.begin(), unknowns_.searched.end(), ref.index) : unknowns_.searched.end();
+      return found == unknowns_.searched.end() ? -1 : static_cast<int>(found - unknowns_.searched.begin());
+    };
+    const std::array<int, 2> here{unknown(view.center_x_px), unknown(view.center_y_px)};
+    if (here[0] < 0 || here[1] < 0 || here == at) continue;  // frames that share a centre: the first one's
+    Mask used(job_.micrographs[g].values.width(), job_.micrographs[g].values.height());
+    for (const auto& [x, y] : pixels_[g]) used(x, y) = 1;
+    const std::optional<std::array<double, 2>> centre = centre_of_symmetry(job_.micrographs[g].values, used);
+    if (!centre) return std::nullopt;
+    at = here;
+    for (int axis = 0; axis < 2; ++axis) {
+      const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(here[axis])]];
+      if (!((*centre)[axis] > parameter.lower && (*centre)[axis] < parameter.upper)) return std::nullopt;
+      centred[here[axis]] = (*centre)[axis];
+    }
+  }
+  if (at[0] < 0) return std::nullopt;
+  return centred;
+}
+
 double Fit::look_for_minima(double hopeless_above) {
   if (std::any_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) {
     look_near_rays();
@@ -360,12 +389,33 @@ double Fit::look_for_minima(double hopeless_above) {
       }
     }
   }
-  std::vector<PixelSet> part;
   const std::size_t share = std::max<std::size_t>(50, job_.options.scan_pixels / std::max(1, frames_));
-  for (int g = 0; g < frames_; ++g)
-    part.push_back(pixel_set(job_.micrographs[g], sigma_[g], subsample(pixels_[g], share)));
-  LeastSquares sample(job_, unknowns_, plans_, std::move(part));
-  sample.set_misfit(prior_misfit());
+  const auto sampled = [&] {
+    std::vector<PixelSet> part;
+    for (int g = 0; g < frames_; ++g) part.push_back(pixel_set(job_.micrographs[g], sigma_[g], subsample(pixels_[g], share)));
+    auto problem = std::make_unique<LeastSquares>(job_, unknowns_, plans_, std::move(part));
+    problem->set_misfit(prior_misfit());
+    return problem;
+  };
+  std::unique_ptr<LeastSquares> sampled_pixels = sampled();
+  // The picture's own middle, where fringes fit better around it: the grid takes the centre as known.
+  if (const std::optional<Eigen::VectorXd> centred = start_at_symmetry()) {
+    const std::vector<RenderPlan> given = plans_;
+    const double by_given = lowest_of_few(*sampled_pixels, job_, unknowns_, start_, phase);
+    Theta theta = theta_;
+    for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) theta[unknowns_.searched[j]] = (*centred)[static_cast<Eigen::Index>(j)];
+    for (int g = 0; g < frames_; ++g) plans_[g] = plan(job_.micrographs[g].scene, theta);
+    std::unique_ptr<LeastSquares> around_centre = sampled();
+    evaluations_ += sampled_pixels->evaluations();
+    if (lowest_of_few(*around_centre, job_, unknowns_, *centred, phase) < by_given) {
+      start_ = *centred, theta_ = theta;
+      sampled_pixels = std::move(around_centre);
+    } else {
+      evaluations_ += around_centre->evaluations();
+      plans_ = given;
+    }
+  }
+  LeastSquares& sample = *sampled_pixels;
   found_ = scan(sample, job_, unknowns_, start_, phase, hopeless_above);
   evaluations_ += sample.evaluations();
   stopped_ = stopped_ || found_.interrupted;
@@ -687,14 +737,15 @@ void Fit::weigh_rivals() {
       solve(x, "", 30);
       Candidate rival{x, problem_->objective(), projected_information(*problem_)};
       if (stopped_) break;
-      // Far apart in the rival's own standard errors, or else they are two places of one valley.
-      if (separation(main, x) < 5 || separation(rival, main.searched) < 5) {
+      // Far apart in the standard errors of either, or else they are two places of one valley. (At an extremum of the fringes one alone
+      // calls everything near.)
+      if (separation(main, x) < 5 && separation(rival, main.searched) < 5) {
         if (rival.objective < main.objective) std::swap(main, rival);
         continue;
       }
       if (rival.objective < main.objective) std::swap(main, rival);
       const bool known = std::any_of(others.begin(), others.end(),
-                                     [&](const Candidate& other) { return separation(other, rival.searched) < 5; });
+                                     [&](const Candidate& other) { return separation(other, rival.searched) < 5 && separation(rival, other.searched) < 5; });
       if (!known) others.push_back(std::move(rival));
     }
     for (const Candidate& rival : others) {
@@ -705,7 +756,7 @@ void Fit::weigh_rivals() {
       minimum.theta = problem_->theta();
       for (int g = 0; g < frames_; ++g) minimum.chi_square += problem_->frame_misfit(g).chi_square;
       minimum.chi_square += problem_->prior_chi_square();
-      if (minimum.odds > 0.05) result_.ambiguous = true;
+      if (minimum.odds > kAmbiguousOdds) result_.ambiguous = true;
       result_.rivals.push_back(std::move(minimum));
     }
     std::stable_sort(result_.rivals.begin(), result_.rivals.end(),
@@ -1301,7 +1352,7 @@ FitResult best_branch(const FitJob& job, std::vector<FitResult> results) {
     branches[b].odds = std::exp(-0.5 * (score[b] - score[best]));
     branches[b].reported = b == best;
     if (b == best) continue;
-    if (branches[b].odds > 0.01) result.ambiguous = true;
+    if (branches[b].odds > kAmbiguousOdds) result.ambiguous = true;
     others += fmt::format("{}{} {:.2g}", others.empty() ? "" : ", ", branches[b].name, branches[b].odds);
     result.evaluations += results[b].evaluations;
     result.seconds += results[b].seconds;

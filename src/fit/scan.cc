@@ -1,9 +1,11 @@
 #include "fit/scan.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -14,8 +16,19 @@ namespace {
 
 constexpr int kMostPointsPerAxis = 400;
 constexpr int kMostProductPoints = 3000;
+constexpr std::size_t kMostAxesSpread = 4;
 /// Fewer points than this could step over the valley of a parameter that also moves an edge.
 constexpr int kFewestPointsPerAxis = 7;
+/// A droplet's edge carries all of its rings: the largest step of a diameter, of its upper bound.
+constexpr double kDiameterStep = 1.0 / 30;
+/// Of a parameter that forms no fringes, as long as the grid has no more points than the second.
+constexpr int kPlacesWithoutFringes = 9;
+constexpr std::size_t kMostPointsWithoutFringes = 1000;
+/// Batches of starts looked at; the next one only where chi-square is more standard deviations above its expectation.
+constexpr std::size_t kMostBatches = 4;
+constexpr double kDoubtful = 5;
+/// Of the solver, for every start of a batch.
+constexpr int kFirstSteps = 2;
 
 struct Axis {
   int searched = 0;
@@ -28,35 +41,62 @@ std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std
     const Parameter& parameter = job.parameters[unknowns.searched[j]];
     const double width = parameter.upper - parameter.lower;
     if (!(phase_per_unit[j] > 0) || !std::isfinite(width) || !(width > 0)) continue;
-    const int points =
-        static_cast<int>(std::clamp(std::ceil(width * phase_per_unit[j]) + 1, static_cast<double>(kFewestPointsPerAxis),
-                                    static_cast<double>(kMostPointsPerAxis)));
+    double fewest = kFewestPointsPerAxis;
+    for (const Micrograph& m : job.micrographs)
+      if (const Droplet* droplet = std::get_if<Droplet>(&m.scene.sample); droplet && droplet->diameter_um.index == unknowns.searched[j])
+        fewest = std::max(fewest, std::ceil(width / (kDiameterStep * parameter.upper)));
+    const int points = static_cast<int>(std::clamp(std::ceil(width * phase_per_unit[j]) + 1, fewest, static_cast<double>(kMostPointsPerAxis)));
     Axis axis{static_cast<int>(j), {}};
     // Cell middles: the bounds themselves are where models degenerate.
     for (int i = 0; i < points; ++i) axis.values.push_back(parameter.lower + width * (i + 0.5) / points);
     axes.push_back(std::move(axis));
   }
+  if (axes.empty()) return axes;
+  // The rest moves the minima along the fringes' axes. But a centre: the picture has shown it.
+  std::size_t product = 1;
+  for (const Axis& axis : axes) product *= axis.values.size();
+  const auto is_centre = [&](int index) {
+    return std::any_of(job.micrographs.begin(), job.micrographs.end(),
+                       [&](const Micrograph& m) { return m.scene.view.center_x_px.index == index || m.scene.view.center_y_px.index == index; });
+  };
+  for (std::size_t j = 0; j < unknowns.searched.size() && product * kPlacesWithoutFringes <= kMostPointsWithoutFringes; ++j) {
+    const Parameter& parameter = job.parameters[unknowns.searched[j]];
+    const double width = parameter.upper - parameter.lower;
+    if (phase_per_unit[j] > 0 || !std::isfinite(width) || !(width > 0) || is_centre(unknowns.searched[j])) continue;
+    Axis axis{static_cast<int>(j), {}};
+    for (int i = 0; i < kPlacesWithoutFringes; ++i) axis.values.push_back(parameter.lower + width * (i + 0.5) / kPlacesWithoutFringes);
+    axes.push_back(std::move(axis));
+    product *= kPlacesWithoutFringes;
+  }
   return axes;
 }
 
-/// Solves from every start and keeps the distinct minima, best first, at least one.
-void polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options, std::vector<std::pair<double, Eigen::VectorXd>>& starts, int steps,
-                 double hopeless_above, const SameMinimum& same = {}) {
-  const Eigen::VectorXd start = starts.back().second;
-  // A few steps for everyone, the rest for those that may still be the best: a wrong order stays many times worse.
-  constexpr double kHopeless = 4;
+/// Solves from every start, a few steps for all and the rest for those that may still be the best, and adds the minima found to the
+/// result. Returns the lowest objective.
+double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options, std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists,
+                   int steps, double hopeless_above, const SameMinimum& same = {}) {
+  const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
   SolveOptions polish;
   polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
   polish.interrupted = options.interrupted;
-  double best = std::numeric_limits<double>::infinity();
-  for (auto& [objective, x] : starts) {
-    polish.max_iterations = steps;
-    result.interrupted = problem.solve(x, polish).interrupted || result.interrupted;
-    objective = std::isfinite(problem.objective()) ? problem.objective() : std::numeric_limits<double>::infinity();
-    best = std::min(best, objective);
+  const auto walk = [&](int iterations) {
+    polish.max_iterations = iterations;
+    for (auto& [objective, x] : starts) {
+      if (result.interrupted) return;
+      result.interrupted = problem.solve(x, polish).interrupted;
+      objective = std::isfinite(problem.objective()) ? problem.objective() : std::numeric_limits<double>::infinity();
+    }
+    std::stable_sort(starts.begin(), starts.end(), by_objective);
+  };
+  // Two steps tell whether a valley leads down; a wrong order stays many times worse.
+  constexpr double kHopeless = 4;
+  if (starts.size() > finalists + 1) {
+    walk(kFirstSteps);
+    starts.resize(finalists);
   }
+  walk(steps);
+  const double best = starts.front().first;
   const bool beaten = best > hopeless_above;
-  if (same) std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [objective, from] : starts) {
     if (!(objective <= (beaten ? 1 : kHopeless) * best) || !std::isfinite(objective)) continue;
     if (beaten) {
@@ -74,6 +114,11 @@ void polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& op
     if (std::isfinite(candidate.objective)) result.candidates.push_back(std::move(candidate));
     if (result.interrupted && !result.candidates.empty()) break;
   }
+  return best;
+}
+
+/// Of candidates from any number of starts, the distinct ones, best first; at least one, `start` itself if need be.
+void keep_distinct(ScanResult& result, LeastSquares& problem, const Eigen::VectorXd& start) {
   if (result.candidates.empty()) {
     problem.evaluate(start, true);
     result.candidates.push_back({start, problem.objective(), projected_information(problem)});
@@ -83,11 +128,30 @@ void polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& op
   std::vector<Candidate> distinct;
   for (Candidate& candidate : result.candidates) {
     const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Candidate& other) {
-      return separation(other, candidate.searched) < 5 || separation(candidate, other.searched) < 5;
+      // By both measures: where one is flat, at an extremum of the fringes, everything is near it.
+      return separation(other, candidate.searched) < 5 && separation(candidate, other.searched) < 5;
     });
     if (!known) distinct.push_back(std::move(candidate));
   }
   result.candidates = std::move(distinct);
+}
+
+/// Member `index` >= 1 of the van der Corput sequence: evenly spread over (0, 1) however many are taken.
+double van_der_corput(int index, int base) {
+  double value = 0, digit = 1.0 / base;
+  for (; index > 0; index /= base, digit /= base) value += digit * (index % base);
+  return value;
+}
+
+/// The same in the box of several axes (J. H. Halton, Numer. Math. 2, 84 (1960)).
+Eigen::VectorXd spread_point(int index, const FitJob& job, const Unknowns& unknowns, const std::vector<Axis>& axes, const Eigen::VectorXd& start) {
+  constexpr std::array<int, 8> kPrimes{2, 3, 5, 7, 11, 13, 17, 19};
+  Eigen::VectorXd x = start;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const Parameter& parameter = job.parameters[unknowns.searched[static_cast<std::size_t>(axes[k].searched)]];
+    x[axes[k].searched] = parameter.lower + (parameter.upper - parameter.lower) * van_der_corput(index + 1, kPrimes[k % kPrimes.size()]);
+  }
+  return x;
 }
 
 }  // namespace
@@ -121,6 +185,8 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
     return std::isfinite(objective) ? objective : std::numeric_limits<double>::infinity();
   };
 
+  const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
+  const int candidates = std::max(1, options.scan_candidates);
   std::vector<std::pair<double, Eigen::VectorXd>> starts;
   const std::vector<Axis> axes = axes_of(job, unknowns, phase_per_unit);
   std::size_t product = axes.empty() ? 0 : 1;
@@ -128,7 +194,7 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   if (options.progress && product > 0) options.progress("scanning for the fringe order");
 
   if (product > 0 && product <= kMostProductPoints && axes.size() <= 3) {
-    // Every point of the product grid; its minima are points below all neighbours, diagonal ones included.
+    // Every point of the product grid; its minima are points below their neighbours along every axis: a valley across the axes has several.
     std::vector<double> chi(product, std::numeric_limits<double>::infinity());
     const auto point_at = [&](std::size_t flat) {
       Eigen::VectorXd x = start;
@@ -155,56 +221,88 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
     }
     for (std::size_t i = 0; i < product; ++i) {
       bool lowest = std::isfinite(chi[i]);
-      const int neighbours = static_cast<int>(std::lround(std::pow(3, axes.size())));
-      for (int code = 0; code < neighbours && lowest; ++code) {
-        std::size_t rest = i, step = 1, other = i;
-        int digits = code;
-        bool inside = true;
-        for (const Axis& axis : axes) {
-          const int move = digits % 3 - 1;
-          digits /= 3;
-          const auto at = static_cast<std::ptrdiff_t>(rest % axis.values.size()) + move;
-          rest /= axis.values.size();
-          inside = inside && at >= 0 && at < static_cast<std::ptrdiff_t>(axis.values.size());
-          other += static_cast<std::size_t>(move) * step;  // wraps as unsigned arithmetic may
-          step *= axis.values.size();
-        }
-        if (inside && other != i) lowest = chi[i] < chi[other] || (chi[i] == chi[other] && i < other);
+      std::size_t rest = i, step = 1;
+      for (const Axis& axis : axes) {
+        const std::size_t size = axis.values.size(), at = rest % size;
+        rest /= size;
+        if (at > 0) lowest = lowest && chi[i] < chi[i - step];
+        if (at + 1 < size) lowest = lowest && chi[i] <= chi[i + step];
+        step *= size;
       }
       if (lowest) starts.emplace_back(chi[i], point_at(i));
     }
   } else if (product > 0) {
-    // Too many for a product: one axis after the other around the best so far, twice.
-    Eigen::VectorXd best = start;
-    double best_objective = objective_at(start);
+    // Too many for a product: points spread evenly over the box, where its axes are few enough for them to come near each other, then each
+    // axis through the best of them, twice.
+    for (int i = 0; i < kMostProductPoints && axes.size() <= kMostAxesSpread && !result.interrupted; ++i) {
+      Eigen::VectorXd x = spread_point(i, job, unknowns, axes, start);
+      const double objective = objective_at(x);
+      starts.emplace_back(objective, std::move(x));
+      result.interrupted = interrupted();
+    }
+    starts.emplace_back(objective_at(start), start);
     for (int round = 0; round < 2 && !result.interrupted; ++round)
       for (const Axis& axis : axes) {
         ScanTrace trace{job.parameters[unknowns.searched[axis.searched]].name, axis.values, {}};
-        Eigen::VectorXd x = best;
+        Eigen::VectorXd x = std::min_element(starts.begin(), starts.end(), by_objective)->second;
         for (const double value : axis.values) {
           x[axis.searched] = value;
           trace.chi_square.push_back(result.interrupted ? std::numeric_limits<double>::infinity() : objective_at(x));
+          starts.emplace_back(trace.chi_square.back(), x);
           result.interrupted = result.interrupted || interrupted();
-        }
-        for (std::size_t i = 0; i < axis.values.size(); ++i) {
-          const double here = trace.chi_square[i];
-          const double before = i > 0 ? trace.chi_square[i - 1] : std::numeric_limits<double>::infinity();
-          const double after =
-              i + 1 < axis.values.size() ? trace.chi_square[i + 1] : std::numeric_limits<double>::infinity();
-          if (!(here < before && here <= after)) continue;
-          x[axis.searched] = axis.values[i];
-          starts.emplace_back(here, x);
-          if (here < best_objective) best_objective = here, best = x;
         }
         if (round == 1) result.traces.push_back(std::move(trace));
       }
+    // Of neighbours, less than a radian apart in everything, the best.
+    std::stable_sort(starts.begin(), starts.end(), by_objective);
+    std::vector<std::pair<double, Eigen::VectorXd>> apart;
+    for (auto& [objective, x] : starts) {
+      if (apart.size() >= 4 * kMostBatches * static_cast<std::size_t>(candidates) || !std::isfinite(objective)) break;
+      const bool near = std::any_of(apart.begin(), apart.end(), [&](const auto& other) {
+        return std::all_of(axes.begin(), axes.end(), [&](const Axis& axis) {
+          return std::abs(x[axis.searched] - other.second[axis.searched]) * phase_per_unit[static_cast<std::size_t>(axis.searched)] < 1;
+        });
+      });
+      if (!near) apart.emplace_back(objective, x);
+    }
+    starts = std::move(apart);
   }
-  std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  if (static_cast<int>(starts.size()) > options.scan_candidates) starts.resize(std::max(1, options.scan_candidates));
-  starts.emplace_back(0, start);  // the user's, whatever the grid says
+  std::stable_sort(starts.begin(), starts.end(), by_objective);
 
-  polish_into(result, problem, options, starts, 6, hopeless_above);
+  // A batch takes no longer than the grid did, but for a few starts that any fit deserves: images are the unit, a step of the solver takes
+  // one with a derivative by every unknown.
+  constexpr int kSteps = 6, kFewest = 4;
+  const int step_cost = 1 + problem.searched_size(), affordable = result.points / step_cost;
+  const std::size_t finalists = static_cast<std::size_t>(std::clamp(affordable / (2 * kSteps), std::min(kFewest, candidates), candidates));
+  const std::size_t first_look = static_cast<std::size_t>(std::clamp<int>(affordable / (2 * kFirstSteps), static_cast<int>(finalists), 4 * candidates));
+  const std::size_t batches = affordable > 4 * candidates * kFirstSteps ? kMostBatches : 1;
+
+  // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet believed: the next ones,
+  // then, as long as there are any.
+  const double rows = static_cast<double>(problem.pixel_rows());
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t batch = 0; batch < batches && !result.interrupted; ++batch) {
+    const std::size_t first = batch * first_look, last = std::min(starts.size(), first + first_look);
+    std::vector<std::pair<double, Eigen::VectorXd>> some;
+    for (std::size_t i = first; i < last; ++i) some.push_back(starts[i]);
+    if (batch == 0) some.emplace_back(0, start);
+    if (some.empty()) break;
+    best = std::min(best, polish_into(result, problem, options, std::move(some), finalists, kSteps, hopeless_above));
+    if (best < rows + kDoubtful * std::sqrt(2 * rows) || best > hopeless_above) break;
+  }
+  keep_distinct(result, problem, start);
   return result;
+}
+
+double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start, const std::vector<double>& phase_per_unit) {
+  constexpr int kFew = 150;
+  const std::vector<Axis> axes = axes_of(job, unknowns, phase_per_unit);
+  double lowest = std::numeric_limits<double>::infinity();
+  for (int i = -1; i < (axes.empty() ? 0 : kFew); ++i) {
+    problem.evaluate(i < 0 ? start : spread_point(i, job, unknowns, axes, start), false);
+    if (std::isfinite(problem.objective())) lowest = std::min(lowest, problem.objective());
+  }
+  return lowest;
 }
 
 ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> from, int steps, const SameMinimum& same) {
@@ -218,7 +316,10 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
   std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   const std::size_t most = static_cast<std::size_t>(std::max(1, job.options.scan_candidates));
   if (starts.size() > most) starts.resize(most);
-  polish_into(result, problem, job.options, starts, steps, std::numeric_limits<double>::infinity(), same);
+  if (starts.empty()) throw std::logic_error("polish: no start has a picture");
+  const Eigen::VectorXd first = starts.front().second;
+  polish_into(result, problem, job.options, std::move(starts), most, steps, std::numeric_limits<double>::infinity(), same);
+  keep_distinct(result, problem, first);
   return result;
 }
 

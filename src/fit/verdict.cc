@@ -161,7 +161,7 @@ std::string verdict(const FitResult& result, bool signal) {
   if (result.ambiguous) {
     std::vector<std::string> others;
     for (const RivalMinimum& rival : result.rivals)
-      if (rival.odds > 0.05) others.push_back(fmt::format("odds {:.2g}", rival.odds));
+      if (rival.odds > kAmbiguousOdds) others.push_back(fmt::format("odds {:.2g}", rival.odds));
     sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),
                                     others.size() == 1 ? "um" : "a", joined(others)));
   }
