@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -54,7 +53,7 @@ std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std
   if (axes.empty()) return axes;
   // The rest moves the minima along the fringes' axes. But a centre: the picture has shown it.
   std::size_t product = 1;
-  for (const Axis& axis : axes) product *= axis.values.size();
+  for (const Axis& axis : axes) product = std::min(product * axis.values.size(), 2 * kMostPointsWithoutFringes);
   const auto is_centre = [&](int index) {
     return std::any_of(job.micrographs.begin(), job.micrographs.end(),
                        [&](const Micrograph& m) { return m.scene.view.center_x_px.index == index || m.scene.view.center_y_px.index == index; });
@@ -285,7 +284,7 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
     const std::size_t first = batch * first_look, last = std::min(starts.size(), first + first_look);
     std::vector<std::pair<double, Eigen::VectorXd>> some;
     for (std::size_t i = first; i < last; ++i) some.push_back(starts[i]);
-    if (batch == 0) some.emplace_back(0, start);
+    if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
     best = std::min(best, polish_into(result, problem, options, std::move(some), finalists, kSteps, hopeless_above));
     if (best < rows + kDoubtful * std::sqrt(2 * rows) || best > hopeless_above) break;
@@ -314,7 +313,8 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
     if (std::isfinite(problem.objective())) starts.emplace_back(problem.objective(), std::move(x));
   }
   std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  const std::size_t most = static_cast<std::size_t>(std::max(1, job.options.scan_candidates));
+  constexpr int kMostOfDear = 4;
+  const std::size_t most = static_cast<std::size_t>(std::clamp(job.options.scan_candidates, 1, kMostOfDear));
   if (starts.size() > most) starts.resize(most);
   if (starts.empty()) throw std::logic_error("polish: no start has a picture");
   const Eigen::VectorXd first = starts.front().second;

@@ -23,7 +23,8 @@ struct ScanResult {
   bool interrupted = false;
 };
 
-/// `problem` holds the subsample; `start` is the user's. `phase_per_unit[j]` > 0 marks fringe-forming parameters.
+/// `problem` holds the subsample; `start` is the user's. `phase_per_unit[j]` > 0 marks fringe-forming parameters; others, but centres, are
+/// scanned coarsely where the grid stays small (docs/methods.md, "Scan").
 /// Minima whose objective stays above `hopeless_above` are not polished further: another branch has beaten them.
 ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
                 const std::vector<double>& phase_per_unit, double hopeless_above);
@@ -31,7 +32,7 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
 /// The lowest objective at `start` and at a few places spread over what scan() would look at: to compare two starts of the other unknowns.
 double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start, const std::vector<double>& phase_per_unit);
 
-/// The same as scan() from given starts instead of a grid, best first, of which no more than options.scan_candidates are polished; `steps` of
+/// The same as scan() from given starts instead of a grid, best first, of which four at most (options.scan_candidates) are polished; `steps` of
 /// the solver for each before the worst are dropped, and those that `same` finds on the way to a minimum that is already known.
 using SameMinimum = std::function<bool(const Eigen::VectorXd&, const Eigen::VectorXd&)>;
 ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> starts, int steps, const SameMinimum& same);
