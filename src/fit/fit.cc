@@ -335,7 +335,7 @@ void Fit::look_near_rays() {
   sample_rows_ = static_cast<double>(all.pixel_rows());
 }
 
-/// The start with the centre where the images show it, within its bounds; nothing where no centre is searched or the images disagree.
+/// The start with the centre where the images show it, within its bounds; nothing where no centre is searched or the start is there already.
 std::optional<Eigen::VectorXd> Fit::start_at_symmetry() const {
   Eigen::VectorXd centred = start_;
   std::array<int, 2> at{-1, -1};
@@ -358,7 +358,9 @@ std::optional<Eigen::VectorXd> Fit::start_at_symmetry() const {
       centred[here[axis]] = (*centre)[axis];
     }
   }
-  if (at[0] < 0) return std::nullopt;
+  // What is found is good to a hundredth of an image: a start as near as that is no worse.
+  const View& view = job_.micrographs.front().scene.view;
+  if ((centred - start_).cwiseAbs().maxCoeff() < 0.01 * std::max(view.width, view.height)) return std::nullopt;
   return centred;
 }
 
