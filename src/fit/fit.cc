@@ -358,6 +358,7 @@ std::optional<Eigen::VectorXd> Fit::start_at_symmetry() const {
       centred[here[axis]] = (*centre)[axis];
     }
   }
+  if (at[0] < 0) return std::nullopt;
   // What is found is good to a hundredth of an image: a start as near as that is no worse.
   const View& view = job_.micrographs.front().scene.view;
   if ((centred - start_).cwiseAbs().maxCoeff() < 0.01 * std::max(view.width, view.height)) return std::nullopt;
