@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -193,7 +192,7 @@ Count solve(const Family& family, int problems, int first_seed = 1) {
 class GlobalSearch : public ::testing::TestWithParam<std::size_t> {};
 class LongGlobalSearch : public GlobalSearch {};
 
-// A few of every family.
+// A few of every family but shells, which take seconds each.
 TEST_P(GlobalSearch, FindsTheOrder) {
   const Count count = solve(kFamilies[GetParam()], 4);
   EXPECT_EQ(count.wrong, 0);
@@ -209,7 +208,6 @@ TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
 }
 
 std::string family_name(const ::testing::TestParamInfo<std::size_t>& info) { return kFamilies[info.param].name; }
-// Shells take seconds each.
 INSTANTIATE_TEST_SUITE_P(Families, GlobalSearch, ::testing::Values(0, 1, 3, 4), family_name);
 INSTANTIATE_TEST_SUITE_P(Families, LongGlobalSearch, ::testing::Range<std::size_t>(0, 5), family_name);
 
