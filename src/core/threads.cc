@@ -2,12 +2,79 @@
 
 #include <algorithm>
 #include <atomic>
+#include <condition_variable>
+#include <deque>
 #include <exception>
 #include <mutex>
 #include <thread>
 #include <vector>
 
 namespace birefit {
+namespace {
+
+/// Threads that wait for work. They live as long as the program: a picture takes a millisecond, of which making a thread
+/// and the memory it works in would be a third.
+class Helpers {
+ public:
+  static Helpers& instance() {
+    static Helpers helpers;
+    return helpers;
+  }
+  ~Helpers() {
+    {
+      const std::lock_guard lock(guard_);
+      closing_ = true;
+    }
+    wake_.notify_all();
+    for (std::thread& t : members_) t.join();
+  }
+  /// Calls work() here and, where members are free before it returns, in up to `helpers` of them at the same time. A call
+  /// within work() is none the worse: who finds nobody free does all by himself.
+  void run(int helpers, const std::function<void()>& work) {
+    Job job{&work, helpers, 0};
+    {
+      const std::lock_guard lock(guard_);
+      while (members_.size() < static_cast<std::size_t>(helpers)) members_.emplace_back([this] { serve(); });
+      jobs_.push_back(&job);
+    }
+    if (helpers == 1)
+      wake_.notify_one();
+    else
+      wake_.notify_all();
+    work();
+    std::unique_lock lock(guard_);
+    std::erase(jobs_, &job);  // whoever has not begun is not needed any more
+    finished_.wait(lock, [&] { return job.running == 0; });
+  }
+
+ private:
+  struct Job {
+    const std::function<void()>* work;
+    int wanted;   ///< members still to join
+    int running;  ///< members at it
+  };
+  void serve() {
+    std::unique_lock lock(guard_);
+    for (;;) {
+      wake_.wait(lock, [&] { return closing_ || !jobs_.empty(); });
+      if (closing_) return;
+      Job& job = *jobs_.front();
+      if (--job.wanted == 0) jobs_.pop_front();
+      ++job.running;
+      lock.unlock();
+      (*job.work)();
+      lock.lock();
+      if (--job.running == 0) finished_.notify_all();
+    }
+  }
+  std::mutex guard_;
+  std::condition_variable wake_, finished_;
+  std::deque<Job*> jobs_;
+  std::vector<std::thread> members_;
+  bool closing_ = false;
+};
+
+}  // namespace
 
 int thread_count(int requested) {
   if (requested > 0) return requested;
@@ -26,7 +93,7 @@ void parallel_for(int n, int threads, const std::function<void(int)>& body) {
   std::atomic<int> next{0};
   std::exception_ptr failure;
   std::mutex failure_guard;
-  const auto work = [&] {
+  Helpers::instance().run(threads - 1, [&] {
     try {
       for (int first = next.fetch_add(block); first < n; first = next.fetch_add(block))
         for (int i = first; i < std::min(n, first + block); ++i) body(i);
@@ -35,12 +102,15 @@ void parallel_for(int n, int threads, const std::function<void(int)>& body) {
       if (!failure) failure = std::current_exception();
       next = n;
     }
-  };
-  std::vector<std::thread> others;
-  for (int t = 1; t < threads; ++t) others.emplace_back(work);
-  work();
-  for (std::thread& t : others) t.join();
+  });
   if (failure) std::rethrow_exception(failure);
+}
+
+void run_together(int threads, const std::function<void(int)>& body) {
+  std::vector<std::thread> others;
+  for (int t = 1; t < threads; ++t) others.emplace_back(body, t);
+  body(0);
+  for (std::thread& t : others) t.join();
 }
 
 }  // namespace birefit

@@ -12,4 +12,8 @@ int thread_count(int requested);
 /// body is rethrown here.
 void parallel_for(int n, int threads, const std::function<void(int)>& body);
 
+/// Calls body(t) for t in [0, threads), each on a thread of its own and all at the same time, so that they may wait for
+/// each other; a body must not throw. parallel_for promises no such thing, and is cheaper to call.
+void run_together(int threads, const std::function<void(int)>& body);
+
 }  // namespace birefit

@@ -99,7 +99,16 @@ class BallImage final : public PixelModel<S> {
         edge_um_(optics_.sphere.radius_um * rim_.rho_max()) {
     const S between = light_.px * light_.ax + light_.py * light_.ay;
     open_ = between * between;
+    // A field along an axis in the image plane is turned into itself.
+    const auto in_plane = [](const auto& field) {
+      if constexpr (requires { field.axis; })
+        return stays_at(field.axis.z, 0.0);
+      else
+        return false;
+    };
+    half_turn_ = centred(scene, center_x_, center_y_) && std::visit(in_plane, optics_.field);
   }
+  bool half_turn() const override { return half_turn_; }
   S intensity(const P& column, const P& row) const override {
     const S x = (column - center_x_) * pixel_um_, y = (center_y_ - row) * pixel_um_;
     const S rho2 = x * x + y * y + 1e-18, over = inverse_root(rho2), rho = rho2 * over;
@@ -119,7 +128,7 @@ class BallImage final : public PixelModel<S> {
   RimTable rim_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  bool aplanatic_;
+  bool aplanatic_, half_turn_;
   Polarizers<S> light_;
   double pixel_um_;
   S center_x_, center_y_, edge_um_, open_;

@@ -239,6 +239,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       center_y_(value(scene.view.center_y_px)),
       edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)),
       inverse_edge_(inverse(edge_um_)),
+      core_um_(0.0),
       centre_panels_(plan.centre_panels),
       rest_panels_(plan.radial_panels) {
   if (scene.rays == Rays::eikonal) {
@@ -247,6 +248,20 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
   }
   sin_cos(sum_rad_, sin_sum_, cos_sum_);
   sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
+  centred_ = centred(scene, center_x_, center_y_);
+  shell_ = optics_.director == DropletOptics<S>::Director::shell;
+  if (shell_) {
+    // The ray that touches the core: sin psi = (core / R) / m.
+    const S sin_in = optics_.core_um * inverse(optics_.radius_um), sin_out = sin_in * inverse(optics_.ratio);
+    if (lane(plain(sin_out), 0) < std::sin(rim_.psi_max()) * (1 - 1e-6)) {
+      const S cos_in = root(1.0 - sin_in * sin_in), cos_out = root(1.0 - sin_out * sin_out), turn = sin_out * cos_in - cos_out * sin_in;
+      core_um_ = optics_.radius_um * sin_out * inverse(1.0 - 2.0 * turn * turn);
+      inverse_core_ = inverse(core_um_);
+      core_root_ = root(1.0 - core_um_ * inverse_edge_);
+      inverse_core_root_ = inverse(core_root_);
+    }
+    if (!can_tabulate()) rest_panels_ = 0;
+  }
   open_ = cos_between_ * cos_between_;
   dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
 }
@@ -263,9 +278,13 @@ void DropletImage<S>::tabulate(PixelModel<S>::Wanted, int threads) {
 
 // Functions of the radius end at the rim as functions of root = sqrt(1 - rho/edge). At the centre a twist leaves
 // rho^2 log rho and the mesh along the chord changes its shape at rho ~ 0.003 edge: there w = 1 - root is stretched.
+// The way through a shell's wall ends like a root at the core's edge, seen from inside; there is no defect in its centre.
 template <class S>
 void DropletImage<S>::terms(Part part, const S& v, S* out) const {
-  if (part == Part::centre) {
+  if (shell_) {
+    const S to_end = part == Part::centre ? v : core_root_ * v;
+    terms_at((part == Part::centre ? core_um_ : edge_um_) * (1.0 - to_end * to_end), out);
+  } else if (part == Part::centre) {
     const S v2 = v * v, w = kCentre * v2 * v2;
     terms_at(edge_um_ * w * (2.0 - w), out);
   } else {
@@ -327,16 +346,25 @@ S DropletImage<S>::through(const S& rho_um, const P* basis, const P* turned, P* 
   };
   const S fraction = rho_um * inverse_edge_;
   const P to_rim = root(P(1.0) - plain(fraction)), slope = P(-0.5) * inverse(to_rim);
-  const auto central = to_rim > P(1 - kCentre);
+  const auto central = shell_ ? plain(rho_um) < plain(core_um_) : to_rim > P(1 - kCentre);
   S total(P(0.0));
   if (!all(central)) {
     constexpr double kScale = 1 / (1 - kCentre);
-    total = tabulated_sum(Part::rest, place(fraction, to_rim * P(kScale), slope * P(kScale)), basis, turned, turned_sum);
+    const S v = shell_ ? place(fraction, to_rim, slope) * inverse_core_root_ : place(fraction, to_rim * P(kScale), slope * P(kScale));
+    total = tabulated_sum(Part::rest, v, basis, turned, turned_sum);
   }
   if (none(central)) return total;
   P turned_here;
-  const P w = plain(fraction) * inverse(P(1.0) + to_rim), v = root(root(w * P(1 / kCentre)));
-  const S centre = tabulated_sum(Part::centre, place(fraction, v, P(-0.25) * v * inverse(w) * slope), basis, turned, &turned_here);
+  S v(P(0.0));
+  if (shell_) {
+    const S of_core = rho_um * inverse_core_;
+    const P to_core = root(max_of(P(1.0) - plain(of_core), P(1e-30)));
+    v = place(of_core, to_core, P(-0.5) * inverse(to_core));
+  } else {
+    const P w = plain(fraction) * inverse(P(1.0) + to_rim), root4 = root(root(w * P(1 / kCentre)));
+    v = place(fraction, root4, P(-0.25) * root4 * inverse(w) * slope);
+  }
+  const S centre = tabulated_sum(Part::centre, v, basis, turned, &turned_here);
   if (turned) *turned_sum = all(central) ? turned_here : select(central, turned_here, *turned_sum);
   return all(central) ? centre : select(central, centre, total);
 }

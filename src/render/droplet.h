@@ -129,11 +129,15 @@ class DropletImage final : public PixelModel<S> {
   DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value);
   void tabulate(PixelModel<S>::Wanted, int threads) override;
   S intensity(const P& column, const P& row) const override;
+  bool half_turn() const override { return centred_; }
   /// The image is sum_k basis_k(azimuth) f_k(radius). Tables hold the f_k in two parts, each over v in [0, 1]: the
-  /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim.
+  /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim; of a shell what is seen
+  /// through the core, up to the kink at its edge, and what is seen beside it.
   enum class Part { centre, rest };
   static constexpr int kMostTerms = 5;
   int number_of_terms() const { return optics_.coupled() ? 5 : 3; }
+  /// False where one ray a point is needed whatever the plan says: a shell whose core's edge no ray of the image meets.
+  bool can_tabulate() const { return !shell_ || lane(plain(core_um_), 0) > 0; }
   /// f_k at v of the part; out has number_of_terms() places.
   void terms(Part part, const S& v, S* out) const;
   /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with plan.radial_panels > 0.
@@ -155,12 +159,13 @@ class DropletImage final : public PixelModel<S> {
   RimTable rim_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  bool aplanatic_;
+  bool aplanatic_, centred_, shell_;
   std::shared_ptr<const EikonalFan> fan_p_, fan_s_;  ///< of curved rays; else none
   double objective_na_;
   S cos_between_, sin_between_, cos_sum_, sin_sum_, sum_rad_;  ///< of analyser - polarizer, of analyser + polarizer
   double pixel_um_;
   S center_x_, center_y_, edge_um_, inverse_edge_, open_;
+  S core_um_, inverse_core_, core_root_, inverse_core_root_;  ///< image radius of a shell's core, sqrt(1 - that / edge)
   bool dark_ = false;  ///< no light beside the droplet
   int centre_panels_, rest_panels_;
   RadialTable<S> centre_, rest_;

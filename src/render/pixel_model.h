@@ -1,6 +1,7 @@
 #pragma once
 // What the image assembly needs of a scene: the intensity at points of the image, for any scalar.
 
+#include <cmath>
 #include <memory>
 #include <numbers>
 #include <stdexcept>
@@ -53,10 +54,26 @@ class PixelModel {
   virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
+  /// The picture is its own image under half a turn about its middle, and so is every derivative.
+  virtual bool half_turn() const { return false; }
   enum class Wanted { points, picture };
   /// Once, before the first point: makes the tables that pay for what is wanted.
   virtual void tabulate(Wanted, int /*threads*/) {}
 };
+
+/// `x` is `value` to rounding and no parameter moves it.
+template <class S>
+bool stays_at(const S& x, double value) {
+  bool stays = std::abs(lane(plain(x), 0) - value) < 1e-9;
+  if constexpr (ScalarTraits<S>::derivatives > 0)
+    for (const auto& d : x.d) stays = stays && lane(d, 0) == 0;
+  return stays;
+}
+/// The axis of the microscope meets the middle of the picture.
+template <class S>
+bool centred(const Scene& scene, const S& center_x_px, const S& center_y_px) {
+  return stays_at(center_x_px, 0.5 * (scene.view.width - 1)) && stays_at(center_y_px, 0.5 * (scene.view.height - 1));
+}
 
 /// 2 pi / wavelength in 1/um.
 template <class S>

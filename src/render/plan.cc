@@ -136,22 +136,29 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
   const double target = std::max(share * scene.intensity_accuracy, 2e-11);
   const double points = static_cast<double>(scene.view.width) * scene.view.height;
   const Values<Pack> lanes = value.template as<Pack>();
-  // The largest error of one part read at `places` places.
+  const bool shell = std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
+  if (!Image(scene, plan, lanes).can_tabulate()) {
+    plan.reasons.push_back("retardance has a kink where rays touch the core, too close to the rim for a table over the radius: one ray a point");
+    return;
+  }
+  // The largest error of one part read at many places.
   const auto error_of = [&](const Image& image, Image::Part part, int panels) {
     std::array<Pack, Image::kMostTerms> direct;
     double error = 0;
     // A panel's error is largest near its ends; the golden ratio meets all places of a panel, the ends of the table too.
     // Closer to the centre than 1/1000 of the radius (v = 0.4 of that part) the mesh along the chord no longer resolves
     // the defect; the ripple this leaves is far below the accuracy but not smooth.
-    const double from = part == Image::Part::centre ? 0.4 : 0;
+    // A shell has a core there.
+    const bool defect = part == Image::Part::centre && !shell;
+    const double from = defect ? 0.4 : 0;
     for (int i = 0; i < 96; i += kLanes) {
       alignas(64) double v[kLanes];
       for (int k = 0; k < kLanes; ++k) {
         const double turn = (i + k + 0.5) * 0.6180339887498949;
         const double in_panel = (i + k + 0.1) / 8.2 / panels;
         v[k] = i + k >= 8                       ? from + (1 - from) * (turn - std::floor(turn))
-               : part == Image::Part::centre ? 1 - in_panel
-                                             : in_panel;  // the rim
+               : defect ? 1 - in_panel
+                        : in_panel;  // the rim, the core's edge
       }
       image.terms(part, Pack::load_aligned(v), direct.data());
       for (int f = 0; f < image.number_of_terms(); ++f) {
@@ -174,8 +181,8 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
     if (rest <= target && centre <= target) {
       plan.reasons.push_back(fmt::format(
           "the droplet looks the same from all sides of the viewing axis: {} rays, one a radius, serve all pixels "
-          "(interpolated to {})",
-          (plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints, sci(std::max(rest, centre))));
+          "(interpolated to {}{})",
+          (plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints, sci(std::max(rest, centre)), shell ? "; the core's edge is an end of two tables" : ""));
       return;
     }
     if (rest > target) plan.radial_panels += std::max(1, plan.radial_panels / 4);
@@ -288,7 +295,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   if (!looks_round(droplet)) return plan_ball(scene, value);
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
-  const bool twisted = o.coupled(), axial = o.axial != nullptr, shell = o.director == DropletOptics<double>::Director::shell;
+  const bool twisted = o.coupled(), axial = o.axial != nullptr;
   if (scene.method == "diagonal" && twisted)
     throw UserError(Where{}, "transport.method: diagonal cannot do a twisted director, its modes are coupled",
                     "use auto or magnus4");
@@ -311,10 +318,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
   if (scene.rays == Rays::eikonal) plan.reasons.push_back("each mode on its own curved ray, in closed form: the method above is not used");
-  if (shell)
-    plan.reasons.push_back("retardance has a kink at the core's edge, which no table over the radius follows: one ray a point");
-  else
-    plan_radial_table(scene, value, plan);
+  plan_radial_table(scene, value, plan);
 
   const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.radius_um;
   double largest_phase = 0;
@@ -739,6 +743,13 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
   return result;
 }
 
+bool has_half_turn(const Scene& scene, const RenderPlan& plan, const Values<double>& value) {
+  if (!std::holds_alternative<Droplet>(scene.sample) && !cone_half_angle(scene)) return false;
+  if (!centred(scene, value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1)), value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1))))
+    return false;
+  return make_pixel_model<double>(scene, plan, value)->half_turn();
+}
+
 /// What the literature's birefringence is off by.
 void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
   const auto* law = std::get_if<LawIndices>(&scene.material);
@@ -794,6 +805,7 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     result = plan_planar(scene, value);
   }
   note_material(scene, theta, result);
+  if (!result.wave && has_half_turn(scene, result, value)) result.reasons.push_back("half a turn about the viewing axis leaves the picture as it is: half of it is computed");
   result.physics = scene.ceiling == Ceiling::e_only        ? "e_only"
                    : scene.ceiling == Ceiling::reflections ? "reflections"
                    : scene.ceiling == Ceiling::wave        ? "wave"

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <vector>
 
-#include "core/lookup.h"
 #include "core/scalar.h"
 #include "core/threads.h"
 #include "render/chebyshev.h"
@@ -30,9 +29,7 @@ class RadialTable {
   template <class Evaluate>
   RadialTable(int panels, int functions, int threads, const Evaluate& evaluate)
       : panels_(panels),
-        functions_(functions),
-        row_(static_cast<std::size_t>(panels + Lookup<P>::width)),
-        stride_(row_ * static_cast<std::size_t>(functions) * kPoints) {
+        plane_(static_cast<std::size_t>(functions) * kPoints) {
     const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();
     const int n = panels * kPoints;
     const std::size_t points = static_cast<std::size_t>(n);
@@ -61,7 +58,7 @@ class RadialTable {
         }
       }
     });
-    coefficients_.assign(stride_ * kPlanes, 0.0);
+    coefficients_.resize(static_cast<std::size_t>(panels) * kPlanes * plane_);
     // Rounding leaves 1e-17 of what vanishes (crossed polarizers, parameters that do not matter).
     const double* from = values.data();
     for (std::size_t plane = 0; plane < kPlanes; ++plane) {
@@ -71,7 +68,7 @@ class RadialTable {
           for (std::size_t c = 0; c < kPoints; ++c) {
             double sum = 0;
             for (std::size_t k = 0; k < kPoints; ++k) sum += rule.to_powers[c][k] * from[k];
-            coefficients_[plane * stride_ + (f * kPoints + c) * row_ + panel] = sum;
+            coefficients_[(panel * kPlanes + plane) * plane_ + f * kPoints + c] = sum;
             size[f] = std::max(size[f], std::abs(sum));
           }
       const double all = *std::max_element(size.begin(), size.end());
@@ -102,18 +99,17 @@ class RadialTable {
     int count = 0;
     void add(int j) { list[static_cast<std::size_t>(count++)] = j; }
   };
-  /// L polynomials at x and their slopes; c: the first coefficient of the first function on the first panel of a window.
+  /// L polynomials at x and their slopes; c: the coefficients of the first.
   template <int L, bool kSlope>
-  BIREFIT_INLINE void horner(const double* c, const Lookup<P>& at, const P& x, P* value, P* slope) const {
+  BIREFIT_INLINE static void horner(const double* c, const P& x, P* value, P* slope) {
     for (int f = 0; f < L; ++f) {
-      const double* of = c + static_cast<std::size_t>(f) * kPoints * row_;
-      value[f] = at(of + (kPoints - 1) * row_);
+      value[f] = P(c[f * kPoints + kPoints - 1]);
       if constexpr (kSlope) slope[f] = P(0.0);
     }
-    for (std::size_t k = kPoints - 1; k-- > 0;)
+    for (int k = kPoints - 1; k-- > 0;)
       for (int f = 0; f < L; ++f) {
         if constexpr (kSlope) slope[f] = slope[f] * x + value[f];
-        value[f] = value[f] * x + at(c + (static_cast<std::size_t>(f) * kPoints + k) * row_);
+        value[f] = value[f] * x + P(c[f * kPoints + k]);
       }
   }
   template <int L>
@@ -124,11 +120,11 @@ class RadialTable {
   }
   /// Adds the derivatives of which the first L functions are not negligible, contracted with the basis.
   template <int L>
-  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const Lookup<P>& at, const P& x, const P* basis, S& total) const {
+  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const P& x, const P* basis, S& total) const {
     for (int i = 0; i < planes.count; ++i) {
       const int j = planes.list[static_cast<std::size_t>(i)];
       P f[L];
-      horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * stride_, at, x, f, nullptr);
+      horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * plane_, x, f, nullptr);
       total.d[j] = total.d[j] + contract<L>(basis, f);
     }
   }
@@ -138,25 +134,26 @@ class RadialTable {
     using std::floor;
     const P cell = min_of(max_of(floor(scaled), P(0.0)), P(panels_ - 1.0));
     const P x = P(2.0) * (scaled - cell) - P(1.0);
-    // Lanes are neighbours in the image and mostly lie within one window of panels.
-    double first = smallest(cell);
-    S total = sum_in_window<L, F>(first, cell, x, v, basis, turned, turned_sum);
-    const double last = largest(cell);
-    while (last - first >= Lookup<P>::width) {
-      first += Lookup<P>::width;
-      const auto here = cell >= P(first);
+    // Lanes are neighbours in the image and mostly lie on one panel: its coefficients are single numbers for all of them.
+    double panel = smallest(cell);
+    S total = on_panel<L, F>(panel, x, v, basis, turned, turned_sum);
+    for (const double last = largest(cell); panel < last;) {
+      panel += 1;
+      const auto here = cell == P(panel);
+      if (none(here)) continue;
       P turned_here;
-      total = select(here, sum_in_window<L, F>(first, cell, x, v, basis, turned, &turned_here), total);
+      total = select(here, on_panel<L, F>(panel, x, v, basis, turned, &turned_here), total);
       if (turned) *turned_sum = select(here, turned_here, *turned_sum);
     }
     return total;
   }
+  static bool none(bool here) { return !here; }
+  static bool none(const Pack::batch_bool_type& here) { return xsimd::none(here); }
   template <int L, int F>
-  BIREFIT_INLINE S sum_in_window(double first, const P& cell, const P& x, const S& v, const P* basis, const P* turned, P* turned_sum) const {
-    const double* c = coefficients_.data() + static_cast<std::size_t>(first);
-    const Lookup<P> at(cell - P(first));
+  BIREFIT_INLINE S on_panel(double panel, const P& x, const S& v, const P* basis, const P* turned, P* turned_sum) const {
+    const double* c = coefficients_.data() + static_cast<std::size_t>(panel) * kPlanes * plane_;
     P value[L], slope[L];
-    horner<L, (kPlanes > 1)>(c, at, x, value, slope);
+    horner<L, (kPlanes > 1)>(c, x, value, slope);
     if (turned) *turned_sum = contract<L>(turned, value);
     if constexpr (kPlanes == 1) {
       return contract<L>(basis, value);
@@ -164,16 +161,16 @@ class RadialTable {
       S total(contract<L>(basis, value));
       const P along = contract<L>(basis, slope) * P(2.0 * panels_);
       for (std::size_t j = 0; j + 1 < kPlanes; ++j) total.d[j] = along * v.d[j];
-      add_planes<1>(of_one_, c, at, x, basis, total);
-      add_planes<(F > 3 ? 3 : F)>(of_three_, c, at, x, basis, total);
-      add_planes<F>(of_all_, c, at, x, basis, total);
+      add_planes<1>(of_one_, c, x, basis, total);
+      add_planes<(F > 3 ? 3 : F)>(of_three_, c, x, basis, total);
+      add_planes<F>(of_all_, c, x, basis, total);
       return total;
     }
   }
 
-  int panels_ = 0, functions_ = 0;
-  std::size_t row_ = 0, stride_ = 0;       ///< places a row of panels, which ends with a window of zeros, and a plane
-  std::vector<double> coefficients_;       ///< [plane][function][power][panel], plane 0 the value
+  int panels_ = 0;
+  std::size_t plane_ = 0;                  ///< places of all functions of a plane
+  std::vector<double> coefficients_;       ///< [panel][plane][function][power], plane 0 the value
   int live_ = 0;                           ///< functions up to the last whose values are not negligible
   Planes of_one_, of_three_, of_all_;      ///< derivatives of which the first one, three, all functions are not negligible
 };

@@ -196,10 +196,12 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     Image& image = *images[static_cast<std::size_t>(p)];
     if (image.width() != w || image.height() != h) image = Image(w, h);
   });
-  parallel_for((h + Band::kRows - 1) / Band::kRows, threads, [&](int b) {
+  const bool half_turn = model->half_turn();
+  const int computed = half_turn ? (h + 1) / 2 : h;  // rows; the others are copied
+  parallel_for((computed + Band::kRows - 1) / Band::kRows, threads, [&](int b) {
     thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
     thread_local NeededPoints needed;
-    const int top = b * Band::kRows, rows = std::min(Band::kRows, h - top);
+    const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
     band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes);
     for (int r = -1; r <= rows + 2; ++r) rings.fill(std::clamp(top + r, 0, h + 1), band.samples(r), wide);
     for (int r = 0; r < rows + 2; ++r) {
@@ -268,6 +270,10 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       for (std::size_t most = 2; most < 9; ++most)
         if (count[most] > 0) flush(most);
     }
+    if (half_turn)
+      for (int row = top; row < top + rows; ++row)
+        if (const int turned = h - 1 - row; turned != row)
+          for (Image* image : images) std::reverse_copy(image->row(row), image->row(row) + w, image->row(turned));
   });
 }
 
@@ -311,15 +317,17 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   });
 }
 
-/// Calls body<S>(chunk, first) for the active parameters in chunks of 4, 2 and 1 derivatives a pass.
+/// Calls body<S>(chunk, first) for the active parameters in chunks of 8, 4, 2 and 1 derivatives a pass: a pass computes the values, too.
 template <class Body>
 void in_chunks(const std::vector<int>& active, const Body& body) {
   std::size_t first = 0;
   while (first < active.size()) {
     const std::size_t left = active.size() - first;
-    const std::size_t take = left >= 3 ? std::min<std::size_t>(left, 4) : left;
+    const std::size_t take = std::min<std::size_t>(left, 8);
     const std::vector<int> chunk(active.begin() + static_cast<long>(first), active.begin() + static_cast<long>(first + take));
-    if (take > 2)
+    if (take > 4)
+      body.template operator()<Dual8>(chunk, static_cast<int>(first));
+    else if (take > 2)
       body.template operator()<Dual4>(chunk, static_cast<int>(first));
     else if (take == 2)
       body.template operator()<Dual2>(chunk, static_cast<int>(first));

@@ -92,9 +92,10 @@ Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double t
                   int max_steps = 200000);
 
 // The scalars all kernels are compiled for.
-#define BIREFIT_FOR_EACH_SCALAR(X) X(double) X(Pack) X(Dual1) X(Dual2) X(Dual4)
+#define BIREFIT_FOR_EACH_SCALAR(X) X(double) X(Pack) X(Dual1) X(Dual2) X(Dual4) X(Dual8)
 using Dual1 = Dual<Pack, 1>;
 using Dual2 = Dual<Pack, 2>;
 using Dual4 = Dual<Pack, 4>;
+using Dual8 = Dual<Pack, 8>;
 
 }  // namespace birefit

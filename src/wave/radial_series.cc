@@ -350,9 +350,11 @@ BIREFIT_INSTANTIATE(double)
 using Dual1 = Dual<double, 1>;
 using Dual2 = Dual<double, 2>;
 using Dual4 = Dual<double, 4>;
+using Dual8 = Dual<double, 8>;
 BIREFIT_INSTANTIATE(Dual1)
 BIREFIT_INSTANTIATE(Dual2)
 BIREFIT_INSTANTIATE(Dual4)
+BIREFIT_INSTANTIATE(Dual8)
 #undef BIREFIT_INSTANTIATE
 
 }  // namespace birefit

@@ -8,7 +8,7 @@
 // C.-W. Qiu et al., IEEE Trans. Antennas Propag. 55, 3515 (2007). Conventions: docs/conventions.md, C1, C7, C9; the centre of
 // the ball is the origin, the incident wave runs towards +z and has amplitude 1 and phase 0 in the middle of the focal plane.
 //
-// All indices are real: absorption is not supported. Scalars S: double and Dual<double, N>, N = 1, 2, 4 (a line at the end of
+// All indices are real: absorption is not supported. Scalars S: double and Dual<double, N>, N = 1, 2, 4, 8 (a line at the end of
 // radial_series.cc adds more); with duals every result carries its derivatives by whatever the inputs depend on.
 
 #include <array>

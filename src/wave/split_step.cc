@@ -234,7 +234,7 @@ class Propagation {
 
   std::vector<WaveField> run(int threads) {
     std::barrier barrier(threads);
-    parallel_for(threads, threads, [&](int t) {
+    run_together(threads, [&](int t) {
       const Crew crew{barrier, t, threads};
       for (int slab = 0; slab <= g_.slabs; ++slab) {
         const Table& table = oblique_[slab % 2];
