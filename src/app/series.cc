@@ -1,6 +1,7 @@
-// birefit series: fits every frame of a series, each from where its neighbour ended, and settles what they share.
+// birefit series: fits every frame of a series, each from where frames before it ended, and settles what they share.
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <iostream>
 #include <map>
@@ -16,11 +17,14 @@
 #include "app/output.h"
 #include "app/plot.h"
 #include "birefit/series.h"
+#include "core/threads.h"
 
 namespace birefit {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kFramesTogether = 4;
 
 struct Arguments {
   std::string config;
@@ -185,8 +189,8 @@ int run_series(const Arguments& arguments) {
   const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
   std::vector<std::optional<FitResult>> fits(series.frames.size());
   const FitResult* neighbour = nullptr;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < series.frames.size() && !interrupt.flag(); ++i) {
+  std::atomic<std::size_t> kept{0};
+  const auto do_frame = [&](std::size_t i, int threads) {
     Config config = load_frame(series, i);
     if (neighbour) start_from(config, *neighbour);
     config.fingerprint = fingerprint_of(config);
@@ -196,19 +200,28 @@ int run_series(const Arguments& arguments) {
     if (record && record->fingerprint == config.fingerprint) {
       ++kept;
     } else {
-      if (arguments.threads >= 0) config.job.options.threads = arguments.threads;
+      config.job.options.threads = threads;
       config.job.options.interrupted = &interrupt.flag();
       const std::string at = fmt::format("{} of {}: {}", i + 1, series.frames.size(), series.frames[i].name);
-      if (terminal) config.job.options.progress = [&](const std::string& line) { std::cerr << "\r\033[K" << at << ": " << line << std::flush; };
+      if (terminal) config.job.options.progress = [&](const std::string& line) { std::cerr << fmt::format("\r\033[K{}: {}", at, line) << std::flush; };
       const FitResult result = fit(config.job);
-      if (result.interrupted) break;  // the next run does it whole
+      if (result.interrupted) return;  // the next run does it whole
       write_results(place, config, result);
       // What is read back is all that later runs will know of it.
       record = load_recorded_fit(place / "fit.json");
       if (!record) throw std::logic_error("fit.json cannot be read back");
     }
     fits[i] = std::move(record->result);
-    if (fits[i]->has_answer()) neighbour = &*fits[i];
+  };
+  // The first alone, then a few at a time that all start where the frames before them ended: how many does not depend on the number
+  // of cores, so that neither do the results.
+  const int cores = thread_count(std::max(arguments.threads, 0));
+  for (std::size_t first = 0, count; first < series.frames.size() && !interrupt.flag(); first += count) {
+    count = std::min<std::size_t>(first == 0 ? 1 : kFramesTogether, series.frames.size() - first);
+    const int side_by_side = std::min(cores, static_cast<int>(count)), each = cores / side_by_side;
+    parallel_for(static_cast<int>(count), side_by_side, [&](int k) { if (!interrupt.flag()) do_frame(first + static_cast<std::size_t>(k), each); });
+    for (std::size_t i = first; i < first + count; ++i)
+      if (fits[i] && fits[i]->has_answer()) neighbour = &*fits[i];
   }
   if (terminal) std::cerr << "\r\033[K" << std::flush;
 

@@ -136,17 +136,18 @@ Circle fit_circle(std::vector<cv::Point2d> points, Circle start) {
 }
 
 /// Correlation of the signal with itself turned by 180 degrees about (x, y), over the disc; (x, y) in half pixels lands
-/// on the grid, so nothing is interpolated. Radially symmetric droplets between crossed polarizers have that symmetry.
-double inversion_correlation(const cv::Mat1d& signal, const cv::Mat1b& used, int twice_x, int twice_y, double radius) {
+/// on the grid, so nothing is interpolated. Radially symmetric droplets between crossed polarizers have that symmetry. Of every
+/// `stride` rows and columns one is looked at.
+double inversion_correlation(const cv::Mat1d& signal, const cv::Mat1b& used, int twice_x, int twice_y, double radius, int stride) {
   const double cx = 0.5 * twice_x, cy = 0.5 * twice_y;
   const int y0 = std::max({0, static_cast<int>(std::ceil(cy - radius)), twice_y - (signal.rows - 1)});
   const int x0 = std::max({0, static_cast<int>(std::ceil(cx - radius)), twice_x - (signal.cols - 1)});
   double product = 0, square = 0, sum = 0;
   long count = 0;
-  for (int y = y0; 2 * y <= twice_y; ++y) {
+  for (int y = y0; 2 * y <= twice_y; y += stride) {
     const int v = twice_y - y;
     if (v >= signal.rows || v < 0) continue;
-    for (int x = x0; x <= std::min(signal.cols - 1, twice_x - x0); ++x) {
+    for (int x = x0; x <= std::min(signal.cols - 1, twice_x - x0); x += stride) {
       const int u = twice_x - x;
       if (u < 0 || u >= signal.cols) continue;
       if ((x - cx) * (x - cx) + (y - cy) * (y - cy) > radius * radius) continue;
@@ -286,14 +287,15 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
   // Symmetry: a coarse to fine search around the outline's centre, on the half-pixel grid, then a parabola.
   int twice_x = static_cast<int>(std::lround(2 * circle.x)), twice_y = static_cast<int>(std::lround(2 * circle.y));
   const double reach = 1.05 * circle.radius;
-  const auto score = [&](int u, int v) { return inversion_correlation(smooth, field.used, u, v, reach); };
+  const auto score = [&](int u, int v, int stride = 1) { return inversion_correlation(smooth, field.used, u, v, reach, stride); };
   const int search = std::max(4, static_cast<int>(0.25 * circle.radius) * 2);
   const int coarse = std::max(1, static_cast<int>(circle.radius / 20));
   double best_score = -2;
   const int start_x = twice_x, start_y = twice_y;
   for (int v = start_y - search; v <= start_y + search; v += coarse)
     for (int u = start_x - search; u <= start_x + search; u += coarse)
-      if (const double s = score(u, v); s > best_score) best_score = s, twice_x = u, twice_y = v;
+      if (const double s = score(u, v, coarse); s > best_score) best_score = s, twice_x = u, twice_y = v;
+  best_score = score(twice_x, twice_y);
   for (int step = coarse; step >= 1; step /= 2)
     for (bool moved = true; moved;) {
       moved = false;

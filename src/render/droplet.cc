@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 
 #include "medium/build.h"
 #include "render/ball.h"
@@ -410,7 +411,12 @@ S DropletImage<S>::intensity(const P& column, const P& row) const {
 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  if (!looks_round(std::get<Droplet>(scene.sample))) return make_ball_model(scene, plan, value);
+  if (!looks_round(std::get<Droplet>(scene.sample))) {
+    if constexpr (kForTablesOnly<S>)
+      throw std::logic_error("a ray a point takes fewer derivatives at once");
+    else
+      return make_ball_model(scene, plan, value);
+  }
   return std::make_unique<DropletImage<S>>(scene, plan, value);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                       \
@@ -422,6 +428,6 @@ std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const Rend
                                       const Mesh&);                                                            \
   template Mat2<S> droplet_jones<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,        \
                                     const Mesh&);
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -97,7 +97,7 @@ template <class S>
 Mat2<S> droplet_jones(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&, const Mesh&);
 // Large, and needed by few: axial_column.cc has them, so that droplet.cc stays small enough to be inlined well.
 #define BIREFIT_EXTERN(S) extern template class AxialColumn<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_EXTERN)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_EXTERN)
 #undef BIREFIT_EXTERN
 /// Calls f(column) with the medium along the ray.
 template <class S, class F>

@@ -29,13 +29,22 @@ EikonalFan::EikonalFan(double n_host, double n_mode, double sweep, bool extraord
   table_.rho_max = seen(low, turn);
   for (int i = 1; i < IncidenceTable::kNodes; ++i) {
     const double t = static_cast<double>(i) / IncidenceTable::kNodes, target = table_.rho_max * (1 - t * t);
-    // 30 halvings of less than the last step's size: far below what interpolation leaves.
+    // Newton from where the last two nodes point to, halving where it leaves the bracket: rho grows with psi, but without bound of
+    // its slope at an end.
     double below = 0, above = table_.psi[static_cast<std::size_t>(i - 1)];
-    for (int k = 0; k < 30; ++k) {
-      const double middle = 0.5 * (below + above);
-      (seen(middle, turn) < target ? below : above) = middle;
+    double psi = i == 1 ? above : std::max(2 * above - table_.psi[static_cast<std::size_t>(i - 2)], 0.5 * above);
+    for (int k = 0; k < 40; ++k) {
+      const double rho = seen(psi, turn);
+      (rho < target ? below : above) = psi;
+      const double s = std::sin(psi), c = std::cos(psi), secant = 1 / std::cos(turn);
+      const double slope = secant * (c + s * std::tan(turn) * (2 * sweep * ratio * c / std::sqrt(std::max(1e-14, 1 - ratio * ratio * s * s)) - 2));
+      double next = psi - (rho - target) / slope;
+      if (!(next > below && next < above)) next = 0.5 * (below + above);
+      const double change = std::abs(next - psi);
+      psi = next;
+      if (change < 1e-10) break;
     }
-    table_.psi[static_cast<std::size_t>(i)] = 0.5 * (below + above);
+    table_.psi[static_cast<std::size_t>(i)] = psi;
   }
 }
 
@@ -88,6 +97,6 @@ EikonalRay<S> eikonal_ray(const DropletOptics<S>& o, const EikonalFan& fan, cons
 }
 
 #define BIREFIT_INSTANTIATE(S) template EikonalRay<S> eikonal_ray<S>(const DropletOptics<S>&, const EikonalFan&, const S&, double);
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

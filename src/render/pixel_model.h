@@ -41,6 +41,10 @@ class Values {
   std::vector<int> active_;
 };
 
+/// Compiled for pictures that are read from a table over the radius and no others (transport/method.h).
+template <class S>
+inline constexpr bool kForTablesOnly = (ScalarTraits<S>::derivatives > 4);
+
 template <class S>
 inline constexpr int kLanesOf = std::is_same_v<PlainOf<S>, Pack> ? kLanes : 1;
 

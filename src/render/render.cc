@@ -21,11 +21,15 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
   if (std::holds_alternative<Droplet>(scene.sample)) return make_droplet_model(scene, plan, value);
-  if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
-  if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
-  if (std::holds_alternative<SampledVolume>(scene.sample)) return make_volume_model(scene, plan, value);
-  if (is_ring_table(scene)) return make_ring_model(scene, value);
-  return make_planar_model(scene, plan, value);
+  if constexpr (kForTablesOnly<S>) {
+    throw std::logic_error("no table over the radius serves this scene");
+  } else {
+    if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
+    if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
+    if (std::holds_alternative<SampledVolume>(scene.sample)) return make_volume_model(scene, plan, value);
+    if (is_ring_table(scene)) return make_ring_model(scene, value);
+    return make_planar_model(scene, plan, value);
+  }
 }
 
 int rays_side_by_side() { return kLanes; }
@@ -317,13 +321,16 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   });
 }
 
-/// Calls body<S>(chunk, first) for the active parameters in chunks of 8, 4, 2 and 1 derivatives a pass: a pass computes the values, too.
+std::size_t derivatives_at_once(const RenderPlan& plan) { return plan.radial_panels > 0 ? 8 : 4; }
+
+/// Calls body<S>(chunk, first) for the active parameters in chunks of at most `most` (4 or 8) derivatives a pass: every pass
+/// computes the values, too.
 template <class Body>
-void in_chunks(const std::vector<int>& active, const Body& body) {
+void in_chunks(const std::vector<int>& active, std::size_t most, const Body& body) {
   std::size_t first = 0;
   while (first < active.size()) {
     const std::size_t left = active.size() - first;
-    const std::size_t take = std::min<std::size_t>(left, 8);
+    const std::size_t take = std::min(left, most);
     const std::vector<int> chunk(active.begin() + static_cast<long>(first), active.begin() + static_cast<long>(first + take));
     if (take > 4)
       body.template operator()<Dual8>(chunk, static_cast<int>(first));
@@ -347,7 +354,7 @@ void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, cons
     render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
     return;
   }
-  in_chunks(active, [&]<class S>(const std::vector<int>& chunk, int first) {
+  in_chunks(active, derivatives_at_once(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
     std::vector<Image*> images{&into.intensity};
     for (std::size_t j = 0; j < chunk.size(); ++j) images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
     render_planes<S>(scene, plan, theta, chunk, threads, images);
@@ -387,7 +394,7 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
   if (active.empty())
     render_list<Pack>(scene, plan, theta, pixels, {}, threads, out, 0);
   else
-    in_chunks(active, [&]<class S>(const std::vector<int>& chunk, int first) {
+    in_chunks(active, derivatives_at_once(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
       render_list<S>(scene, plan, theta, pixels, chunk, threads, out, first);
     });
   return out;

@@ -221,6 +221,6 @@ std::unique_ptr<PixelModel<S>> make_series_model(const Scene& scene, const Rende
   return std::make_unique<SeriesImage<S>>(scene, plan, value);
 }
 #define BIREFIT_INSTANTIATE(S) template std::unique_ptr<PixelModel<S>> make_series_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

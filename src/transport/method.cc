@@ -111,7 +111,7 @@ Mat2<S> TransportMethod<S>::transmission(const Column<S>& column, const Ray<S>& 
   template Mat2<S> step_of_medium<S>(const Column<S>&, const Ray<S>&, const Mesh&, std::size_t);            \
   template FaceFactors<S> lossless_faces<S>(const Column<S>&, const Ray<S>&, const S&);                     \
   template class TransportMethod<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 Mesh uniform_mesh(int steps, const std::vector<double>& breaks) {
   std::vector<double> edges{0.0};

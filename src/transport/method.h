@@ -91,8 +91,10 @@ Mesh uniform_mesh(int steps, const std::vector<double>& breaks = {});
 Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double tolerance, double* error_estimate = nullptr,
                   int max_steps = 200000);
 
-// The scalars all kernels are compiled for.
-#define BIREFIT_FOR_EACH_SCALAR(X) X(double) X(Pack) X(Dual1) X(Dual2) X(Dual4) X(Dual8)
+// The scalars all kernels are compiled for, and one more for pictures that are read from a table over the radius: eight
+// derivatives at once cost less there than four and four, but not where every point has its ray (lanes leave the registers).
+#define BIREFIT_FOR_EACH_SCALAR(X) X(double) X(Pack) X(Dual1) X(Dual2) X(Dual4)
+#define BIREFIT_FOR_EACH_SCALAR_OF_TABLES(X) BIREFIT_FOR_EACH_SCALAR(X) X(Dual8)
 using Dual1 = Dual<Pack, 1>;
 using Dual2 = Dual<Pack, 2>;
 using Dual4 = Dual<Pack, 4>;

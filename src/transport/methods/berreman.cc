@@ -56,6 +56,6 @@ Mat2<S> Berreman<S>::reflection(const Column<S>& column, const Ray<S>& ray, cons
 }
 
 #define BIREFIT_INSTANTIATE(S) template class Berreman<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

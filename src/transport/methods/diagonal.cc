@@ -85,6 +85,6 @@ Su2<S> Diagonal<S>::retarder(const Column<S>& column, const Ray<S>& ray, const M
 }
 
 #define BIREFIT_INSTANTIATE(S) template class Diagonal<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

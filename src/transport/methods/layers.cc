@@ -74,6 +74,6 @@ Su2<S> Layers<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mes
   template class Layers<S>;    \
   template class LayersMidpoint<S>; \
   template class LayersEdge<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -104,6 +104,6 @@ Su2<S> Magnus6<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Me
 }
 
 #define BIREFIT_INSTANTIATE(S) template class Magnus6<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

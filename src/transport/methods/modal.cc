@@ -130,6 +130,6 @@ Su2<S> Modal<S>::retarder(const Column<S>&, const Ray<S>&, const Mesh&) const {
   template class Modal<S>;                                                                                  \
   template ModalTransfer<S> modal_transfer<S>(const Column<S>&, const Ray<S>&, const Mesh&, int);           \
   template Mat2<S> together<S>(const ModalTransfer<S>&);
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -130,6 +130,6 @@ Su2<S> OdeScalar<S>::retarder(const Column<S>& column, const Ray<S>& ray, const 
 }
 
 #define BIREFIT_INSTANTIATE(S) template class OdeScalar<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

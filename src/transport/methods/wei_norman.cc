@@ -289,6 +289,6 @@ BIREFIT_WEI_NORMAN(WeiNormanExp, kExpInfo)
 #define BIREFIT_INSTANTIATE(S) \
   template class WeiNorman<S>; \
   template class WeiNormanExp<S>;
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit
