@@ -17,7 +17,7 @@ struct ChartPoint {
   double samples = 0;          ///< of the medium, per ray
   double jones_error = 0;      ///< |T - T_ref| / |T_ref|, Frobenius
   double intensity_error = 0;  ///< largest change of |q T p|^2 over 91 angles p of the polarizer, q crossed, unit field in
-  double gradient_error = 0;   ///< the same as jones_error, of dT / d n_e
+  double gradient_error = 0;   ///< the same as jones_error, of dT / d n_e; by differences of fourth order where a method has no derivatives
 };
 
 struct ChartScene {

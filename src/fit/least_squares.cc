@@ -371,27 +371,25 @@ void LeastSquares::solve_linear() {
         prior_root_.leftCols(p) * searched + prior_root_.rightCols(l) * linear - prior_target_;
 }
 
-void LeastSquares::copy_residual(const Tile& tile, double* out) const {
-  const Eigen::Index begin = tile.micrograph < 0 ? pixel_rows_ : frames_[tile.micrograph].begin + tile.begin;
-  Eigen::Map<Eigen::VectorXd>(out, tile.count) = residual_.segment(begin, tile.count);
-}
-
-void LeastSquares::copy_jacobian(const Tile& tile, const Eigen::VectorXd& scale, double* row_major) const {
+Eigen::MatrixXd LeastSquares::projected_factor(const Eigen::VectorXd& scale) const {
   const Eigen::Index p = scale.size();
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(row_major, tile.count, p);
-  if (tile.micrograph < 0) {
-    out = (searched_columns_.bottomRows(tile.count) - prior_root_.rightCols(projection_.rows()) * projection_) *
-          scale.asDiagonal();
-    return;
+  TallQr qr(static_cast<int>(p) + 1);
+  Eigen::MatrixXd rows;
+  for (const Tile& tile : tiles_) {
+    rows.resize(tile.count, p + 1);
+    const Eigen::Index begin = tile.micrograph < 0 ? pixel_rows_ : frames_[static_cast<std::size_t>(tile.micrograph)].begin + tile.begin;
+    rows.leftCols(p) = searched_columns_.middleRows(begin, tile.count);
+    if (tile.micrograph < 0) {
+      rows.leftCols(p) -= prior_root_.rightCols(projection_.rows()) * projection_;
+    } else {
+      for (const Term& term : frames_[static_cast<std::size_t>(tile.micrograph)].terms)
+        if (term.unknown >= 0) rows.leftCols(p) -= term.whitened.segment(tile.begin, tile.count) * projection_.row(term.unknown);
+    }
+    rows.leftCols(p) *= scale.asDiagonal();
+    rows.col(p) = residual_.segment(begin, tile.count);
+    qr.add(rows);
   }
-  const Frame& frame = frames_[tile.micrograph];
-  const Eigen::Index begin = frame.begin + tile.begin;
-  for (Eigen::Index j = 0; j < p; ++j) {
-    auto column = out.col(j);
-    column = searched_columns_.col(j).segment(begin, tile.count) * scale[j];
-    for (const Term& term : frame.terms)
-      if (term.unknown >= 0) column -= (projection_(term.unknown, j) * scale[j]) * term.whitened.segment(tile.begin, tile.count);
-  }
+  return qr.factor();
 }
 
 Eigen::MatrixXd LeastSquares::full_rows(const Tile& tile) const {
@@ -531,7 +529,7 @@ struct Scaling {
   }
 };
 
-/// One render per point, shared by all tiles.
+/// One render per point.
 class SharedEvaluation : public ceres::EvaluationCallback {
  public:
   SharedEvaluation(LeastSquares& problem, const Scaling& scaling, const std::vector<double>& x)
@@ -562,24 +560,34 @@ class SharedEvaluation : public ceres::EvaluationCallback {
   bool valid_ = false, has_jacobian_ = false;
 };
 
-class TileCost : public ceres::CostFunction {
+/// The whole problem in one row more than it has unknowns. With R = [A b; 0 c] the triangular factor of all rows [Jacobian,
+/// residual], the residual (b, c) and the Jacobian (A, 0) have the same sum of squares, gradient and Gauss-Newton steps, and the
+/// solver keeps no copies of a million rows.
+class ReducedCost : public ceres::CostFunction {
  public:
-  TileCost(const LeastSquares& problem, const LeastSquares::Tile& tile, const Scaling& scaling,
-           const SharedEvaluation& evaluation)
-      : problem_(problem), tile_(tile), scaling_(scaling), evaluation_(evaluation) {
-    set_num_residuals(static_cast<int>(tile.count));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(scaling.scale.size()));
+  ReducedCost(const LeastSquares& problem, const Scaling& scaling, const SharedEvaluation& evaluation)
+      : problem_(problem), scaling_(scaling), evaluation_(evaluation) {
+    const int p = static_cast<int>(scaling.scale.size());
+    set_num_residuals(p + 1);
+    mutable_parameter_block_sizes()->push_back(p);
   }
   bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
     if (!evaluation_.valid()) return false;
-    problem_.copy_residual(tile_, residuals);
-    if (jacobians && jacobians[0]) problem_.copy_jacobian(tile_, scaling_.scale, jacobians[0]);
+    const Eigen::Index p = scaling_.scale.size();
+    Eigen::Map<Eigen::VectorXd> residual(residuals, p + 1);
+    if (jacobians && jacobians[0]) {
+      const Eigen::MatrixXd factor = problem_.projected_factor(scaling_.scale);
+      residual = factor.col(p);
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(jacobians[0], p + 1, p) = factor.leftCols(p);
+    } else {  // only its sum of squares is asked for
+      residual.setZero();
+      residual[p] = std::sqrt(problem_.objective());
+    }
     return true;
   }
 
  private:
   const LeastSquares& problem_;
-  LeastSquares::Tile tile_;
   const Scaling& scaling_;
   const SharedEvaluation& evaluation_;
 };
@@ -633,8 +641,7 @@ SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& 
   ceres::Problem problem(problem_options);
   problem.AddParameterBlock(x.data(), p);
   if (options.held >= 0) problem.SetManifold(x.data(), new ceres::SubsetManifold(p, {options.held}));
-  for (const Tile& tile : tiles_)
-    problem.AddResidualBlock(new TileCost(*this, tile, scaling, evaluation), nullptr, x.data());
+  problem.AddResidualBlock(new ReducedCost(*this, scaling, evaluation), nullptr, x.data());
   for (int j = 0; j < p; ++j) {
     const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
     if (std::isfinite(parameter.lower))
@@ -645,7 +652,7 @@ SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& 
   ceres::Solver::Options solver;
   solver.minimizer_type = ceres::TRUST_REGION;
   solver.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
-  // A handful of columns: QR costs no more than the rows' copy and keeps the digits that normal equations lose.
+  // QR keeps the digits that normal equations lose.
   solver.linear_solver_type = ceres::DENSE_QR;
   // With bounds Ceres adds a line search; the cubic one would ask for derivative images at every trial step.
   solver.line_search_interpolation_type = ceres::QUADRATIC;

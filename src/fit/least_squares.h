@@ -113,14 +113,9 @@ class LeastSquares {
   int prior_rows() const { return static_cast<int>(prior_root_.rows()); }
   Eigen::Index pixel_rows() const { return pixel_rows_; }
 
-  // For the tiles: rows of the projected problem, searched unknowns in the solver's scale.
-  struct Tile {
-    int micrograph = 0;  ///< -1 = priors
-    Eigen::Index begin = 0, count = 0;
-  };
-  const std::vector<Tile>& tiles() const { return tiles_; }
-  void copy_residual(const Tile& tile, double* out) const;
-  void copy_jacobian(const Tile& tile, const Eigen::VectorXd& scale, double* row_major) const;
+  /// Triangular factor of the rows [d/d searched, residual] of the projected problem (the linear unknowns follow), priors
+  /// included, the searched unknowns in units of `scale`: all that a step of the solver needs to know of a million rows.
+  Eigen::MatrixXd projected_factor(const Eigen::VectorXd& scale) const;
 
  private:
   struct Term : LightTerm {
@@ -148,6 +143,11 @@ class LeastSquares {
   void whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const;
   void set_priors();
   void solve_linear();
+  /// Some thousand rows of one micrograph, or the priors'.
+  struct Tile {
+    int micrograph = 0;  ///< -1 = priors
+    Eigen::Index begin = 0, count = 0;
+  };
   Eigen::MatrixXd full_rows(const Tile& tile) const;
 
   const FitJob& job_;

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include <fmt/format.h>
 
+#include "birefit/error.h"
 #include "fit/statistics.h"
 
 namespace birefit::estimation {
@@ -162,14 +162,7 @@ double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
 
 Eigen::MatrixXd projected_information(const LeastSquares& problem) {
   const int p = problem.searched_size();
-  TallQr qr(p);
-  if (p > 0)
-    for (const LeastSquares::Tile& tile : problem.tiles()) {
-      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows(tile.count, p);
-      problem.copy_jacobian(tile, Eigen::VectorXd::Ones(p), rows.data());
-      qr.add(rows);
-    }
-  return qr.factor();
+  return problem.projected_factor(Eigen::VectorXd::Ones(p)).topLeftCorner(p, p);
 }
 
 ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
@@ -316,7 +309,8 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
   constexpr int kMostOfDear = 4;
   const std::size_t most = static_cast<std::size_t>(std::clamp(job.options.scan_candidates, 1, kMostOfDear));
   if (starts.size() > most) starts.resize(most);
-  if (starts.empty()) throw std::logic_error("polish: no start has a picture");
+  if (starts.empty())
+    throw UserError(Where{}, "wave optics gives no finite picture at the start values, nor where rays would put them", "check the start values and bounds of indices, diameter_um and wavelength_nm");
   const Eigen::VectorXd first = starts.front().second;
   polish_into(result, problem, job.options, std::move(starts), most, steps, std::numeric_limits<double>::infinity(), same);
   keep_distinct(result, problem, first);

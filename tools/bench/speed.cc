@@ -188,6 +188,51 @@ void time_waves(int rounds) {
   }
 }
 
+/// A whole fit: size x size pixels, six free parameters, the scan included.
+void time_fit(int size, int rounds) {
+  const double scale = 256.0 / size;
+  DropletScene s = droplet_scene(false, size, 0.05 * scale);
+  testing::IndependentDroplet truth;
+  truth.center_x_px = 129.3 / scale;
+  truth.center_y_px = 125.8 / scale;
+  truth.pixel_um = 0.05 * scale;
+  std::vector<double> mean;
+  for (int row = 0; row < size; ++row)
+    for (int column = 0; column < size; ++column) mean.push_back(150 + 3200 * truth.pixel(column, row, 2));
+  const std::vector<double> counts = testing::camera(mean, 0.5, 4.0, 7);
+  const auto free = [&](int index, double value, double low, double high) {
+    Parameter& parameter = s.table[index];
+    parameter.free = true;
+    parameter.value = value;
+    parameter.lower = low;
+    parameter.upper = high;
+  };
+  free(s.four[0], 9.0, 8.0, 10.5);
+  free(s.four[1], 0.15, 0.05, 0.4);
+  free(s.four[2], 130 / scale, 110 / scale, 150 / scale);
+  free(s.four[3], 126 / scale, 106 / scale, 146 / scale);
+  Micrograph micrograph;
+  micrograph.name = "synthetic";
+  micrograph.values = Image(size, size);
+  micrograph.values.values() = counts;
+  micrograph.mask = Mask(size, size, 1);
+  for (const char* name : {"gain", "offset"}) {
+    Parameter parameter;
+    parameter.name = name;
+    parameter.free = parameter.automatic = parameter.linear = true;
+    (std::string(name) == "gain" ? micrograph.gain : micrograph.offset) = s.table.add(parameter);
+  }
+  micrograph.scene = s.scene;
+  FitJob job;
+  job.parameters = s.table;
+  job.micrographs = {micrograph};
+  std::vector<double> times;
+  FitResult result;
+  for (int i = 0; i < rounds; ++i) times.push_back(seconds_of([&] { result = fit(job); }));
+  std::printf("fit of a %d x %d droplet, six parameters, scan included: %.2f s, %d evaluations, %s\n", size, size, median(times),
+              result.evaluations, result.has_answer() ? "converged" : "NO ANSWER");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -234,46 +279,8 @@ int main(int argc, char** argv) {
     }
   }
 
-  // A whole fit: 256 x 256, six free parameters, the scan included.
-  DropletScene s = droplet_scene(false, 256, 0.05);
-  testing::IndependentDroplet truth;
-  truth.center_x_px = 129.3;
-  truth.center_y_px = 125.8;
-  std::vector<double> mean;
-  for (int row = 0; row < 256; ++row)
-    for (int column = 0; column < 256; ++column) mean.push_back(150 + 3200 * truth.pixel(column, row, 2));
-  const std::vector<double> counts = testing::camera(mean, 0.5, 4.0, 7);
-  const auto free = [&](int index, double value, double low, double high) {
-    Parameter& parameter = s.table[index];
-    parameter.free = true;
-    parameter.value = value;
-    parameter.lower = low;
-    parameter.upper = high;
-  };
-  free(s.four[0], 9.0, 8.0, 10.5);
-  free(s.four[1], 0.15, 0.05, 0.4);
-  free(s.four[2], 130, 110, 150);
-  free(s.four[3], 126, 106, 146);
-  Micrograph micrograph;
-  micrograph.name = "synthetic";
-  micrograph.values = Image(256, 256);
-  micrograph.values.values() = counts;
-  micrograph.mask = Mask(256, 256, 1);
-  for (const char* name : {"gain", "offset"}) {
-    Parameter parameter;
-    parameter.name = name;
-    parameter.free = parameter.automatic = parameter.linear = true;
-    (std::string(name) == "gain" ? micrograph.gain : micrograph.offset) = s.table.add(parameter);
-  }
-  micrograph.scene = s.scene;
-  FitJob job;
-  job.parameters = s.table;
-  job.micrographs = {micrograph};
-  std::vector<double> times;
-  FitResult result;
-  for (int i = 0; i < 3; ++i) times.push_back(seconds_of([&] { result = fit(job); }));
-  std::printf("fit of a 256 x 256 droplet, six parameters, scan included: %.2f s, %d evaluations, %s\n", median(times),
-              result.evaluations, result.has_answer() ? "converged" : "NO ANSWER");
+  time_fit(256, 3);
+  time_fit(1024, 1);
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   std::printf("peak memory %.0f MB\n", static_cast<double>(usage.ru_maxrss) / 1024);
