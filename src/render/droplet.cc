@@ -252,11 +252,8 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
   centred_ = centred(scene, center_x_, center_y_);
   shell_ = optics_.director == DropletOptics<S>::Director::shell;
   if (shell_) {
-    // The ray that touches the core: sin psi = (core / R) / m.
-    const S sin_in = optics_.core_um * inverse(optics_.radius_um), sin_out = sin_in * inverse(optics_.ratio);
-    if (lane(plain(sin_out), 0) < std::sin(rim_.psi_max()) * (1 - 1e-6)) {
-      const S cos_in = root(1.0 - sin_in * sin_in), cos_out = root(1.0 - sin_out * sin_out), turn = sin_out * cos_in - cos_out * sin_in;
-      core_um_ = optics_.radius_um * sin_out * inverse(1.0 - 2.0 * turn * turn);
+    core_um_ = core_edge(optics_, rim_);
+    if (can_tabulate()) {
       inverse_core_ = inverse(core_um_);
       core_root_ = root(1.0 - core_um_ * inverse_edge_);
       inverse_core_root_ = inverse(core_root_);

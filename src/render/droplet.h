@@ -86,6 +86,16 @@ S rim_edge(const RimTable& rim, const S& ratio, const S& n_host) {
   return (s1 + c1 * change) / tip;
 }
 
+/// Image radius (um) of the rays that touch a shell's core, where its picture has a kink; 0 where the rim comes first.
+template <class S>
+S core_edge(const DropletOptics<S>& o, const RimTable& rim) {
+  // sin psi = (core / R) / m.
+  const S sin_in = o.core_um * inverse(o.radius_um), sin_out = sin_in * inverse(o.ratio);
+  if (!(lane(plain(sin_out), 0) < std::sin(rim.psi_max()) * (1 - 1e-6))) return S(0.0);
+  const S cos_in = root(1.0 - sin_in * sin_in), cos_out = root(1.0 - sin_out * sin_out), turn = sin_out * cos_in - cos_out * sin_in;
+  return o.radius_um * sin_out * inverse(1.0 - 2.0 * turn * turn);
+}
+
 /// The ray whose backward extension meets the mid plane at image radius rho_um < rim.rho_max() R.
 template <class S>
 DropletRay<S> trace(const DropletOptics<S>& optics, const RimTable& rim, const S& rho_um);

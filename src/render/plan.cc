@@ -321,6 +321,8 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   plan_radial_table(scene, value, plan);
 
   const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.radius_um;
+  const bool shell = o.director == DropletOptics<double>::Director::shell;
+  const double core = shell ? core_edge(o, rim) : 0;
   double largest_phase = 0;
   const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
   if (bins > 100000) throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");
@@ -334,6 +336,8 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
     // The cross turns within the innermost pixels; at the rim intensity ends like a root.
     if (r < 3) return r < 2 ? 9.0 : 5.0;
     if (high > edge - px && low < edge + px) return 3.0;
+    // A shell's retardance turns back where rays touch the core, with a slope that has no bound.
+    if (shell && high > core - px && low < core + px) return 9.0;
     return std::abs(phase_at(high) - phase_at(low));
   });
   const int most = *std::max_element(plan.samples.begin(), plan.samples.end());

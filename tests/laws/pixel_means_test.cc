@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -79,6 +81,60 @@ TEST(PixelMeans, DerivativesOfAMeanAreThoseOfDifferences) {
     const double coarse = (at(slope + h) - at(slope - h)) / (2 * h), fine = (at(slope + h / 2) - at(slope - h / 2)) / h;
     EXPECT_NEAR(at(x).d[0], (4 * fine - coarse) / 3, 1e-9) << slope;
   }
+}
+
+/// Worst and RMS difference of a shell's picture (wall_um 0: a droplet's) from one of pixels a ninth the size, averaged.
+std::array<double, 2> from_finer_pixels(double diameter_um, double wall_um, double pixel_um, double off_px) {
+  constexpr int kSize = 48, kFiner = 9;
+  const auto picture = [&](int finer) {
+    testing::TableBuilder b;
+    Scene s;
+    Droplet droplet;
+    droplet.diameter_um = b.fixed("diameter_um", diameter_um);
+    if (wall_um > 0) {
+      ShellDirector shell;
+      shell.wall_um = b.fixed("wall_um", wall_um);
+      droplet.director = shell;
+    }
+    s.sample = droplet;
+    s.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fixed("birefringence", 0.22)};
+    s.surround_index = b.fixed("surround", 1.5);
+    s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
+    s.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+    s.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+    s.view.width = s.view.height = kSize * finer;
+    s.view.pixel_size_um = pixel_um / finer;
+    // The same place: pixel centres are whole numbers.
+    const double centre = (0.5 * kSize + off_px + 0.5) * finer - 0.5;
+    s.view.center_x_px = b.fixed("center_x", centre);
+    s.view.center_y_px = b.fixed("center_y", centre);
+    const Theta theta = b.table.values();
+    return render(s, plan(s, theta), theta, {}, 1).intensity;
+  };
+  const Image coarse = picture(1), fine = picture(kFiner);
+  double worst = 0, square = 0;
+  for (int row = 0; row < kSize; ++row)
+    for (int column = 0; column < kSize; ++column) {
+      double sum = 0;
+      for (int j = 0; j < kFiner; ++j)
+        for (int i = 0; i < kFiner; ++i) sum += fine(kFiner * column + i, kFiner * row + j);
+      const double error = std::abs(coarse(column, row) - sum / (kFiner * kFiner));
+      worst = std::max(worst, error);
+      square += error * error;
+    }
+  return {worst, std::sqrt(square / (kSize * kSize))};
+}
+
+TEST(PixelMeans, OfShellsAndDropletsAreThoseOfFinerPixels) {
+  for (const double off : {0.0, 0.31})
+    for (const double pixel : {0.15, 0.3})
+      for (const double wall : {0.0, 0.4, 0.47, 1.1, 2.3}) {
+        const auto [worst, rms] = from_finer_pixels(40 * pixel, wall, pixel, off);
+        // Pixels on the edge of a core, where the retardance has a kink without a bound to its slope, are means of 64 points; the
+        // others' are good to the accuracy of 1e-4.
+        EXPECT_LT(worst, wall > 0 ? 0.02 : 1e-3) << "wall " << wall << " um, pixel " << pixel << " um, off " << off;
+        EXPECT_LT(rms, wall > 0 ? 1e-3 : 1e-4) << "wall " << wall << " um, pixel " << pixel << " um, off " << off;
+      }
 }
 
 // Degree 11 on panels of 1/6 of a smooth function of 5 radians: (5/12)^12 / (2^11 12!) = 3e-17; powers lose (1 + sqrt 2)^11
