@@ -215,7 +215,7 @@ int run_series(const Arguments& arguments) {
   };
   // The first alone, then a few at a time that all start where the frames before them ended: how many does not depend on the number
   // of cores, so that neither do the results.
-  const int cores = thread_count(std::max(arguments.threads, 0));
+  const int cores = thread_count(arguments.threads >= 0 ? arguments.threads : load_frame(series, 0).job.options.threads);
   for (std::size_t first = 0, count; first < series.frames.size() && !interrupt.flag(); first += count) {
     count = std::min<std::size_t>(first == 0 ? 1 : kFramesTogether, series.frames.size() - first);
     const int side_by_side = std::min(cores, static_cast<int>(count)), each = cores / side_by_side;
