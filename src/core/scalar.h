@@ -59,6 +59,11 @@ BIREFIT_INLINE double select(bool condition, double a, double b) { return condit
 BIREFIT_INLINE Pack select(const Pack::batch_bool_type& condition, const Pack& a, const Pack& b) {
   return xsimd::select(condition, a, b);
 }
+/// Of all lanes of a condition.
+BIREFIT_INLINE bool none(bool condition) { return !condition; }
+BIREFIT_INLINE bool none(const Pack::batch_bool_type& condition) { return xsimd::none(condition); }
+BIREFIT_INLINE bool all(bool condition) { return condition; }
+BIREFIT_INLINE bool all(const Pack::batch_bool_type& condition) { return xsimd::all(condition); }
 BIREFIT_INLINE double min_of(double a, double b) { return a < b ? a : b; }
 BIREFIT_INLINE double max_of(double a, double b) { return a > b ? a : b; }
 BIREFIT_INLINE Pack min_of(const Pack& a, const Pack& b) { return xsimd::min(a, b); }

@@ -346,12 +346,12 @@ S DropletImage<S>::through(const S& rho_um, const P* basis, const P* turned, P* 
   const P to_rim = root(P(1.0) - plain(fraction)), slope = P(-0.5) * inverse(to_rim);
   const auto central = shell_ ? plain(rho_um) < plain(core_um_) : to_rim > P(1 - kCentre);
   S total(P(0.0));
-  if (!all(central)) {
+  if (!birefit::all(central)) {
     constexpr double kScale = 1 / (1 - kCentre);
     const S v = shell_ ? place(fraction, to_rim, slope) * inverse_core_root_ : place(fraction, to_rim * P(kScale), slope * P(kScale));
     total = tabulated_sum(Part::rest, v, basis, turned, turned_sum);
   }
-  if (none(central)) return total;
+  if (birefit::none(central)) return total;
   P turned_here;
   S v(P(0.0));
   if (shell_) {
@@ -363,8 +363,8 @@ S DropletImage<S>::through(const S& rho_um, const P* basis, const P* turned, P* 
     v = place(fraction, root4, P(-0.25) * root4 * inverse(w) * slope);
   }
   const S centre = tabulated_sum(Part::centre, v, basis, turned, &turned_here);
-  if (turned) *turned_sum = all(central) ? turned_here : select(central, turned_here, *turned_sum);
-  return all(central) ? centre : select(central, centre, total);
+  if (turned) *turned_sum = birefit::all(central) ? turned_here : select(central, turned_here, *turned_sum);
+  return birefit::all(central) ? centre : select(central, centre, total);
 }
 
 template <class S>
@@ -379,7 +379,7 @@ S DropletImage<S>::intensity(const P& column, const P& row) const {
     for (int j = 0; j < ScalarTraits<S>::derivatives; ++j) rho.d[j] = (y * center_y_.d[j] - x * center_x_.d[j]) * over_rho * px;
   }
   S result(P(0.0));
-  if (!dark_ && !all(rho_um < plain(optics_.radius_um) - P(pixel_um_))) {  // light that passes by; averaged over a pixel
+  if (!dark_ && !birefit::all(rho_um < plain(optics_.radius_um) - P(pixel_um_))) {  // light that passes by; averaged over a pixel
     S everywhere(rho);
     if constexpr (ScalarTraits<S>::derivatives > 0)
       everywhere.value = rho_um;
@@ -387,7 +387,7 @@ S DropletImage<S>::intensity(const P& column, const P& row) const {
       everywhere = rho_um;
     result = open_ * min_of(max_of((everywhere - optics_.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
   }
-  if (none(inside)) return result;
+  if (birefit::none(inside)) return result;
   const P square = over_rho * over_rho, c2 = (x * x - y * y) * square, s2 = P(2.0) * x * y * square;
   const P q = plain(cos_sum_) * c2 + plain(sin_sum_) * s2, s = plain(cos_sum_) * s2 - plain(sin_sum_) * c2;
   const P basis[kMostTerms] = {q * q, q, P(1.0), s, q * s};

@@ -157,10 +157,6 @@ class DropletImage final : public PixelModel<S> {
   }
 
  private:
-  static bool none(bool inside) { return !inside; }
-  static bool none(const Pack::batch_bool_type& inside) { return xsimd::none(inside); }
-  static bool all(bool inside) { return inside; }
-  static bool all(const Pack::batch_bool_type& inside) { return xsimd::all(inside); }
   void terms_at(const S& rho_um, S* out) const;
   void eikonal_terms_at(const S& rho_um, S* out) const;
   S through(const S& rho_um, const P* basis, const P* turned, P* turned_sum) const;

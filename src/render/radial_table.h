@@ -140,15 +140,13 @@ class RadialTable {
     for (const double last = largest(cell); panel < last;) {
       panel += 1;
       const auto here = cell == P(panel);
-      if (none(here)) continue;
+      if (birefit::none(here)) continue;
       P turned_here;
       total = select(here, on_panel<L, F>(panel, x, v, basis, turned, &turned_here), total);
       if (turned) *turned_sum = select(here, turned_here, *turned_sum);
     }
     return total;
   }
-  static bool none(bool here) { return !here; }
-  static bool none(const Pack::batch_bool_type& here) { return xsimd::none(here); }
   template <int L, int F>
   BIREFIT_INLINE S on_panel(double panel, const P& x, const S& v, const P* basis, const P* turned, P* turned_sum) const {
     const double* c = coefficients_.data() + static_cast<std::size_t>(panel) * kPlanes * plane_;

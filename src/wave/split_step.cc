@@ -168,7 +168,7 @@ std::vector<double> padded(std::vector<double> x) {
 }
 
 /// Phases last some ten microseconds and there are thousands of them: who waits looks again for about as long as a phase before
-/// it sleeps, because to be woken takes longer (std::barrier sleeps at once: two threads were hardly faster than one).
+/// it sleeps, because to be woken takes longer (std::barrier sleeps after some 16 looks: two threads were hardly faster than one).
 class Barrier {
  public:
   explicit Barrier(int threads) : threads_(threads) {}

@@ -76,6 +76,11 @@ if command -v gnuplot > /dev/null; then
   [ -s stderr.txt ] && fail "something on stderr: $(cat stderr.txt)"
 fi
 
+# ---- frames side by side: the same to the byte ------------------------------------------------------------------------
+
+"$birefit" series series.yaml --threads 4 --out four --quiet > stdout.txt 2> stderr.txt || { fail 'four threads'; cat stdout.txt stderr.txt; }
+same four || fail 'four threads give another result than one'
+
 # ---- a second run does not touch it -----------------------------------------------------------------------------------
 
 find whole -type f -exec md5sum {} + | sort > before.txt
@@ -88,7 +93,7 @@ find whole -type f -exec md5sum {} + | sort | cmp -s - before.txt || fail 'resum
 
 # ---- killed, then resumed ---------------------------------------------------------------------------------------------
 
-"$birefit" series series.yaml --threads 1 --out killed > /dev/null 2>&1 &
+"$birefit" series series.yaml --threads 4 --out killed > /dev/null 2>&1 &
 pid=$!
 for ((k = 0; k < 2000; ++k)); do
   [ "$(done_in killed)" -ge 2 ] && break

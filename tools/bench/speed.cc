@@ -95,8 +95,8 @@ DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
 }
 
 /// Points inside the droplet of which a picture's rays are traced.
-double rays_in_picture(const Scene& scene, const RenderPlan& plan) {
-  const double radius_px = 4.65 / scene.view.pixel_size_um;
+double rays_in_picture(const Scene& scene, const RenderPlan& plan, double radius_um) {
+  const double radius_px = radius_um / scene.view.pixel_size_um;
   double rays = 0;
   for (int r = 0; r < scene.view.height; ++r)
     for (int c = 0; c < scene.view.width; ++c) {
@@ -188,6 +188,19 @@ void time_waves(int rounds) {
   }
 }
 
+void time_shell(int rounds) {
+  DropletScene s = droplet_scene(false, 500, 0.025);
+  ShellDirector shell;
+  shell.wall_um = s.table.add_constant("wall_um", 1.3);
+  std::get<Droplet>(s.scene.sample).director = shell;
+  const Theta theta = s.table.values();
+  const RenderPlan p = plan(s.scene, theta);
+  Rendering out;
+  std::vector<double> times;
+  for (int i = 0; i < rounds; ++i) times.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, out); }));
+  std::printf("500 x 500 concentric shell, wall 1.3 um: %.2f ms\n", 1e3 * median(times));
+}
+
 /// A whole fit: size x size pixels, six free parameters, the scan included.
 void time_fit(int size, int rounds) {
   const double scale = 256.0 / size;
@@ -272,19 +285,23 @@ int main(int argc, char** argv) {
                 median(rays_scalar) / median(rays_one));
     if (twisted && p.method == "magnus6") {
       // Three samples a step; points beside the droplet have no ray, some pixels several.
-      const double rays_traced = rays_in_picture(s.scene, every), operations = static_cast<double>(operations_of_a_ray(p.steps, 3)), peak = peak_operations_per_second();
+      const double rays_traced = rays_in_picture(s.scene, every, 0.5 * theta[static_cast<std::size_t>(s.four[0])]), operations = static_cast<double>(operations_of_a_ray(p.steps, 3)), peak = peak_operations_per_second();
       const double achieved = rays_traced * operations / median(rays_one);
       std::printf("    %.0f rays of %.0f operations: %.1f GFLOP/s of the core's %.1f (fused multiplications and additions alone), %.0f %%\n", rays_traced, operations,
                   1e-9 * achieved, 1e-9 * peak, 100 * achieved / peak);
     }
   }
 
+  time_shell(rounds);
+  const auto peak_mb = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<double>(usage.ru_maxrss) / 1024;
+  };
   time_fit(256, 3);
+  std::printf("  peak memory so far %.0f MB\n", peak_mb());
   time_fit(1024, 1);
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  std::printf("peak memory %.0f MB\n", static_cast<double>(usage.ru_maxrss) / 1024);
+  std::printf("  peak memory so far %.0f MB\n", peak_mb());
   time_waves(std::max(3, rounds / 3));
-  getrusage(RUSAGE_SELF, &usage);
-  std::printf("peak memory with waves %.0f MB\n", static_cast<double>(usage.ru_maxrss) / 1024);
+  std::printf("  peak memory so far %.0f MB\n", peak_mb());
 }
