@@ -17,6 +17,13 @@ namespace birefit {
 
 struct WavePlan;  // grids of wave optics, render/wave.h
 
+/// A part of a droplet's disc (render/polar_table.h), of 4 x 2^level panels from the rim inwards and 8 x 2^level sectors around.
+struct DiscSquare {
+  int level = 0, panel = 0, sector = 0;
+  int steps = 1;        ///< mesh steps of its rays
+  bool smooth = false;  ///< its light is interpolated from a few rays
+};
+
 /// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth.
 struct RenderPlan {
   std::string method;               ///< transport method by name
@@ -39,6 +46,8 @@ struct RenderPlan {
   /// Which squares of so many pixels have their fringes interpolated from a few rays (render/fringe_table.h); 0 = none.
   int fringe_block_px = 0;
   std::vector<std::uint8_t> fringe_blocks;
+  /// Droplets that look different from all sides: all of the disc, in squares that have their own `steps`. Empty: `steps` everywhere.
+  std::vector<DiscSquare> disc;
   /// Samples per pixel side by distance from (sampling_center_x_px, _y_px), one entry per sampling_bin_px; 1 = the
   /// point value with a second-order correction to the pixel's mean, n > 1 = n x n Gauss points.
   std::vector<int> samples;
@@ -59,7 +68,7 @@ RenderPlan plan(const Scene& scene, const Theta& theta);
 /// and much slower. Throws UserError like plan().
 Image image_by_march(const Scene& scene, const Theta& theta, int threads = 0);
 
-/// The grids of `before` no longer hold what `now` was made for (wave optics).
+/// The grids of `before` no longer hold what `now` was made for (wave optics, parts of a disc).
 bool outgrown(const RenderPlan& now, const RenderPlan& before);
 
 /// What Ceiling::wave would cost where it is not yet chosen.

@@ -1,6 +1,12 @@
 #include "render/ball.h"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
 #include "medium/build.h"
+#include "render/pilots.h"
+#include "render/polar_table.h"
 
 namespace birefit {
 
@@ -82,21 +88,36 @@ Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, 
 
 namespace {
 
+/// Parts of the disc are planned to interpolate to a hundredth of the accuracy (plan.cc); with more than this share they are left to rays.
+constexpr double kGivenUp = 0.1;
+
 template <class S>
 class BallImage final : public PixelModel<S> {
  public:
   using P = PlainOf<S>;
   BallImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
-      : optics_(ball_optics(scene, value)),
+      : scene_(scene),
+        plan_(plan),
+        value_(value),
+        optics_(ball_optics(scene, value)),
         rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0), scene.microscope.objective_na),
         method_(transport_method<S>(plan.method)),
-        mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
         aplanatic_(scene.microscope.aplanatic),
         light_(polarizers(scene, value)),
         pixel_um_(scene.view.pixel_size_um),
         center_x_(value(scene.view.center_x_px)),
         center_y_(value(scene.view.center_y_px)),
-        edge_um_(optics_.sphere.radius_um * rim_.rho_max()) {
+        edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
+        inverse_edge_(inverse(edge_um_)),
+        disc_(plan.disc),
+        map_(plan.disc) {
+    std::vector<int> steps;
+    for (const DiscSquare& q : disc_) steps.push_back(q.steps);
+    std::sort(steps.begin(), steps.end());
+    steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
+    for (const DiscSquare& q : disc_) mesh_of_.push_back(static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
+    for (const int n : steps) meshes_.push_back(uniform_mesh(n));
+    if (meshes_.empty()) meshes_.push_back(uniform_mesh(plan.steps));
     const S between = light_.px * light_.ax + light_.py * light_.ay;
     open_ = between * between;
     // A field along an axis in the image plane is turned into itself.
@@ -113,28 +134,258 @@ class BallImage final : public PixelModel<S> {
     const S x = (column - center_x_) * pixel_um_, y = (center_y_ - row) * pixel_um_;
     const S rho2 = x * x + y * y + 1e-18, over = inverse_root(rho2), rho = rho2 * over;
     // Light that passes by, averaged over a pixel.
-    S result = open_ * min_of(max_of((rho - optics_.sphere.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
+    const S beside = open_ * min_of(max_of((rho - optics_.sphere.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
     const auto inside = plain(rho) < plain(edge_um_) * P(1 - 1e-12);
-    const DropletRay<S> ray = trace(optics_.sphere, rim_, S(select(inside, rho, 0.5 * edge_um_)));
+    if (birefit::none(inside)) return beside;
+    const S within = select(inside, rho, 0.5 * edge_um_);
+    return beside + select(inside, through(x, y, within, over, inside), S(0.0));
+  }
+  /// What light brings that is seen at rho_um and at the azimuth, through the sphere.
+  S light(const S& rho_um, const S& cos_azimuth, const S& sin_azimuth, const Mesh& mesh) const {
+    const DropletRay<S> ray = trace(optics_.sphere, rim_, rho_um);
     S tube = optics_.sphere.radius_um * ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
     if (!aplanatic_) tube = tube * inverse(ray.cos_twice);
-    const Mat2<S> j = ball_jones<S>(optics_, ray, x * over, y * over, method_, mesh_, aplanatic_ ? S(1.0) : ray.cos_twice);
+    const Mat2<S> j = ball_jones<S>(optics_, ray, cos_azimuth, sin_azimuth, method_, mesh, aplanatic_ ? S(1.0) : ray.cos_twice);
     const Complex<S> out = light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
-    return result + select(inside, S(tube * norm(out)), S(0.0));
+    return tube * norm(out);
+  }
+  double edge_um() const { return lane(plain(edge_um_), 0); }
+  /// The same at a place of a PolarTable.
+  S light_at(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh& mesh) const {
+    return light(edge_um_ * S(P(1.0) - v * v), S(cos_azimuth), S(sin_azimuth), mesh);
+  }
+  void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
+    if (wanted != PixelModel<S>::Wanted::picture) return;
+    if constexpr (ScalarTraits<S>::derivatives > 0) {
+      // What only moves the disc does not change its light.
+      std::vector<int> shape, place;
+      for (std::size_t j = 0; j < value_.active().size(); ++j)
+        if (const int index = value_.active()[j]; index != scene_.view.center_x_px.index && index != scene_.view.center_y_px.index) {
+          shape.push_back(index);
+          place.push_back(static_cast<int>(j));
+        }
+      const auto narrow = [&]<class T>() { table_ = PolarTable<S>(BallImage<T>(scene_, plan_, Values<T>(value_.theta(), shape)).table(threads), place); };
+      constexpr int kAll = ScalarTraits<S>::derivatives;
+      if (shape.empty()) return narrow.template operator()<Pack>();
+      if constexpr (kAll > 1)
+        if (shape.size() == 1) return narrow.template operator()<Dual1>();
+      if constexpr (kAll > 2)
+        if (shape.size() == 2) return narrow.template operator()<Dual2>();
+    }
+    table_ = table(threads);
+  }
+  PolarTable<S> table(int threads) const {
+    return PolarTable<S>(disc_, kGivenUp * scene_.intensity_accuracy, threads, [this](int square, const P& v, const P& c, const P& s) { return light_at(v, c, s, meshes_[mesh_of_[static_cast<std::size_t>(square)]]); });
   }
 
  private:
+  template <class Mask>
+  S through(const S& x, const S& y, const S& rho_um, const S& over, const Mask& inside) const {
+    if (disc_.empty()) return light(rho_um, x * over, y * over, meshes_[0]);
+    P inverse_major;
+    const P angle = disc::turn_of(plain(x), plain(y), inverse_major);
+    const S fraction = rho_um * inverse_edge_;
+    const P to_rim = root(P(1.0) - plain(fraction)), square = map_.find(to_rim, angle);
+    S result(0.0);
+    if (!table_.empty()) {
+      S v(to_rim), turn(angle);
+      if constexpr (ScalarTraits<S>::derivatives > 0) {
+        v = fraction.chain(to_rim, P(-0.5) * inverse(to_rim));
+        for (std::size_t j = 0; j < turn.d.size(); ++j) turn.d[j] = (x.value * y.d[j] - y.value * x.d[j]) * (inverse_major * inverse_major);
+      }
+      if (table_.read(square, v, turn, inside, result)) return result;
+    }
+    P mesh;
+    if constexpr (kLanesOf<S> == 1) {
+      mesh = static_cast<double>(mesh_of_[static_cast<std::size_t>(square)]);
+    } else {
+      double which[kLanes];
+      for (int k = 0; k < kLanes; ++k) which[k] = static_cast<double>(mesh_of_[static_cast<std::size_t>(lane(square, k))]);
+      mesh = Pack::load_unaligned(which);
+    }
+    for_each_value(mesh, inside, [&](double m, const auto& here) {
+      result = select(here, light(rho_um, x * over, y * over, meshes_[static_cast<std::size_t>(m)]), result);
+      return true;
+    });
+    return result;
+  }
+
+  const Scene& scene_;
+  const RenderPlan& plan_;
+  Values<S> value_;
   BallOptics<S> optics_;
   RimTable rim_;
   const TransportMethod<S>& method_;
-  Mesh mesh_;
+  std::vector<Mesh> meshes_;         ///< from the fewest steps on
+  std::vector<std::size_t> mesh_of_; ///< which of them, by square of the disc; none: the first
   bool aplanatic_, half_turn_;
   Polarizers<S> light_;
   double pixel_um_;
-  S center_x_, center_y_, edge_um_, open_;
+  S center_x_, center_y_, edge_um_, inverse_edge_, open_;
+  std::vector<DiscSquare> disc_;
+  DiscMap map_;
+  PolarTable<S> table_;
 };
 
 }  // namespace
+
+namespace {
+
+/// How many mesh steps the rays of one square take: a defect, a wall that is seen from the side, takes many and little of the picture.
+class StepsOfSquare {
+ public:
+  StepsOfSquare(const Scene& scene, const RenderPlan& plan, const Values<double>& value)
+      : optics_(ball_optics(scene, value.as<Pack>())),
+        rim_(lane(optics_.sphere.ratio, 0), lane(optics_.sphere.n_host, 0), scene.microscope.objective_na),
+        method_(transport_method<Pack>(plan.method)),
+        target_(0.25 * scene.intensity_accuracy) {}
+  /// Until two more refinements change no pilot ray by more than a quarter of the accuracy: one alone may agree by chance. `change`: by how much they do.
+  int operator()(const DiscSquare& square, double& change) const {
+    Rays coarse = rays(square, 2), fine = rays(square, 4);
+    int n = 2, m = 4;
+    for (double first = distance(coarse, fine);;) {
+      const int finer = m + std::max(2, m / 8 * 2);
+      Rays finest = rays(square, finer);
+      const double second = distance(fine, finest);
+      change = std::max(first, second);
+      if (change <= target_) return n;
+      if (finer > kMost) return finer;
+      n = m, m = finer, first = second;
+      fine = std::move(finest);
+    }
+  }
+
+ private:
+  static constexpr int kPilots = 16, kMost = 512;
+  using Rays = std::vector<Mat2<double>>;
+
+  Rays rays(const DiscSquare& square, int steps) const {
+    const Mesh mesh = uniform_mesh(steps);
+    Rays result;
+    for (int i = 0; i < kPilots; i += kLanes) {
+      alignas(64) double vs[kLanes], cs[kLanes], ss[kLanes];
+      for (int k = 0; k < kLanes; ++k) {
+        // The plastic number leaves no gaps in two dimensions.
+        const auto part = [&](double turn) { return 0.5 + turn * (i + k) - std::floor(0.5 + turn * (i + k)); };
+        vs[k] = std::clamp(disc::v_in(square, part(0.7548776662466927)), 1e-6, 1 - 1e-6);
+        disc::direction_of(disc::turn_in(square, part(0.5698402909980532)), cs[k], ss[k]);
+      }
+      const Pack v = Pack::load_aligned(vs);
+      const Pack rho = optics_.sphere.radius_um * Pack(rim_.rho_max()) * (Pack(1.0) - v * v);
+      const Mat2<Pack> j = ball_jones<Pack>(optics_, trace<Pack>(optics_.sphere, rim_, rho), Pack::load_aligned(cs), Pack::load_aligned(ss), method_, mesh, Pack(1.0));
+      for (int k = 0; k < kLanes; ++k) {
+        const auto z = [&](const Complex<Pack>& x) { return Complex<double>(lane(x.re, k), lane(x.im, k)); };
+        result.push_back({z(j.a), z(j.b), z(j.c), z(j.d)});
+      }
+    }
+    return result;
+  }
+  static double distance(const Rays& a, const Rays& b) {
+    double worst = 0;
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (const double d = intensity_distance(a[i], b[i]); !(d <= worst)) worst = d;
+    return worst;
+  }
+
+  BallOptics<Pack> optics_;
+  RimTable rim_;
+  const TransportMethod<Pack>& method_;
+  double target_;
+};
+
+/// Largest error of the table in one of its squares.
+double error_in(const BallImage<Pack>& image, const PolarTable<Pack>& table, const DiscSquare& square, int number) {
+  const Mesh mesh = uniform_mesh(square.steps);
+  double error = 0;
+  for (const double around : {0.02, 0.31, 0.55, 0.77, 0.98}) {  // none a Chebyshev point, the ends among them
+    const double turn = disc::turn_in(square, around);
+    double c, s;
+    disc::direction_of(turn, c, s);
+    for (int first = 0; first < 8; first += kLanes) {
+      alignas(64) double place[kLanes];
+      for (int k = 0; k < kLanes; ++k) place[k] = disc::v_in(square, 0.01 + 0.98 * std::min(first + k, 7) / 7);
+      const Pack v = Pack::load_aligned(place), exact = image.light_at(v, Pack(c), Pack(s), mesh);
+      Pack read;
+      if (!table.read(Pack(number), v, Pack(turn), v < Pack(2.0), read)) return 1.0;
+      const double off = largest(max_of(exact - read, read - exact));
+      if (!(off <= error)) error = off;
+    }
+  }
+  return error;
+}
+
+}  // namespace
+
+void plan_disc_squares(const Scene& scene, const Values<double>& value, double target, RenderPlan& plan) {
+  const BallImage<Pack> image(scene, plan, value.as<Pack>());
+  const StepsOfSquare steps_of(scene, plan, value);
+  // Rays inside each radius were every point to have its own, and what share of them is in the picture.
+  std::vector<double> inside{0};
+  for (std::size_t i = 0; i < plan.samples.size(); ++i) inside.push_back(inside.back() + std::numbers::pi * (2.0 * static_cast<double>(i) + 1) * square(plan.sampling_bin_px * plan.samples[i]));
+  const double edge_px = image.edge_um() / scene.view.pixel_size_um, disc_px = std::numbers::pi * square(edge_px);
+  const double share = std::min(1.0, static_cast<double>(scene.view.width) * scene.view.height / disc_px);
+  const auto rays_within = [&](double v) {
+    const double bin = std::clamp(edge_px * (1 - v * v) / plan.sampling_bin_px, 0.0, static_cast<double>(inside.size() - 1));
+    const std::size_t i = std::min(static_cast<std::size_t>(bin), inside.size() - 2);
+    return share * (inside[i] + (bin - static_cast<double>(i)) * (inside[i + 1] - inside[i]));
+  };
+  const auto rays_of = [&](const DiscSquare& q) { return (rays_within(disc::v_in(q, 0)) - rays_within(disc::v_in(q, 1))) / disc::sectors(q.level); };
+
+  std::vector<DiscSquare> open;
+  for (int sector = 0; sector < disc::kSectors; ++sector)
+    for (int panel = 0; panel < disc::kPanels; ++panel) open.push_back({.level = 0, .panel = panel, .sector = sector});
+  double error = 0, smooth_error = 0, rays = 0, work = 0;
+  while (!open.empty()) {
+    std::vector<double> changes(open.size()), errors(open.size(), 0.0);
+    const int count = static_cast<int>(open.size());
+    parallel_for(count, 0, [&](int b) {
+      DiscSquare& q = open[static_cast<std::size_t>(b)];
+      q.steps = steps_of(q, changes[static_cast<std::size_t>(b)]);
+      q.smooth = rays_of(q) > PolarTable<Pack>::kRays;  // to be tried
+    });
+    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0, [&](int b, const Pack& v, const Pack& c, const Pack& s) { return image.light_at(v, c, s, uniform_mesh(open[static_cast<std::size_t>(b)].steps)); });
+    parallel_for(count, 0, [&](int b) {
+      const std::size_t i = static_cast<std::size_t>(b);
+      if (!open[i].smooth) return;
+      errors[i] = error_in(image, table, open[i], b);
+      open[i].smooth = errors[i] <= target;
+    });
+    std::vector<DiscSquare> next;
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      const DiscSquare& q = open[i];
+      if (!q.smooth && q.level + 1 < disc::kLevels && rays_of(q) > 4 * PolarTable<Pack>::kRays) {
+        for (const int down : {0, 1})
+          for (const int right : {0, 1}) next.push_back({.level = q.level + 1, .panel = 2 * q.panel + right, .sector = 2 * q.sector + down});
+        continue;
+      }
+      plan.disc.push_back(q);
+      error = std::max(error, changes[i]);
+      if (q.smooth) smooth_error = std::max(smooth_error, errors[i]);
+      const double here = q.smooth ? PolarTable<Pack>::kRays : rays_of(q);
+      rays += here;
+      work += here * q.steps;
+    }
+    open = std::move(next);
+  }
+  plan.numerical_error = error + smooth_error;
+  const auto [fewest, most] = std::minmax_element(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& a, const DiscSquare& b) { return a.steps < b.steps; });
+  const auto smooth = std::count_if(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.smooth; });
+  plan.reasons.push_back(fmt::format("steps by place on the disc, as its rays need: {} to {}, {:.0f} a ray in the mean", fewest->steps, most->steps, work / std::max(rays, 1.0)));
+  plan.reasons.push_back(fmt::format(
+      "the droplet does not look the same from all sides of the viewing axis: {} of {} parts of the disc are smooth enough to be interpolated from {} rays each{}, elsewhere one ray a point; {:.0f} rays instead of {:.0f}",
+      smooth, plan.disc.size(), PolarTable<Pack>::kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays, inside.back() * share));
+  plan.cost_seconds = 4e-9 * (60 * work + 25.0 * scene.view.width * scene.view.height);
+}
+
+bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before) {
+  if (now.empty() || before.empty()) return now.empty() != before.empty();
+  const DiscMap now_at(now), before_at(before);
+  for (std::size_t i = 0; i < now_at.cells().size(); ++i) {
+    const DiscSquare &a = now[static_cast<std::size_t>(now_at.cells()[i])], &b = before[static_cast<std::size_t>(before_at.cells()[i])];
+    if (a.steps > 1.25 * b.steps + 1 || (b.smooth && (!a.smooth || a.level > b.level))) return true;
+  }
+  return false;
+}
 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {

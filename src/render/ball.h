@@ -33,6 +33,12 @@ template <class S>
 Mat2<S> ball_jones(const BallOptics<S>&, const DropletRay<S>&, const S& cos_azimuth, const S& sin_azimuth, const TransportMethod<S>&, const Mesh&,
                    const S& p_scale);
 
+/// Divides the disc into squares with their own steps, and finds those that are smooth: interpolated to `target` of the incident
+/// intensity. To be called with method and samples planned; sets the error, too, and the cost.
+void plan_disc_squares(const Scene&, const Values<double>&, double target, RenderPlan& plan);
+/// See outgrown().
+bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before);
+
 template <class S>
 std::unique_ptr<PixelModel<S>> make_ball_model(const Scene&, const RenderPlan&, const Values<S>&);
 

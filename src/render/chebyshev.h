@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 
 namespace birefit {
 
@@ -35,6 +36,46 @@ const ChebyshevRule<kPoints>& chebyshev_rule() {
     return r;
   }();
   return rule;
+}
+/// Size of the two highest Chebyshev coefficients, along either coordinate and at most, of values at kPoints x kPoints points: how far the
+/// polynomials are from what they follow.
+template <int kPoints>
+double tail(const double* values) {
+  constexpr std::size_t n = static_cast<std::size_t>(kPoints);
+  static const std::array<std::array<double, n>, 2> weight = [] {
+    std::array<std::array<double, n>, 2> w;
+    for (std::size_t m = 0; m < 2; ++m)
+      for (std::size_t k = 0; k < n; ++k) w[m][k] = 2.0 / kPoints * std::cos((kPoints - 1.0 - static_cast<double>(m)) * std::numbers::pi * (static_cast<double>(k) + 0.5) / kPoints);
+    return w;
+  }();
+  double worst = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (const auto& [start, stride] : {std::pair{i * n, std::size_t{1}}, {i, n}}) {
+      double a[2] = {0, 0};
+      for (std::size_t m = 0; m < 2; ++m)
+        for (std::size_t k = 0; k < n; ++k) a[m] += weight[m][k] * values[start + k * stride];
+      const double here = std::abs(a[0]) + std::abs(a[1]);
+      if (!(here <= worst)) worst = here;  // not a number stays
+    }
+  return worst;
+}
+/// Values at kPoints x kPoints Chebyshev points, [second coordinate][first], to the coefficients of their powers, in the same order.
+template <int kPoints>
+void to_powers(const double* values, double* powers) {
+  const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();
+  constexpr std::size_t n = static_cast<std::size_t>(kPoints);
+  double half[n][n];
+  for (std::size_t r = 0; r < n; ++r)
+    for (std::size_t c = 0; c < n; ++c) {
+      half[r][c] = 0;
+      for (std::size_t k = 0; k < n; ++k) half[r][c] += rule.to_powers[c][k] * values[r * n + k];
+    }
+  for (std::size_t r = 0; r < n; ++r)
+    for (std::size_t c = 0; c < n; ++c) {
+      double sum = 0;
+      for (std::size_t k = 0; k < n; ++k) sum += rule.to_powers[r][k] * half[k][c];
+      powers[r * n + c] = sum;
+    }
 }
 
 }  // namespace birefit

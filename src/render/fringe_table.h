@@ -68,23 +68,8 @@ class FringeTable {
           }
         }
       }
-      // Values to powers, along the columns and then along the rows.
       double* out = coefficients_.data() + static_cast<std::size_t>(i) * kBlock;
-      for (int plane = 0; plane < kFields * kPlanes; ++plane) {
-        const double* v = values.data() + plane * kRays;
-        double half[kPoints][kPoints];
-        for (std::size_t r = 0; r < kPoints; ++r)
-          for (std::size_t c = 0; c < kPoints; ++c) {
-            half[r][c] = 0;
-            for (std::size_t k = 0; k < kPoints; ++k) half[r][c] += rule().to_powers[c][k] * v[r * kPoints + k];
-          }
-        for (std::size_t r = 0; r < kPoints; ++r)
-          for (std::size_t c = 0; c < kPoints; ++c) {
-            double sum = 0;
-            for (std::size_t k = 0; k < kPoints; ++k) sum += rule().to_powers[r][k] * half[k][c];
-            out[plane * kRays + static_cast<int>(r * kPoints + c)] = sum;
-          }
-      }
+      for (int plane = 0; plane < kFields * kPlanes; ++plane) to_powers<kPoints>(values.data() + plane * kRays, out + plane * kRays);
     });
   }
 

@@ -70,11 +70,13 @@ Pilots::Pilots(const Scene& scene, const Values<double>& value) {
 }
 
 double Pilots::error(const TransportMethod<double>& method, const Mesh& mesh, double enough) const {
-  double worst = 0;
-  for (const auto& ray : rays_) {
-    worst = std::max(worst, ray(method, mesh));
-    if (worst > enough) break;
-  }
+  // The ray that was too much for the last effort mostly is for the next.
+  double worst = rays_.empty() ? 0 : rays_[hardest_](method, mesh);
+  for (std::size_t i = 0; i < rays_.size() && !(worst > enough); ++i)
+    if (i != hardest_) {
+      worst = std::max(worst, rays_[i](method, mesh));
+      if (worst > enough) hardest_ = i;
+    }
   return worst;
 }
 

@@ -34,6 +34,7 @@ class Pilots {
   std::vector<std::function<double(const TransportMethod<double>&, const Mesh&)>> rays_;
   std::function<int(const TransportMethod<double>&, const Mesh&)> samples_;
   std::vector<double> breaks_;
+  mutable std::size_t hardest_ = 0;
 };
 
 /// The directions, as tan(incidence) (cos azimuth, sin azimuth), on which cells, plates and slabs are judged: of a list at

@@ -28,6 +28,7 @@ class Values {
     return value;
   }
   const Theta& theta() const { return theta_; }
+  const std::vector<int>& active() const { return active_; }
   /// The same values as another scalar.
   template <class T>
   Values<T> as() const { return {theta_, active_}; }

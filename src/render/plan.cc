@@ -127,6 +127,8 @@ void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double 
 /// Of the accuracy asked for: the table's error stays far below it, so that neither the image nor its slope shows the
 /// panels.
 constexpr double kTableShare = 1e-4;
+/// In two dimensions digits are dearer.
+constexpr double kPolarShare = 1e-2;
 
 /// One ray a radius instead of one a point, when that is fewer rays.
 void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
@@ -251,7 +253,6 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
                                                 : "the director leaves the plane of the ray: modes couple, so the full 2 x 2 transport is needed");
   plan.reasons.push_back(fmt::format("{}: {} steps, {} samples of the medium a ray, hold the intensity to {} on {} pilot rays (asked: {}); no method needs fewer",
                                      plan.method, plan.steps, effort.samples, sci(plan.numerical_error), pilots.size(), sci(scene.intensity_accuracy)));
-  plan.reasons.push_back("the droplet does not look the same from all sides of the viewing axis: one ray a point");
   const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.sphere.radius_um;
   const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
   if (bins > 100000) throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");
@@ -277,10 +278,14 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
   });
   plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel",
                                      *std::max_element(plan.samples.begin(), plan.samples.end())));
+  plan.cost_seconds = 1e-9 * scene.view.width * scene.view.height * (100 + 60 * plan.steps) * 4;
+  if (scene.method == "auto")
+    plan_disc_squares(scene, value, std::max(kPolarShare * scene.intensity_accuracy, 1e-10), plan);
+  else
+    plan.reasons.push_back("the droplet does not look the same from all sides of the viewing axis: one ray a point");
   plan.samples.push_back(1);  // outside
   note_rays(scene, value, o.sphere, plan);
   note_illumination(scene, value, largest_phase, plan);
-  plan.cost_seconds = 1e-9 * scene.view.width * scene.view.height * (100 + 60 * plan.steps) * 4;
   return plan;
 }
 

@@ -157,7 +157,7 @@ struct RayBench {
   /// The compiler must not drop the work.
   template <class T>
   static void keep(const T& value) {
-    static volatile double sink;
+    [[maybe_unused]] static volatile double sink;
     sink = lane(plain(value.a.re), 0);
   }
 };

@@ -201,6 +201,50 @@ void time_shell(int rounds) {
   std::printf("500 x 500 concentric shell, wall 1.3 um: %.2f ms\n", 1e3 * median(times));
 }
 
+/// Droplets that look different from all sides: full transport, tables over squares of the disc or a ray for every point.
+void time_unsymmetric(int rounds) {
+  for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 12", "eccentric shell"}) {
+    DropletScene s = droplet_scene(false, 500, 0.025);
+    Droplet& droplet = std::get<Droplet>(s.scene.sample);
+    if (name[0] == 'b') {
+      BipolarDirector bipolar;
+      bipolar.azimuth_deg = s.table.add_constant("azimuth_deg", 35);
+      bipolar.tilt_deg = s.table.add_constant("tilt_deg", 20);
+      droplet.director = bipolar;
+    } else if (name[0] == 'u') {
+      AxialDirector axial;
+      axial.reduced_field = s.table.add_constant("reduced_field", 12);
+      axial.ring_radius = s.table.add_constant("ring_radius", 0.9);
+      axial.field_azimuth_deg = s.table.add_constant("field_azimuth_deg", 35);
+      droplet.director = axial;
+    } else {
+      ShellDirector shell;
+      shell.wall_um = s.table.add_constant("wall_um", 1.3);
+      shell.offset_um = {s.table.add_constant("offset_x", 0.4), s.table.add_constant("offset_y", -0.2), s.table.add_constant("offset_z", 0.3)};
+      droplet.director = shell;
+    }
+    const Theta theta = s.table.values();
+    RenderPlan p;
+    const double planned = seconds_of([&] { p = plan(s.scene, theta); });
+    RenderPlan every = p;
+    for (DiscSquare& square : every.disc) square.smooth = false;
+    Rendering image, four, direct, direct_four;
+    std::vector<double> table, table_four, rays, rays_four;
+    for (int i = 0; i < std::max(3, rounds / 3); ++i) {
+      table.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, image); }));
+      table_four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four, 0, four); }));
+      rays.push_back(seconds_of([&] { render(s.scene, every, theta, {}, 0, direct); }));
+      rays_four.push_back(seconds_of([&] { render(s.scene, every, theta, s.four, 0, direct_four); }));
+    }
+    double error = 0;
+    for (std::size_t i = 0; i < image.intensity.values().size(); ++i) error = std::max(error, std::abs(image.intensity.values()[i] - direct.intensity.values()[i]));
+    std::printf("500 x 500 droplet, %s (%s, %d steps), planned in %.0f ms:\n", name, p.method.c_str(), p.steps, 1e3 * planned);
+    std::printf("  image                         %8.2f ms   with four derivatives %.2f ms, %.2f times\n", 1e3 * median(table), 1e3 * median(table_four), median(table_four) / median(table));
+    std::printf("  a ray for every point         %8.2f ms   with four derivatives %.2f ms, %.2f times; differs by %.1e\n", 1e3 * median(rays), 1e3 * median(rays_four),
+                median(rays_four) / median(rays), error);
+  }
+}
+
 /// A whole fit: size x size pixels, six free parameters, the scan included.
 void time_fit(int size, int rounds) {
   const double scale = 256.0 / size;
@@ -293,6 +337,7 @@ int main(int argc, char** argv) {
   }
 
   time_shell(rounds);
+  time_unsymmetric(rounds);
   const auto peak_mb = [] {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);

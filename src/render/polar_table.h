@@ -1,0 +1,235 @@
+#pragma once
+// Light behind a sphere that looks different from all sides: smooth over most of its disc, so that rays at a few thousand
+// points serve any number of pixels. The squares lie in coordinates of the disc, not of the picture: they go where it goes
+// and grow as it grows.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "core/threads.h"
+#include "render/chebyshev.h"
+#include "render/pixel_model.h"
+
+namespace birefit {
+
+/// The disc's coordinates: v = sqrt(1 - rho/edge), 0 at the rim, where light ends like that root, and turn: y/x and -x/y in turn,
+/// from -1 to 1 in each quarter that is centred on half an axis; an angle without a trigonometric function, 8 a full turn.
+namespace disc {
+constexpr int kPanels = 4, kSectors = 8, kLevels = 4;  ///< squares of level 0; level l has 2^l times as many along either
+constexpr int panels(int level) { return kPanels << level; }
+constexpr int sectors(int level) { return kSectors << level; }
+
+/// Also with lanes; (0, 0) lies on the positive x axis.
+template <class P>
+P turn_of(const P& x, const P& y, P& inverse_major) {
+  const P ax = max_of(x, -x), ay = max_of(y, -y);
+  const auto flat = ax >= ay;
+  const P major = select(flat, x, y), there = max_of(ax, ay);
+  inverse_major = inverse(select(there < P(1e-100), P(1.0), major));
+  const P quarter = select(flat, select(x < P(0.0), P(2.0), P(0.0)), select(y < P(0.0), P(3.0), P(1.0)));
+  return P(2.0) * quarter + P(1.0) + select(flat, y, -x) * inverse_major;
+}
+inline void direction_of(double turn, double& c, double& s) {
+  const int quarter = std::clamp(static_cast<int>(turn / 2), 0, 3);
+  const double u = turn - 2 * quarter - 1, f = 1 / std::sqrt(1 + u * u);
+  const double cs[4] = {f, -u * f, -f, u * f}, sn[4] = {u * f, f, -u * f, -f};
+  c = cs[quarter];
+  s = sn[quarter];
+}
+/// The place (across, around), each from 0 to 1, in a square.
+inline double v_in(const DiscSquare& q, double across) { return (q.panel + across) / panels(q.level); }
+inline double turn_in(const DiscSquare& q, double around) { return (q.sector + around) * 8 / sectors(q.level); }
+}  // namespace disc
+
+/// Which square of a list a place of the disc lies in: by the squares of the finest level.
+class DiscMap {
+ public:
+  DiscMap() = default;
+  explicit DiscMap(const std::vector<DiscSquare>& squares) : at_(static_cast<std::size_t>(kAcross * kAround), -1) {
+    for (std::size_t i = 0; i < squares.size(); ++i) {
+      const DiscSquare& q = squares[i];
+      const int size = 1 << (disc::kLevels - 1 - q.level);
+      for (int r = q.sector * size; r < (q.sector + 1) * size; ++r)
+        for (int c = q.panel * size; c < (q.panel + 1) * size; ++c) at_[static_cast<std::size_t>(r * kAcross + c)] = static_cast<int>(i);
+    }
+  }
+  /// The square's number in the list, -1 where none covers the place, one a lane.
+  template <class P>
+  P find(const P& v, const P& turn) const {
+    using std::floor;
+    const P column = min_of(max_of(floor(v * P(kAcross)), P(0.0)), P(kAcross - 1.0)), row = min_of(max_of(floor(turn * P(kAround / 8.0)), P(0.0)), P(kAround - 1.0));
+    const P cell = column + P(kAcross) * row;
+    if constexpr (std::is_same_v<P, Pack>) {
+      alignas(64) double which[kLanes];
+      for (int k = 0; k < kLanes; ++k) which[k] = at_[static_cast<std::size_t>(lane(cell, k))];
+      return Pack::load_aligned(which);
+    } else {
+      return at_[static_cast<std::size_t>(cell)];
+    }
+  }
+  const std::vector<int>& cells() const { return at_; }
+
+ private:
+  static constexpr int kAcross = disc::panels(disc::kLevels - 1), kAround = disc::sectors(disc::kLevels - 1);
+  std::vector<int> at_;
+};
+
+/// f(value, lanes that have it) for every value among the lanes where `here`, from the smallest on, as long as f returns true; whether it always did.
+template <class P, class Mask, class F>
+bool for_each_value(const P& values, const Mask& here, const F& f) {
+  const P of_interest = select(here, values, P(1e300));
+  for (double next = smallest(of_interest); next < 1e300; next = smallest(select(of_interest > P(next), of_interest, P(1e300))))
+    if (!f(next, of_interest == P(next))) return false;
+  return true;
+}
+
+/// Polynomials of degree 11 in v and in turn through 12 x 12 Chebyshev points of every smooth square. Derivatives by parameters
+/// are tabulated beside the values, those by place come from the polynomials.
+template <class S>
+class PolarTable {
+ public:
+  static constexpr int kPoints = 12;
+  static constexpr int kRays = kPoints * kPoints;
+  using P = PlainOf<S>;
+
+  PolarTable() = default;
+  /// light(square, v, cos, sin of the azimuth) at points of the disc, one a lane. What was smooth when it was planned need not be: a core's
+  /// edge, a pole may have come in since. Squares whose tail (chebyshev.h) exceeds `allowed` are left to rays.
+  template <class Light>
+  PolarTable(const std::vector<DiscSquare>& squares, double allowed, int threads, const Light& light) : squares_(squares), start_(squares.size(), -1) {
+    std::vector<int> list;
+    for (std::size_t b = 0; b < squares.size(); ++b)
+      if (squares[b].smooth) {
+        start_[b] = static_cast<int>(list.size());
+        list.push_back(static_cast<int>(b));
+      }
+    coefficients_.resize(list.size() * kPlanes * kRays);
+    parallel_for(static_cast<int>(list.size()), threads, [&](int i) {
+      const int b = list[static_cast<std::size_t>(i)];
+      const DiscSquare& square = squares_[static_cast<std::size_t>(b)];
+      std::vector<double> values(kPlanes * kRays);
+      constexpr int kStep = kLanesOf<S>;
+      for (int first = 0; first < kRays; first += kStep) {
+        alignas(64) double v[kLanes], c[kLanes], s[kLanes];
+        for (int k = 0; k < kStep; ++k) {
+          const std::size_t n = static_cast<std::size_t>(std::min(first + k, kRays - 1));
+          v[k] = disc::v_in(square, 0.5 + 0.5 * rule().x[n % kPoints]);
+          disc::direction_of(disc::turn_in(square, 0.5 + 0.5 * rule().x[n / kPoints]), c[k], s[k]);
+        }
+        S value;
+        if constexpr (kStep == 1)
+          value = light(b, v[0], c[0], s[0]);
+        else
+          value = light(b, Pack::load_aligned(v), Pack::load_aligned(c), Pack::load_aligned(s));
+        for (int k = 0; k < std::min(kStep, kRays - first); ++k) {
+          double* to = values.data() + first + k;
+          to[0] = lane(plain(value), k);
+          if constexpr (kPlanes > 1)
+            for (int j = 1; j < kPlanes; ++j) to[j * kRays] = lane(value.d[static_cast<std::size_t>(j - 1)], k);
+        }
+      }
+      if (!(tail<kPoints>(values.data()) <= allowed)) {
+        start_[static_cast<std::size_t>(b)] = -1;
+        return;
+      }
+      for (int plane = 0; plane < kPlanes; ++plane)
+        to_powers<kPoints>(values.data() + plane * kRays, coefficients_.data() + (static_cast<std::size_t>(i) * kPlanes + static_cast<std::size_t>(plane)) * kRays);
+    });
+    // Parameters that only move the disc have nothing here.
+    for (int plane = 1; plane < kPlanes; ++plane) {
+      double most = 0;
+      for (std::size_t i = 0; i < list.size(); ++i) {
+        const double* c = coefficients_.data() + (i * kPlanes + static_cast<std::size_t>(plane)) * kRays;
+        most = std::max(most, std::abs(*std::max_element(c, c + kRays, [](double x, double y) { return std::abs(x) < std::abs(y); })));
+      }
+      if (most > 0) live_[static_cast<std::size_t>(count_++)] = plane;
+    }
+  }
+
+  /// A table with fewer derivatives as one with more: plane j + 1 of it is plane to[j] + 1 of this.
+  template <class T>
+  PolarTable(const PolarTable<T>& narrow, const std::vector<int>& to) : squares_(narrow.squares_), start_(narrow.start_) {
+    constexpr std::size_t rays = static_cast<std::size_t>(kRays), from_planes = static_cast<std::size_t>(PolarTable<T>::kPlanes);
+    const std::size_t blocks = narrow.coefficients_.size() / (from_planes * rays);
+    coefficients_.resize(blocks * kPlanes * rays);
+    for (std::size_t b = 0; b < blocks; ++b)
+      for (std::size_t plane = 0; plane <= to.size(); ++plane)
+        std::copy_n(narrow.coefficients_.data() + (b * from_planes + plane) * rays, rays,
+                    coefficients_.data() + (b * kPlanes + (plane == 0 ? 0 : static_cast<std::size_t>(to[plane - 1]) + 1)) * rays);
+    for (int k = 0; k < narrow.count_; ++k) live_[static_cast<std::size_t>(count_++)] = to[static_cast<std::size_t>(narrow.live_[static_cast<std::size_t>(k)] - 1)] + 1;
+  }
+
+  bool empty() const { return coefficients_.empty(); }
+  /// The light at v, turn where `here`, square by DiscMap::find; false, where one of these lanes lies in a square that is not smooth.
+  template <class Mask>
+  bool read(const P& square, const S& v, const S& turn, const Mask& here, S& out) const {
+    out = S(0.0);
+    // Lanes are neighbours in the picture and mostly lie in one square: its coefficients are single numbers for all of them.
+    return for_each_value(square, here, [&](double number, const auto& in_it) {
+      const int start = start_[static_cast<std::size_t>(number)];
+      if (start < 0) return false;
+      const DiscSquare& q = squares_[static_cast<std::size_t>(number)];
+      const double across = 2.0 * disc::panels(q.level), around = 0.25 * disc::sectors(q.level);
+      add(coefficients_.data() + static_cast<std::size_t>(start) * (kPlanes * kRays), plain(v) * P(across) - P(2.0 * q.panel + 1), plain(turn) * P(around) - P(2.0 * q.sector + 1), across, around,
+          v, turn, in_it, out);
+      return true;
+    });
+  }
+
+ private:
+  template <class T>
+  friend class PolarTable;
+  static constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
+
+  /// x, y: the place in the square, each from -1 to 1; across, around: how fast they go with v and turn.
+  template <class Mask>
+  void add(const double* c, const P& x, const P& y, [[maybe_unused]] double across, [[maybe_unused]] double around, [[maybe_unused]] const S& v, [[maybe_unused]] const S& turn, const Mask& in_it, S& out) const {
+    if constexpr (kPlanes == 1) {
+      out = select(in_it, polynomial(c, x, y), out);
+    } else {
+      P value(0.0), by_x(0.0), by_y(0.0);
+      for (int j = kPoints - 1; j >= 0; --j) {
+        const double* row = c + j * kPoints;
+        P f(row[kPoints - 1]), slope(0.0);
+        for (int i = kPoints - 2; i >= 0; --i) {
+          slope = slope * x + f;
+          f = f * x + P(row[i]);
+        }
+        by_y = by_y * y + value;
+        value = value * y + f;
+        by_x = by_x * y + slope;
+      }
+      by_x = by_x * P(across);
+      by_y = by_y * P(around);
+      out.value = select(in_it, value, out.value);
+      std::array<P, static_cast<std::size_t>(kPlanes)> d;
+      for (std::size_t j = 1; j < d.size(); ++j) d[j] = by_x * v.d[j - 1] + by_y * turn.d[j - 1];
+      for (int k = 0; k < count_; ++k) {
+        const int j = live_[static_cast<std::size_t>(k)];
+        d[static_cast<std::size_t>(j)] = d[static_cast<std::size_t>(j)] + polynomial(c + j * kRays, x, y);
+      }
+      for (std::size_t j = 1; j < d.size(); ++j) out.d[j - 1] = select(in_it, d[j], out.d[j - 1]);
+    }
+  }
+  static P polynomial(const double* c, const P& x, const P& y) {
+    P value(0.0);
+    for (int j = kPoints - 1; j >= 0; --j) {
+      const double* row = c + j * kPoints;
+      P f(row[kPoints - 1]);
+      for (int i = kPoints - 2; i >= 0; --i) f = f * x + P(row[i]);
+      value = value * y + f;
+    }
+    return value;
+  }
+  static const ChebyshevRule<kPoints>& rule() { return chebyshev_rule<kPoints>(); }
+
+  std::vector<DiscSquare> squares_;
+  std::vector<int> start_;            ///< place among the coefficients, -1 = not smooth
+  std::vector<double> coefficients_;  ///< [smooth square][plane][power of turn][power of v], plane 0 the value
+  std::array<int, static_cast<std::size_t>(kPlanes)> live_{};  ///< derivatives that do not vanish
+  int count_ = 0;
+};
+
+}  // namespace birefit
