@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "core/scalar.h"
@@ -77,9 +78,10 @@ class RadialTable {
         if (size[static_cast<std::size_t>(f)] > 1e-15 * all) live = f + 1;
       if (plane == 0)
         live_ = live;
-      else if (live > 0)
+      else if (live > 0 && !combination(values, points * static_cast<std::size_t>(functions), static_cast<int>(plane) - 1))
         (live <= 1 ? of_one_ : live <= 3 ? of_three_ : of_all_).add(static_cast<int>(plane) - 1);
     }
+    directions_.clear();
   }
 
   /// sum_k basis[k] f_k(v) over the F functions that were tabulated, with its derivatives at fixed basis; with `turned`
@@ -94,6 +96,43 @@ class RadialTable {
 
  private:
   static constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
+  /// Light knows fewer quantities than a scene has parameters: it does not tell size from wavelength, nor indices that all grow from
+  /// a shorter wavelength. A derivative that is a combination of earlier ones (to rounding, on all points) is not read but combined.
+  bool combination(const std::vector<double>& values, std::size_t size, int j) {
+    const auto plane = [&](int k) { return values.data() + (static_cast<std::size_t>(k) + 1) * size; };
+    std::vector<double> rest(plane(j), plane(j) + size);
+    const auto dot = [&](const double* a, const double* b) { return std::inner_product(a, a + size, b, 0.0); };
+    const double norm = std::sqrt(dot(rest.data(), rest.data()));
+    std::array<double, kPlanes> weights{};
+    // Twice: what rounding left the first time.
+    for (int pass = 0; pass < 2; ++pass)
+      for (const Direction& d : directions_) {
+        const double along = dot(d.values.data(), rest.data());
+        for (std::size_t i = 0; i < size; ++i) rest[i] -= along * d.values[i];
+        for (std::size_t k = 0; k < weights.size(); ++k) weights[k] += along * d.weights[k];
+      }
+    const double left = std::sqrt(dot(rest.data(), rest.data()));
+    if (!directions_.empty() && left <= 1e-11 * norm) {
+      for (int k = 0; k < j; ++k)
+        if (const double w = weights[static_cast<std::size_t>(k)]; w != 0) combined_.push_back({j, k, w});
+      return true;
+    }
+    Direction d{std::move(rest), {}};
+    for (double& x : d.values) x /= left;
+    for (std::size_t k = 0; k < weights.size(); ++k) d.weights[k] = -weights[k] / left;
+    d.weights[static_cast<std::size_t>(j)] = 1 / left;
+    directions_.push_back(std::move(d));
+    return false;
+  }
+  /// A unit vector among the derivatives' values, and which sum of derivatives it is.
+  struct Direction {
+    std::vector<double> values;
+    std::array<double, kPlanes> weights{};
+  };
+  struct Combined {
+    int plane, of;
+    double weight;
+  };
   struct Planes {
     std::array<int, kPlanes> list{};
     int count = 0;
@@ -120,12 +159,13 @@ class RadialTable {
   }
   /// Adds the derivatives of which the first L functions are not negligible, contracted with the basis.
   template <int L>
-  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const P& x, const P* basis, S& total) const {
+  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const P& x, const P* basis, S& total, P* read) const {
     for (int i = 0; i < planes.count; ++i) {
       const int j = planes.list[static_cast<std::size_t>(i)];
       P f[L];
       horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * plane_, x, f, nullptr);
-      total.d[j] = total.d[j] + contract<L>(basis, f);
+      read[j] = contract<L>(basis, f);
+      total.d[j] = total.d[j] + read[j];
     }
   }
   template <int L, int F>
@@ -159,9 +199,11 @@ class RadialTable {
       S total(contract<L>(basis, value));
       const P along = contract<L>(basis, slope) * P(2.0 * panels_);
       for (std::size_t j = 0; j + 1 < kPlanes; ++j) total.d[j] = along * v.d[j];
-      add_planes<1>(of_one_, c, x, basis, total);
-      add_planes<(F > 3 ? 3 : F)>(of_three_, c, x, basis, total);
-      add_planes<F>(of_all_, c, x, basis, total);
+      P read[kPlanes - 1];
+      add_planes<1>(of_one_, c, x, basis, total, read);
+      add_planes<(F > 3 ? 3 : F)>(of_three_, c, x, basis, total, read);
+      add_planes<F>(of_all_, c, x, basis, total, read);
+      for (const Combined& w : combined_) total.d[w.plane] = total.d[w.plane] + P(w.weight) * read[w.of];
       return total;
     }
   }
@@ -170,7 +212,9 @@ class RadialTable {
   std::size_t plane_ = 0;                  ///< places of all functions of a plane
   std::vector<double> coefficients_;       ///< [panel][plane][function][power], plane 0 the value
   int live_ = 0;                           ///< functions up to the last whose values are not negligible
-  Planes of_one_, of_three_, of_all_;      ///< derivatives of which the first one, three, all functions are not negligible
+  std::vector<Direction> directions_;      ///< of the derivatives that are read; only while the table is made
+  std::vector<Combined> combined_;         ///< derivatives that are not read
+  Planes of_one_, of_three_, of_all_;      ///< read derivatives of which the first one, three, all functions are not negligible
 };
 
 }  // namespace birefit

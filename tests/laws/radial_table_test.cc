@@ -56,7 +56,9 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
     s.view.pixel_size_um = 0.07;
     s.view.center_x_px = b.fixed("center_x", 80.3);
     s.view.center_y_px = b.fixed("center_y", 78.9);
-    std::vector<int> by{droplet.diameter_um.index, material.birefringence.index, s.view.center_x_px.index, s.surround_index.index};
+    std::vector<int> by{droplet.diameter_um.index, material.birefringence.index, s.view.center_x_px.index, s.surround_index.index,
+                        // Two combinations of the others: light knows sizes and indices in wavelengths only.
+                        material.ordinary.index, s.microscope.wavelength_nm.index};
     if (c.wall_um > 0) by.push_back(std::get<ShellDirector>(droplet.director).wall_um.index);
     const Theta theta = b.table.values();
     const RenderPlan table = plan(s, theta);

@@ -203,7 +203,7 @@ void time_shell(int rounds) {
 
 /// Droplets that look different from all sides: full transport, tables over squares of the disc or a ray for every point.
 void time_unsymmetric(int rounds) {
-  for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 12", "eccentric shell"}) {
+  for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 3", "eccentric shell"}) {
     DropletScene s = droplet_scene(false, 500, 0.025);
     Droplet& droplet = std::get<Droplet>(s.scene.sample);
     if (name[0] == 'b') {
@@ -213,8 +213,7 @@ void time_unsymmetric(int rounds) {
       droplet.director = bipolar;
     } else if (name[0] == 'u') {
       AxialDirector axial;
-      axial.reduced_field = s.table.add_constant("reduced_field", 12);
-      axial.ring_radius = s.table.add_constant("ring_radius", 0.9);
+      axial.reduced_field = s.table.add_constant("reduced_field", 3);
       axial.field_azimuth_deg = s.table.add_constant("field_azimuth_deg", 35);
       droplet.director = axial;
     } else {
