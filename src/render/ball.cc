@@ -121,15 +121,24 @@ class BallImage final : public PixelModel<S> {
     const S between = light_.px * light_.ax + light_.py * light_.ay;
     open_ = between * between;
     // A field along an axis in the image plane is turned into itself.
-    const auto in_plane = [](const auto& field) {
+    const auto turned = [](const auto& field) {
       if constexpr (requires { field.axis; })
         return stays_at(field.axis.z, 0.0);
       else
         return false;
     };
-    half_turn_ = centred(scene, center_x_, center_y_) && std::visit(in_plane, optics_.field);
+    const auto reflected = [](const auto& field) {
+      if constexpr (requires { field.axis; })
+        return mirrored(field.axis.x, field.axis.y, field.axis.z);
+      else
+        return stays_at(field.offset.y, 0.0);
+    };
+    if (centred(scene, center_x_, center_y_) && std::visit(turned, optics_.field))
+      symmetry_ = Symmetry::half_turn;
+    else if (on_middle_row(scene, center_y_) && along_axes(light_) && std::visit(reflected, optics_.field))
+      symmetry_ = Symmetry::mirror;
   }
-  bool half_turn() const override { return half_turn_; }
+  Symmetry symmetry() const override { return symmetry_; }
   S intensity(const P& column, const P& row) const override {
     const S x = (column - center_x_) * pixel_um_, y = (center_y_ - row) * pixel_um_;
     const S rho2 = x * x + y * y + 1e-18, over = inverse_root(rho2), rho = rho2 * over;
@@ -218,7 +227,8 @@ class BallImage final : public PixelModel<S> {
   const TransportMethod<S>& method_;
   std::vector<Mesh> meshes_;         ///< from the fewest steps on
   std::vector<std::size_t> mesh_of_; ///< which of them, by square of the disc; none: the first
-  bool aplanatic_, half_turn_;
+  bool aplanatic_;
+  Symmetry symmetry_ = Symmetry::none;
   Polarizers<S> light_;
   double pixel_um_;
   S center_x_, center_y_, edge_um_, inverse_edge_, open_;

@@ -249,7 +249,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
   }
   sin_cos(sum_rad_, sin_sum_, cos_sum_);
   sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
-  centred_ = centred(scene, center_x_, center_y_);
+  symmetry_ = round_symmetry(scene, value, optics_.coupled());
   shell_ = optics_.director == DropletOptics<S>::Director::shell;
   if (shell_) {
     core_um_ = core_edge(optics_, rim_);

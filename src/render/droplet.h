@@ -139,7 +139,7 @@ class DropletImage final : public PixelModel<S> {
   DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value);
   void tabulate(PixelModel<S>::Wanted, int threads) override;
   S intensity(const P& column, const P& row) const override;
-  bool half_turn() const override { return centred_; }
+  Symmetry symmetry() const override { return symmetry_; }
   /// The image is sum_k basis_k(azimuth) f_k(radius). Tables hold the f_k in two parts, each over v in [0, 1]: the
   /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim; of a shell what is seen
   /// through the core, up to the kink at its edge, and what is seen beside it.
@@ -165,7 +165,8 @@ class DropletImage final : public PixelModel<S> {
   RimTable rim_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  bool aplanatic_, centred_, shell_;
+  bool aplanatic_, shell_;
+  Symmetry symmetry_;
   std::shared_ptr<const EikonalFan> fan_p_, fan_s_;  ///< of curved rays; else none
   double objective_na_;
   S cos_between_, sin_between_, cos_sum_, sin_sum_, sum_rad_;  ///< of analyser - polarizer, of analyser + polarizer

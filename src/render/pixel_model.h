@@ -49,6 +49,9 @@ inline constexpr bool kForTablesOnly = (ScalarTraits<S>::derivatives > 4);
 template <class S>
 inline constexpr int kLanesOf = std::is_same_v<PlainOf<S>, Pack> ? kLanes : 1;
 
+/// What leaves a picture as it is: half a turn about its middle, or a mirror that exchanges its upper and its lower half.
+enum class Symmetry { none, half_turn, mirror };
+
 /// Intensity at image points (pixel units; docs/conventions.md), one a lane.
 template <class S>
 class PixelModel {
@@ -59,8 +62,8 @@ class PixelModel {
   virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
-  /// The picture is its own image under half a turn about its middle, and so is every derivative.
-  virtual bool half_turn() const { return false; }
+  /// Of the picture and every derivative.
+  virtual Symmetry symmetry() const { return Symmetry::none; }
   enum class Wanted { points, picture };
   /// Once, before the first point: makes the tables that pay for what is wanted.
   virtual void tabulate(Wanted, int /*threads*/) {}
@@ -74,10 +77,14 @@ bool stays_at(const S& x, double value) {
     for (const auto& d : x.d) stays = stays && lane(d, 0) == 0;
   return stays;
 }
-/// The axis of the microscope meets the middle of the picture.
+/// The axis of the microscope meets the middle row, the middle of the picture.
+template <class S>
+bool on_middle_row(const Scene& scene, const S& center_y_px) {
+  return stays_at(center_y_px, 0.5 * (scene.view.height - 1));
+}
 template <class S>
 bool centred(const Scene& scene, const S& center_x_px, const S& center_y_px) {
-  return stays_at(center_x_px, 0.5 * (scene.view.width - 1)) && stays_at(center_y_px, 0.5 * (scene.view.height - 1));
+  return stays_at(center_x_px, 0.5 * (scene.view.width - 1)) && on_middle_row(scene, center_y_px);
 }
 
 /// 2 pi / wavelength in 1/um.
@@ -107,6 +114,25 @@ Polarizers<S> polarizers(const Scene& scene, const Values<S>& value) {
   sin_cos(value.radians(scene.microscope.polarizer_deg), r.py, r.px);
   sin_cos(value.radians(scene.microscope.analyzer_deg), r.ay, r.ax);
   return r;
+}
+
+/// Both along x or y: a mirror in either turns no more than the sign of what passes.
+template <class S>
+bool along_axes(const Polarizers<S>& p) {
+  return stays_at(S(p.px * p.py), 0.0) && stays_at(S(p.ax * p.ay), 0.0);
+}
+/// A line's direction that a mirror y -> -y leaves as it is.
+template <class S>
+bool mirrored(const S& x, const S& y, const S& z) {
+  return stays_at(y, 0.0) || (stays_at(x, 0.0) && stays_at(z, 0.0));
+}
+
+/// Of a sample that looks the same from all sides of the viewing axis; twisted, it is not its mirror image.
+template <class S>
+Symmetry round_symmetry(const Scene& scene, const Values<S>& value, bool twisted) {
+  const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
+  if (centred(scene, center_x, center_y)) return Symmetry::half_turn;
+  return !twisted && on_middle_row(scene, center_y) && along_axes(polarizers(scene, value)) ? Symmetry::mirror : Symmetry::none;
 }
 
 /// One file a sample kind. `plan` must be of the same scene.

@@ -752,11 +752,10 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
   return result;
 }
 
-bool has_half_turn(const Scene& scene, const RenderPlan& plan, const Values<double>& value) {
-  if (!std::holds_alternative<Droplet>(scene.sample) && !cone_half_angle(scene)) return false;
-  if (!centred(scene, value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1)), value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1))))
-    return false;
-  return make_pixel_model<double>(scene, plan, value)->half_turn();
+Symmetry symmetry_of(const Scene& scene, const RenderPlan& plan, const Values<double>& value) {
+  if (!std::holds_alternative<Droplet>(scene.sample) && !cone_half_angle(scene)) return Symmetry::none;
+  if (!on_middle_row(scene, value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1)))) return Symmetry::none;
+  return make_pixel_model<double>(scene, plan, value)->symmetry();
 }
 
 /// What the literature's birefringence is off by.
@@ -814,7 +813,9 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     result = plan_planar(scene, value);
   }
   note_material(scene, theta, result);
-  if (!result.wave && has_half_turn(scene, result, value)) result.reasons.push_back("half a turn about the viewing axis leaves the picture as it is: half of it is computed");
+  const Symmetry symmetry = result.wave ? Symmetry::none : symmetry_of(scene, result, value);
+  if (symmetry == Symmetry::half_turn) result.reasons.push_back("half a turn about the viewing axis leaves the picture as it is: half of it is computed");
+  if (symmetry == Symmetry::mirror) result.reasons.push_back("the lower half of the picture is the upper one's mirror image: half of it is computed");
   result.physics = scene.ceiling == Ceiling::e_only        ? "e_only"
                    : scene.ceiling == Ceiling::reflections ? "reflections"
                    : scene.ceiling == Ceiling::wave        ? "wave"

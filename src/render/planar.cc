@@ -88,16 +88,14 @@ std::optional<Mat2<S>> compensator(const Scene& scene, const Values<S>& value) {
   return Mat2<S>{{c, s * along}, {S(0.0), s * across}, {S(0.0), s * across}, {c, -(s * along)}};
 }
 
-/// Half a turn about z leaves the medium as it is, at the nodes and in the middle of every step: axes across z or along it.
-template <class S>
-bool turns_into_itself(const Column<S>& column, const Mesh& mesh) {
+/// Whether something holds at the nodes and in the middle of every step.
+template <class S, class Holds>
+bool axes_all(const Column<S>& column, const Mesh& mesh, const Holds& holds) {
   Mesh places(mesh);
   for (std::size_t i = 0; i + 1 < mesh.size(); ++i) places.push_back(0.5 * (mesh[i] + mesh[i + 1]));
   std::vector<OpticalPoint<S>> points(places.size());
   column.sample(places, points.data());
-  return std::all_of(points.begin(), points.end(), [](const OpticalPoint<S>& p) {
-    return stays_at(p.axis.z, 0.0) || (stays_at(p.axis.x, 0.0) && stays_at(p.axis.y, 0.0));
-  });
+  return std::all_of(points.begin(), points.end(), holds);
 }
 
 template <class S>
@@ -131,8 +129,14 @@ class PlanarModel final : public PixelModel<S> {
     constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
     if (plan.fringe_means) planar_fringe(optics_, coupling_, mesh_, polarizers_, tx, ty);
     optics_.column->freeze();
-    half_turn_ = conoscopic_ && centred(scene, center_x_, center_y_) && turns_into_itself(*optics_.column, mesh_);
-    if (half_turn_ && !tabulated_blocks_.empty())  // the lower half of a picture is copied
+    if (conoscopic_ && centred(scene, center_x_, center_y_) && axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) {
+          return stays_at(p.axis.z, 0.0) || (stays_at(p.axis.x, 0.0) && stays_at(p.axis.y, 0.0));
+        }))
+      symmetry_ = Symmetry::half_turn;
+    else if (conoscopic_ && on_middle_row(scene, center_y_) && along_axes(polarizers_) && !compensator_ &&
+             axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) { return mirrored(p.axis.x, p.axis.y, p.axis.z); }))
+      symmetry_ = Symmetry::mirror;
+    if (symmetry_ != Symmetry::none && !tabulated_blocks_.empty())  // the lower half of a picture is copied
       for (int b = 0; b < blocks_.count(); ++b)
         if ((b / blocks_.columns) * blocks_.block_px > scene.view.height / 2 + 2) tabulated_blocks_[static_cast<std::size_t>(b)] = 0;
   }
@@ -147,7 +151,7 @@ class PlanarModel final : public PixelModel<S> {
     return fringe_of_ray(column, row);
   }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
-  bool half_turn() const override { return half_turn_; }
+  Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture || tabulated_blocks_.empty()) return;
     table_ = FringeTable<S>(blocks_, tabulated_blocks_, threads, [this](const P& column, const P& row) { return fringe_of_ray(column, row); });
@@ -168,7 +172,8 @@ class PlanarModel final : public PixelModel<S> {
   Mesh mesh_;
   Polarizers<S> polarizers_;
   std::optional<Mat2<S>> compensator_;
-  bool coupling_, conoscopic_ = false, half_turn_ = false;
+  bool coupling_, conoscopic_ = false;
+  Symmetry symmetry_ = Symmetry::none;
   FringeBlocks blocks_;
   std::vector<std::uint8_t> tabulated_blocks_;
   FringeTable<S> table_;

@@ -200,8 +200,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     Image& image = *images[static_cast<std::size_t>(p)];
     if (image.width() != w || image.height() != h) image = Image(w, h);
   });
-  const bool half_turn = model->half_turn();
-  const int computed = half_turn ? (h + 1) / 2 : h;  // rows; the others are copied
+  const Symmetry symmetry = model->symmetry();
+  const int computed = symmetry != Symmetry::none ? (h + 1) / 2 : h;  // rows; the others are copied
   parallel_for((computed + Band::kRows - 1) / Band::kRows, threads, [&](int b) {
     thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
     thread_local NeededPoints needed;
@@ -274,10 +274,15 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       for (std::size_t most = 2; most < 9; ++most)
         if (count[most] > 0) flush(most);
     }
-    if (half_turn)
-      for (int row = top; row < top + rows; ++row)
-        if (const int turned = h - 1 - row; turned != row)
-          for (Image* image : images) std::reverse_copy(image->row(row), image->row(row) + w, image->row(turned));
+    if (symmetry == Symmetry::none) return;
+    for (int row = top; row < top + rows; ++row)
+      if (const int other = h - 1 - row; other != row)
+        for (Image* image : images) {
+          if (symmetry == Symmetry::half_turn)
+            std::reverse_copy(image->row(row), image->row(row) + w, image->row(other));
+          else
+            std::copy(image->row(row), image->row(row) + w, image->row(other));
+        }
   });
 }
 

@@ -49,7 +49,7 @@ class SeriesImage final : public PixelModel<S> {
         pixel_um_(scene.view.pixel_size_um),
         center_x_(value(scene.view.center_x_px)),
         center_y_(value(scene.view.center_y_px)) {
-    centred_ = centred(scene, center_x_, center_y_);
+    symmetry_ = round_symmetry(scene, value, false);
     sin_cos(sum_rad_, sin_sum_, cos_sum_);
     S unused;
     sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), unused, cos_between_);
@@ -92,7 +92,7 @@ class SeriesImage final : public PixelModel<S> {
     });
   }
 
-  bool half_turn() const override { return centred_; }
+  Symmetry symmetry() const override { return symmetry_; }
 
   // Behind the analyser the field is (1 + A0) cos(analyser - polarizer) + A2 q, q = cos(2 azimuth - analyser - polarizer).
   S intensity(const P& column, const P& row) const override {
@@ -152,7 +152,7 @@ class SeriesImage final : public PixelModel<S> {
   S focus_um_, sum_rad_, cos_sum_, sin_sum_, cos_between_;
   double pixel_um_;
   S center_x_, center_y_;
-  bool centred_;
+  Symmetry symmetry_;
   RadialSeries<Single> series_;
   RadialTable<S> table_;
 };

@@ -19,7 +19,7 @@
 #include "birefit/render.h"
 #include "independent_droplet.h"
 #include "medium/families/radial.h"
-#include "render/pixel_model.h"
+#include "render/droplet.h"
 #include "transport/one_way.h"
 
 namespace birefit {
@@ -94,9 +94,9 @@ DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
   return s;
 }
 
-/// Points inside the droplet of which a picture's rays are traced.
-double rays_in_picture(const Scene& scene, const RenderPlan& plan, double radius_um) {
-  const double radius_px = radius_um / scene.view.pixel_size_um;
+/// Points inside the droplet's image (refraction makes it larger than the droplet) of which a picture's rays are traced.
+double rays_in_picture(const Scene& scene, const RenderPlan& plan, double radius_um, double index_ratio, double host_index) {
+  const double radius_px = radius_um * RimTable(index_ratio, host_index, scene.microscope.objective_na).rho_max() / scene.view.pixel_size_um;
   double rays = 0;
   for (int r = 0; r < scene.view.height; ++r)
     for (int c = 0; c < scene.view.width; ++c) {
@@ -328,7 +328,7 @@ int main(int argc, char** argv) {
                 median(rays_scalar) / median(rays_one));
     if (twisted && p.method == "magnus6") {
       // Three samples a step; points beside the droplet have no ray, some pixels several.
-      const double rays_traced = rays_in_picture(s.scene, every, 0.5 * theta[static_cast<std::size_t>(s.four[0])]), operations = static_cast<double>(operations_of_a_ray(p.steps, 3)), peak = peak_operations_per_second();
+      const double rays_traced = rays_in_picture(s.scene, every, 0.5 * theta[static_cast<std::size_t>(s.four[0])], 1.43 / 1.52, 1.43), operations = static_cast<double>(operations_of_a_ray(p.steps, 3)), peak = peak_operations_per_second();
       const double achieved = rays_traced * operations / median(rays_one);
       std::printf("    %.0f rays of %.0f operations: %.1f GFLOP/s of the core's %.1f (fused multiplications and additions alone), %.0f %%\n", rays_traced, operations,
                   1e-9 * achieved, 1e-9 * peak, 100 * achieved / peak);
