@@ -116,8 +116,8 @@ class BallImage final : public PixelModel<S> {
     std::sort(steps.begin(), steps.end());
     steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
     for (const DiscSquare& q : disc_) mesh_of_.push_back(static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
-    for (const int n : steps) meshes_.push_back(uniform_mesh(n));
-    if (meshes_.empty()) meshes_.push_back(uniform_mesh(plan.steps));
+    for (const int n : steps) meshes_.push_back(ball_mesh(optics_, n));
+    if (meshes_.empty()) meshes_.push_back(ball_mesh(optics_, plan.steps));
     const S between = light_.px * light_.ax + light_.py * light_.ay;
     open_ = between * between;
     // A field along an axis in the image plane is turned into itself.
@@ -158,6 +158,7 @@ class BallImage final : public PixelModel<S> {
     const Complex<S> out = light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
     return tube * norm(out);
   }
+  Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
   /// The same at a place of a PolarTable.
   S light_at(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh& mesh) const {
@@ -248,7 +249,21 @@ class StepsOfSquare {
       : optics_(ball_optics(scene, value.as<Pack>())),
         rim_(lane(optics_.sphere.ratio, 0), lane(optics_.sphere.n_host, 0), scene.microscope.objective_na),
         method_(transport_method<Pack>(plan.method)),
-        target_(0.25 * scene.intensity_accuracy) {}
+        target_(0.25 * scene.intensity_accuracy) {
+    std::visit(
+        [&](const auto& field) {
+          if (ball_breaks(field).size() == 1) return;
+          // A ring of defects, seen from the side across the field's axis: rays that all but touch it.
+          if constexpr (requires { field.axis; })
+            for (const double sign : {-1.0, 1.0}) {
+              constexpr double kAside = 1e-4;
+              const double x = lane(field.axis.x, 0), y = lane(field.axis.y, 0), c = sign * (-y + kAside * x), s = sign * (x + kAside * y);
+              double inverse_major;
+              grazing_.push_back({disc::turn_of(c, s, inverse_major), c, s});
+            }
+        },
+        optics_.field);
+  }
   /// Until two more refinements change no pilot ray by more than a quarter of the accuracy: one alone may agree by chance. `change`: by how much they do.
   int operator()(const DiscSquare& square, double& change) const {
     Rays coarse = rays(square, 2), fine = rays(square, 4);
@@ -270,7 +285,7 @@ class StepsOfSquare {
   using Rays = std::vector<Mat2<double>>;
 
   Rays rays(const DiscSquare& square, int steps) const {
-    const Mesh mesh = uniform_mesh(steps);
+    const Mesh mesh = ball_mesh(optics_, steps);
     Rays result;
     for (int i = 0; i < kPilots; i += kLanes) {
       alignas(64) double vs[kLanes], cs[kLanes], ss[kLanes];
@@ -279,6 +294,8 @@ class StepsOfSquare {
         const auto part = [&](double turn) { return 0.5 + turn * (i + k) - std::floor(0.5 + turn * (i + k)); };
         vs[k] = std::clamp(disc::v_in(square, part(0.7548776662466927)), 1e-6, 1 - 1e-6);
         disc::direction_of(disc::turn_in(square, part(0.5698402909980532)), cs[k], ss[k]);
+        for (const Grazing& g : grazing_)
+          if ((i + k) % 2 == 0 && g.turn > disc::turn_in(square, 0) && g.turn < disc::turn_in(square, 1)) cs[k] = g.cos, ss[k] = g.sin;
       }
       const Pack v = Pack::load_aligned(vs);
       const Pack rho = optics_.sphere.radius_um * Pack(rim_.rho_max()) * (Pack(1.0) - v * v);
@@ -297,15 +314,19 @@ class StepsOfSquare {
     return worst;
   }
 
+  struct Grazing {
+    double turn, cos, sin;
+  };
   BallOptics<Pack> optics_;
   RimTable rim_;
   const TransportMethod<Pack>& method_;
   double target_;
+  std::vector<Grazing> grazing_;
 };
 
 /// Largest error of the table in one of its squares.
 double error_in(const BallImage<Pack>& image, const PolarTable<Pack>& table, const DiscSquare& square, int number) {
-  const Mesh mesh = uniform_mesh(square.steps);
+  const Mesh mesh = image.mesh(square.steps);
   double error = 0;
   for (const double around : {0.02, 0.31, 0.55, 0.77, 0.98}) {  // none a Chebyshev point, the ends among them
     const double turn = disc::turn_in(square, around);
@@ -353,7 +374,7 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
       q.steps = steps_of(q, changes[static_cast<std::size_t>(b)]);
       q.smooth = rays_of(q) > PolarTable<Pack>::kRays;  // to be tried
     });
-    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0, [&](int b, const Pack& v, const Pack& c, const Pack& s) { return image.light_at(v, c, s, uniform_mesh(open[static_cast<std::size_t>(b)].steps)); });
+    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0, [&](int b, const Pack& v, const Pack& c, const Pack& s) { return image.light_at(v, c, s, image.mesh(open[static_cast<std::size_t>(b)].steps)); });
     parallel_for(count, 0, [&](int b) {
       const std::size_t i = static_cast<std::size_t>(b);
       if (!open[i].smooth) return;
@@ -385,6 +406,13 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
       "the droplet does not look the same from all sides of the viewing axis: {} of {} parts of the disc are smooth enough to be interpolated from {} rays each{}, elsewhere one ray a point; {:.0f} rays instead of {:.0f}",
       smooth, plan.disc.size(), PolarTable<Pack>::kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays, inside.back() * share));
   plan.cost_seconds = 4e-9 * (60 * work + 25.0 * scene.view.width * scene.view.height);
+}
+
+int steps_at(const RenderPlan& plan, double fraction, double x, double y) {
+  if (plan.disc.empty()) return plan.steps;
+  double inverse_major;
+  const double turn = disc::turn_of(x, y, inverse_major);
+  return plan.disc[static_cast<std::size_t>(DiscMap(plan.disc).find(std::sqrt(std::max(0.0, 1 - fraction)), turn))].steps;
 }
 
 bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before) {

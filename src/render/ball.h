@@ -15,6 +15,11 @@ struct BallOptics {
   BallField<S> field;
   bool normal_anchoring = true;
 };
+/// Equal steps and the breaks of the rays' columns.
+template <class S>
+Mesh ball_mesh(const BallOptics<S>& o, int steps) {
+  return uniform_mesh(steps, std::visit([](const auto& field) { return ball_breaks(field); }, o.field));
+}
 template <class S>
 BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value);
 
@@ -36,6 +41,8 @@ Mat2<S> ball_jones(const BallOptics<S>&, const DropletRay<S>&, const S& cos_azim
 /// Divides the disc into squares with their own steps, and finds those that are smooth: interpolated to `target` of the incident
 /// intensity. To be called with method and samples planned; sets the error, too, and the cost.
 void plan_disc_squares(const Scene&, const Values<double>&, double target, RenderPlan& plan);
+/// Mesh steps of the ray that is seen at (x, y), `fraction` of the way to the edge.
+int steps_at(const RenderPlan& plan, double fraction, double x, double y);
 /// See outgrown().
 bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before);
 

@@ -466,7 +466,8 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
           continue;
         }
         if (ball) {
-          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, mesh, 1.0), 0, row);
+          const double edge = optics.radius_um * rim.rho_max();
+          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, ball_mesh(*ball, steps_at(plan, rho / edge, x, y)), 1.0), 0, row);
           continue;
         }
         // droplet_jones is in (p, s) = (radial, azimuthal): turn it into x, y.

@@ -110,8 +110,10 @@ RandomScene random_unsymmetric_scene(unsigned long seed) {
     AxialDirector axial;
     axial.reduced_field = b.fixed("reduced_field", between(0, 8));
     axial.field_azimuth_deg = b.fixed("field_azimuth_deg", between(0, 180));
+    const bool ring = between(0, 1) < 0.4;
+    if (ring) axial.ring_radius = b.fixed("ring_radius", between(0.7, 0.97));
     droplet.director = axial;
-    r.kind = "field across";
+    r.kind = ring ? "ring, field across" : "field across";
   } else {
     ShellDirector shell;
     shell.wall_um = b.fixed("wall_um", 0.5 * diameter * between(0.2, 0.6));

@@ -203,7 +203,7 @@ void time_shell(int rounds) {
 
 /// Droplets that look different from all sides: full transport, tables over squares of the disc or a ray for every point.
 void time_unsymmetric(int rounds) {
-  for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 3", "eccentric shell"}) {
+  for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 3", "with a ring under a field across the view, e = 12", "eccentric shell"}) {
     DropletScene s = droplet_scene(false, 500, 0.025);
     Droplet& droplet = std::get<Droplet>(s.scene.sample);
     if (name[0] == 'b') {
@@ -211,9 +211,10 @@ void time_unsymmetric(int rounds) {
       bipolar.azimuth_deg = s.table.add_constant("azimuth_deg", 35);
       bipolar.tilt_deg = s.table.add_constant("tilt_deg", 20);
       droplet.director = bipolar;
-    } else if (name[0] == 'u') {
+    } else if (name[0] != 'e') {
       AxialDirector axial;
-      axial.reduced_field = s.table.add_constant("reduced_field", 3);
+      axial.reduced_field = s.table.add_constant("reduced_field", name[0] == 'w' ? 12 : 3);
+      if (name[0] == 'w') axial.ring_radius = s.table.add_constant("ring_radius", 0.9);
       axial.field_azimuth_deg = s.table.add_constant("field_azimuth_deg", 35);
       droplet.director = axial;
     } else {

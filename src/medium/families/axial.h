@@ -36,6 +36,8 @@ class AxialField {
       }
   }
   const S& e() const { return e_; }
+  bool has_ring() const { return has_ring_; }
+  const S& ring() const { return ring_; }
 
   /// Angle of the director from the field at (rho, z), rho >= 0, z >= 0, inside the unit sphere.
   template <class T>

@@ -96,13 +96,22 @@ struct BallRay {
   S radius_um;
 };
 
+/// Where columns of a field have their breaks.
+template <class Field>
+std::vector<double> ball_breaks(const Field& field) {
+  if constexpr (requires { field.field->has_ring(); })
+    if (field.field->has_ring()) return {0.25, 0.5, 0.75};
+  return {0.5};
+}
+
 /// u in [0, 1/2] runs from the entry to the core or, where there is none on the way, to the middle; the rest to the exit. What
-/// lies in the core does not retard. Nodes crowd at the middle over a length `crowd` (radii).
+/// lies in the core does not retard. Nodes crowd at a defect in the middle; at a ring of defects, to which a ray comes close twice, at
+/// u = 1/4 and 3/4, as far as it passes.
 template <class S, class Field>
 class BallColumn final : public Column<S> {
  public:
   BallColumn(const Field& field, const BallRay<S>& ray, const S& ordinary, const S& extraordinary) : field_(field), ray_(ray), eo_(ordinary), ee_(extraordinary) {
-    this->breaks = {0.5};
+    this->breaks = ball_breaks(field);
     before_ = after_ = S(0.0);
     q_ = S(30.0);  // all but linear
     if constexpr (std::is_same_v<Field, NestedField<S>>) {
@@ -116,6 +125,25 @@ class BallColumn final : public Column<S> {
       after_ = half_way - h;
     } else if constexpr (std::is_same_v<Field, TiltedAxialField<S>>) {
       q_ = 4.0 * ray_.impact * inverse(ray_.half) + 0.05;  // the defect or the wall's middle
+      if (field.field->has_ring()) {
+        const Vec3<S> t = rho_z(ray_.cos_deflection, ray_.sin_deflection), k = rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection);
+        const auto along_axis = [&](const Vec3<S>& v) { return v.x * field.axis.x + v.y * field.axis.y + v.z * field.axis.z; };
+        // In front of and behind the middle, where the ray is as far from the axis as the ring is, or nearest to that:
+        // impact^2 + s^2 - (above + s lean)^2 = ring^2.
+        const S above = ray_.impact * along_axis(t), lean = along_axis(k), over = inverse(S(1.0 - lean * lean + 1e-6));
+        const S square = (field.field->ring() * field.field->ring() - ray_.impact * ray_.impact + above * above) * over + (above * lean * over) * (above * lean * over);
+        const S away = root(max_of(square, S(1e-6))), middle = above * lean * over;
+        for (int side = 0; side < 2; ++side) {
+          RingSide& r = sides_[side];
+          const double sign = side == 0 ? -1 : 1;
+          r.at = min_of(max_of(S(away + sign * middle), S(1e-3)), S(0.98 * ray_.half));
+          const S plane = above + sign * r.at * lean;
+          r.passes = root(plane * plane + max_of(S(0.0) - square, S(0.0)) + 1e-10);
+          r.outer = asinh(S((ray_.half - r.at) * inverse(r.passes)));
+          r.inner = asinh(S(r.at * inverse(r.passes)));
+        }
+        ring_ = true;
+      }
     }
   }
   void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
@@ -134,12 +162,24 @@ class BallColumn final : public Column<S> {
   template <class T>
   OpticalPoint<T> at(const T& u, double where) const {
     const bool first = where < 0.5;
+    if (ring_) {
+      const bool outer = where < 0.25 || where >= 0.75;
+      const T x = where < 0.25 ? 1.0 - 4.0 * u : where < 0.5 ? 4.0 * u - 1.0 : where < 0.75 ? 3.0 - 4.0 * u : 4.0 * u - 3.0;
+      // The director turns on the length of the distance: steps as long as they are far, distance = passes sinh(a x).
+      const RingSide& r = sides_[first ? 0 : 1];
+      const T a = outer ? T(r.outer) : T(r.inner), passes(r.passes), grown = exp(a * x), shrunk = inverse(grown);
+      const T distance = 0.5 * passes * (grown - shrunk), away = outer ? T(r.at) + distance : T(r.at) - distance;
+      return seen_at<T>(first ? -away : away, 2.0 * passes * a * (grown + shrunk) * T(ray_.radius_um));
+    }
     const T x = first ? 1.0 - 2.0 * u : 2.0 * u - 1.0, from = first ? T(before_) : T(after_);
     const T length = first ? T(ray_.half + before_) : T(ray_.half - after_), q(q_);
     const T f = inverse(T(q + 1.0 - x));
     const T distance = length * q * x * f;
     const T slope = 2.0 * length * q * (q + 1.0) * f * f * T(ray_.radius_um);
-    const T s = first ? from - distance : from + distance;
+    return seen_at<T>(first ? from - distance : from + distance, slope);
+  }
+  template <class T>
+  OpticalPoint<T> seen_at(const T& s, const T& slope) const {
     const T b(ray_.impact), sd(ray_.sin_deflection), cd(ray_.cos_deflection), ca(ray_.cos_azimuth), sa(ray_.sin_azimuth);
     const T rho = cd * b - sd * s;
     const Vec3<T> n = field_.template at<T>(Vec3<T>{rho * ca, rho * sa, sd * b + cd * s});
@@ -150,6 +190,12 @@ class BallColumn final : public Column<S> {
   const Field& field_;
   BallRay<S> ray_;
   S eo_, ee_, before_, after_, q_;
+  struct RingSide {
+    S at = S(0.0), passes = S(0.0);     ///< distances (radii): of the closest place from the middle, of the ring from there
+    S outer = S(0.0), inner = S(0.0);   ///< asinh of how many of the latter there are to the surface and to the middle
+  };
+  RingSide sides_[2];
+  bool ring_ = false;
 };
 
 }  // namespace birefit
