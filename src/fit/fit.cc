@@ -79,7 +79,7 @@ std::vector<std::array<int, 2>> subsample(const std::vector<std::array<int, 2>>&
 
 /// A plan that resolves more than the one the solver worked with, or resolves it elsewhere.
 bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
-  if (now.method != before.method || now.steps > before.steps || now.mesh.size() > before.mesh.size() ||
+  if (now.method != before.method || (now.disc.empty() && now.steps > before.steps) || now.mesh.size() > before.mesh.size() ||
       now.radial_panels > before.radial_panels || now.centre_panels > before.centre_panels ||
       (before.fringe_means && !now.fringe_means))
     return true;

@@ -1,6 +1,7 @@
 #pragma once
 // Polynomials through Chebyshev points, none of them at an end of [-1, 1], where a function may be singular.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -55,7 +56,8 @@ double tail(const double* values) {
       for (std::size_t m = 0; m < 2; ++m)
         for (std::size_t k = 0; k < n; ++k) a[m] += weight[m][k] * values[start + k * stride];
       const double here = std::abs(a[0]) + std::abs(a[1]);
-      if (!(here <= worst)) worst = here;  // not a number stays
+      if (!std::isfinite(here)) return here;
+      worst = std::max(worst, here);
     }
   return worst;
 }

@@ -127,7 +127,7 @@ void Pilots::add_ball(const Scene& scene, const Values<double>& value) {
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) { return a.unsure < b.unsure; });
   constexpr std::size_t kLeast = 16;
   for (const Candidate& c : candidates) {
-    if (rays_.size() >= kLeast && c.unsure > 0.1 * scene.intensity_accuracy) break;
+    if (scene.method == "auto" && rays_.size() >= kLeast && c.unsure > 0.1 * scene.intensity_accuracy) break;
     rays_.push_back([=](const TransportMethod<double>& method, const Mesh& mesh) {
       try {
         return checked(intensity_distance(c.exact, jones(c.fraction, c.azimuth, method, mesh)));
@@ -230,6 +230,9 @@ void Pilots::add_planar(const Scene& scene, const Values<double>& value) {
 Effort cheapest_effort(const Pilots& pilots, double target, const std::string& only, bool even_steps, const std::string& but) {
   std::vector<int> ladder;
   for (int n = even_steps ? 2 : 1; n <= 8192; n += std::max(even_steps ? 2 : 1, n / 16 * 2)) ladder.push_back(n);
+  // Breaks make several numbers of steps the same mesh, which would confirm itself.
+  if (even_steps)
+    ladder.erase(std::unique(ladder.begin(), ladder.end(), [&](int a, int b) { return pilots.mesh(a).size() == pilots.mesh(b).size(); }), ladder.end());
   std::vector<Effort> efforts;
   for (const TransportMethod<double>* method : transport_methods<double>()) {
     if (method->info().reflections || but == method->info().name || (!only.empty() && only != method->info().name)) continue;

@@ -113,6 +113,9 @@ class RadialTable {
       }
     const double left = std::sqrt(dot(rest.data(), rest.data()));
     if (!directions_.empty() && left <= 1e-11 * norm) {
+      // As a difference of much larger ones it would be rounding.
+      for (int k = 0; k < j; ++k)
+        if (std::abs(weights[static_cast<std::size_t>(k)]) * std::sqrt(dot(plane(k), plane(k))) > 1e3 * norm) return false;
       for (int k = 0; k < j; ++k)
         if (const double w = weights[static_cast<std::size_t>(k)]; w != 0) combined_.push_back({j, k, w});
       return true;

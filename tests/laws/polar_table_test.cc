@@ -78,7 +78,7 @@ RenderPlan with_rays_alone(RenderPlan plan) {
 double largest_difference(const Image& a, const Image& b) {
   double worst = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
-    if (const double d = std::abs(a.values()[i] - b.values()[i]); !(d <= worst)) worst = d;
+    if (const double d = std::abs(a.values()[i] - b.values()[i]); !(d <= worst)) worst = std::isnan(d) ? 1e300 : d;
   return worst;
 }
 
