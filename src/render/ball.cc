@@ -6,7 +6,6 @@
 
 #include "medium/build.h"
 #include "render/pilots.h"
-#include "render/polar_table.h"
 
 namespace birefit {
 
@@ -109,13 +108,12 @@ class BallImage final : public PixelModel<S> {
         center_y_(value(scene.view.center_y_px)),
         edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
         inverse_edge_(inverse(edge_um_)),
-        disc_(plan.disc),
         map_(plan.disc) {
     std::vector<int> steps;
-    for (const DiscSquare& q : disc_) steps.push_back(q.steps);
+    for (const DiscSquare& q : plan.disc) steps.push_back(q.steps);
     std::sort(steps.begin(), steps.end());
     steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
-    for (const DiscSquare& q : disc_) mesh_of_.push_back(static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
+    for (const DiscSquare& q : plan.disc) mesh_of_.push_back(static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
     for (const int n : steps) meshes_.push_back(ball_mesh(optics_, n));
     if (meshes_.empty()) meshes_.push_back(ball_mesh(optics_, plan.steps));
     const S between = light_.px * light_.ax + light_.py * light_.ay;
@@ -185,13 +183,13 @@ class BallImage final : public PixelModel<S> {
     table_ = table(threads);
   }
   PolarTable<S> table(int threads) const {
-    return PolarTable<S>(disc_, kGivenUp * scene_.intensity_accuracy, threads, [this](int square, const P& v, const P& c, const P& s) { return light_at(v, c, s, meshes_[mesh_of_[static_cast<std::size_t>(square)]]); });
+    return PolarTable<S>(plan_.disc, kGivenUp * scene_.intensity_accuracy, threads, [this](int square, const P& v, const P& c, const P& s) { return light_at(v, c, s, meshes_[mesh_of_[static_cast<std::size_t>(square)]]); });
   }
 
  private:
   template <class Mask>
   S through(const S& x, const S& y, const S& rho_um, const S& over, const Mask& inside) const {
-    if (disc_.empty()) return light(rho_um, x * over, y * over, meshes_[0]);
+    if (plan_.disc.empty()) return light(rho_um, x * over, y * over, meshes_[0]);
     P inverse_major;
     const P angle = disc::turn_of(plain(x), plain(y), inverse_major);
     const S fraction = rho_um * inverse_edge_;
@@ -233,7 +231,6 @@ class BallImage final : public PixelModel<S> {
   Polarizers<S> light_;
   double pixel_um_;
   S center_x_, center_y_, edge_um_, inverse_edge_, open_;
-  std::vector<DiscSquare> disc_;
   DiscMap map_;
   PolarTable<S> table_;
 };
@@ -418,11 +415,11 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
   plan.cost_seconds = 4e-9 * (60 * work + 25.0 * scene.view.width * scene.view.height);
 }
 
-int steps_at(const RenderPlan& plan, double fraction, double x, double y) {
-  if (plan.disc.empty()) return plan.steps;
+int StepsByPlace::at(double fraction, double x, double y) const {
+  if (plan_.disc.empty()) return plan_.steps;
   double inverse_major;
   const double turn = disc::turn_of(x, y, inverse_major);
-  return plan.disc[static_cast<std::size_t>(DiscMap(plan.disc).find(std::sqrt(std::max(0.0, 1 - fraction)), turn))].steps;
+  return plan_.disc[static_cast<std::size_t>(map_.find(std::sqrt(std::max(0.0, 1 - fraction)), turn))].steps;
 }
 
 bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before) {

@@ -3,6 +3,7 @@
 
 #include "medium/families/ball.h"
 #include "render/droplet.h"
+#include "render/polar_table.h"
 
 namespace birefit {
 
@@ -41,8 +42,17 @@ Mat2<S> ball_jones(const BallOptics<S>&, const DropletRay<S>&, const S& cos_azim
 /// Divides the disc into squares with their own steps, and finds those that are smooth: interpolated to `target` of the incident
 /// intensity. To be called with method and samples planned; sets the error, too, and the cost.
 void plan_disc_squares(const Scene&, const Values<double>&, double target, RenderPlan& plan);
-/// Mesh steps of the ray that is seen at (x, y), `fraction` of the way to the edge.
-int steps_at(const RenderPlan& plan, double fraction, double x, double y);
+/// Mesh steps of a plan's rays by place.
+class StepsByPlace {
+ public:
+  explicit StepsByPlace(const RenderPlan& plan) : plan_(plan), map_(plan.disc) {}
+  /// Of the ray that is seen at (x, y), `fraction` of the way to the edge.
+  int at(double fraction, double x, double y) const;
+
+ private:
+  const RenderPlan& plan_;
+  DiscMap map_;
+};
 /// See outgrown().
 bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before);
 

@@ -454,6 +454,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
     const RimTable rim(optics.ratio, optics.n_host, scene.microscope.objective_na);
     const TransportMethod<double>& method = transport_method<double>(plan.method);
     std::optional<BallOptics<double>> ball;
+    const StepsByPlace steps(plan);
     if (!looks_round(std::get<Droplet>(scene.sample))) ball = ball_optics(scene, value);
     for (int r = 0; r < h; ++r)
       for (int c = 0; c < w; ++c) {
@@ -467,7 +468,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
         }
         if (ball) {
           const double edge = optics.radius_um * rim.rho_max();
-          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, ball_mesh(*ball, steps_at(plan, rho / edge, x, y)), 1.0), 0, row);
+          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, ball_mesh(*ball, steps.at(rho / edge, x, y)), 1.0), 0, row);
           continue;
         }
         // droplet_jones is in (p, s) = (radial, azimuthal): turn it into x, y.

@@ -17,25 +17,30 @@ namespace birefit {
 namespace {
 using namespace testing;
 
+/// A scene under construction: a view somewhere off the middle, any wavelength and polarizers; the sample is still to come.
 struct RandomScene {
+  std::mt19937_64 random;
   TableBuilder table;
   Scene scene;
   std::string kind;
+
+  RandomScene(unsigned long seed, int size) : random(seed) {
+    scene.view.width = scene.view.height = size;
+    scene.view.center_x_px = table.fixed("center_x", 0.5 * size + between(-2, 2));
+    scene.view.center_y_px = table.fixed("center_y", 0.5 * size + between(-2, 2));
+    scene.microscope.wavelength_nm = table.fixed("wavelength_nm", between(450, 700));
+    scene.microscope.polarizer_deg = table.fixed("polarizer_deg", between(0, 180));
+    scene.microscope.analyzer_deg = table.fixed("analyzer_deg", between(0, 180));
+  }
+  double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
 };
 
 RandomScene random_scene(unsigned long seed) {
-  std::mt19937_64 random(seed);
-  const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
-  RandomScene r;
+  constexpr int size = 24;
+  RandomScene r(seed, size);
+  const auto between = [&](double low, double high) { return r.between(low, high); };
   TableBuilder& b = r.table;
   Scene& s = r.scene;
-  const int size = 24;
-  s.view.width = s.view.height = size;
-  s.view.center_x_px = b.fixed("center_x", 0.5 * size + between(-2, 2));
-  s.view.center_y_px = b.fixed("center_y", 0.5 * size + between(-2, 2));
-  s.microscope.wavelength_nm = b.fixed("wavelength_nm", between(450, 700));
-  s.microscope.polarizer_deg = b.fixed("polarizer_deg", between(0, 180));
-  s.microscope.analyzer_deg = b.fixed("analyzer_deg", between(0, 180));
   const double n_o = between(1.45, 1.6), dn = between(-0.1, 0.25);
   s.material = ConstantIndices{b.fixed("ordinary", n_o), b.fixed("birefringence", dn)};
   s.ceiling = between(0, 1) < 0.3 ? Ceiling::e_only : Ceiling::one_way;
@@ -83,18 +88,11 @@ RandomScene random_scene(unsigned long seed) {
 
 /// Droplets that look different from all sides, large enough for parts of the disc to be interpolated.
 RandomScene random_unsymmetric_scene(unsigned long seed) {
-  std::mt19937_64 random(seed);
-  const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
-  RandomScene r;
+  constexpr int size = 64;
+  RandomScene r(seed, size);
+  const auto between = [&](double low, double high) { return r.between(low, high); };
   TableBuilder& b = r.table;
   Scene& s = r.scene;
-  const int size = 64;
-  s.view.width = s.view.height = size;
-  s.view.center_x_px = b.fixed("center_x", 0.5 * size + between(-2, 2));
-  s.view.center_y_px = b.fixed("center_y", 0.5 * size + between(-2, 2));
-  s.microscope.wavelength_nm = b.fixed("wavelength_nm", between(450, 700));
-  s.microscope.polarizer_deg = b.fixed("polarizer_deg", between(0, 180));
-  s.microscope.analyzer_deg = b.fixed("analyzer_deg", between(0, 180));
   s.material = ConstantIndices{b.fixed("ordinary", between(1.45, 1.6)), b.fixed("birefringence", between(-0.1, 0.25))};
   s.surround_index = b.fixed("surround", between(1.4, 1.55));
   s.ceiling = between(0, 1) < 0.3 ? Ceiling::e_only : Ceiling::one_way;
