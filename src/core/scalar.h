@@ -81,6 +81,17 @@ BIREFIT_INLINE double largest(const Pack& x) {
 }
 BIREFIT_INLINE double smallest(double x) { return x; }
 BIREFIT_INLINE double smallest(const Pack& x) { return -largest(-x); }
+BIREFIT_INLINE double sum_of_lanes(double x) { return x; }
+BIREFIT_INLINE double sum_of_lanes(const Pack& x) {
+#ifdef __AVX512F__
+  return _mm512_reduce_add_pd(x);
+#endif
+  alignas(64) double lanes[kLanes];
+  x.store_aligned(lanes);
+  double result = lanes[0];
+  for (int i = 1; i < kLanes; ++i) result += lanes[i];
+  return result;
+}
 BIREFIT_INLINE double lane(double x, int) { return x; }
 BIREFIT_INLINE double lane(const Pack& x, int i) { return x.get(static_cast<std::size_t>(i)); }
 BIREFIT_INLINE void sin_cos(double x, double& s, double& c) {

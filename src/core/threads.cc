@@ -12,6 +12,19 @@
 namespace birefit {
 namespace {
 
+/// Until condition() holds, but no longer than a phase of a picture lasts (tens of microseconds).
+template <class Condition>
+bool look_for(const Condition& condition) {
+  constexpr int kLooks = 4000;
+  for (int i = 0; i < kLooks; ++i) {
+    if (condition()) return true;
+#if defined(__x86_64__)
+    __builtin_ia32_pause();
+#endif
+  }
+  return false;
+}
+
 /// Threads that wait for work. They live as long as the program: a picture takes a millisecond, of which making a thread
 /// and the memory it works in would be a third.
 class Helpers {
@@ -36,30 +49,40 @@ class Helpers {
       const std::lock_guard lock(guard_);
       while (members_.size() < static_cast<std::size_t>(helpers)) members_.emplace_back([this] { serve(); });
       jobs_.push_back(&job);
+      waiting_jobs_ = static_cast<int>(jobs_.size());
     }
     if (helpers == 1)
       wake_.notify_one();
     else
       wake_.notify_all();
     work();
-    std::unique_lock lock(guard_);
-    std::erase(jobs_, &job);  // whoever has not begun is not needed any more
+    {
+      const std::lock_guard lock(guard_);
+      std::erase(jobs_, &job);  // whoever has not begun is not needed any more
+      waiting_jobs_ = static_cast<int>(jobs_.size());
+    }
+    look_for([&] { return job.running == 0; });
+    std::unique_lock lock(guard_);  // also: whoever was last has let go of the job
     finished_.wait(lock, [&] { return job.running == 0; });
   }
 
  private:
   struct Job {
     const std::function<void()>* work;
-    int wanted;   ///< members still to join
-    int running;  ///< members at it
+    int wanted;                ///< members still to join
+    std::atomic<int> running;  ///< members at it; changes under the guard
   };
   void serve() {
     std::unique_lock lock(guard_);
     for (;;) {
+      lock.unlock();
+      look_for([&] { return waiting_jobs_ > 0; });
+      lock.lock();
       wake_.wait(lock, [&] { return closing_ || !jobs_.empty(); });
       if (closing_) return;
       Job& job = *jobs_.front();
       if (--job.wanted == 0) jobs_.pop_front();
+      waiting_jobs_ = static_cast<int>(jobs_.size());
       ++job.running;
       lock.unlock();
       (*job.work)();
@@ -70,6 +93,7 @@ class Helpers {
   std::mutex guard_;
   std::condition_variable wake_, finished_;
   std::deque<Job*> jobs_;
+  std::atomic<int> waiting_jobs_{0};  ///< jobs_.size(), for who looks without the guard
   std::vector<std::thread> members_;
   bool closing_ = false;
 };
@@ -111,6 +135,17 @@ void run_together(int threads, const std::function<void(int)>& body) {
   for (int t = 1; t < threads; ++t) others.emplace_back(body, t);
   body(0);
   for (std::thread& t : others) t.join();
+}
+
+void Barrier::arrive_and_wait() {
+  const unsigned phase = phase_.load(std::memory_order_acquire);
+  if (arrived_.fetch_add(1, std::memory_order_acq_rel) + 1 == threads_) {
+    arrived_.store(0, std::memory_order_relaxed);
+    phase_.store(phase + 1, std::memory_order_release);
+    phase_.notify_all();
+    return;
+  }
+  if (!look_for([&] { return phase_.load(std::memory_order_acquire) != phase; })) phase_.wait(phase, std::memory_order_acquire);
 }
 
 }  // namespace birefit

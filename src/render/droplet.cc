@@ -234,10 +234,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       aplanatic_(scene.microscope.aplanatic),
       objective_na_(scene.microscope.objective_na),
-      sum_rad_(value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg)),
-      pixel_um_(scene.view.pixel_size_um),
-      center_x_(value(scene.view.center_x_px)),
-      center_y_(value(scene.view.center_y_px)),
+      view_(scene, value),
       edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)),
       inverse_edge_(inverse(edge_um_)),
       core_um_(0.0),
@@ -247,7 +244,6 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
     fan_p_ = std::make_shared<const EikonalFan>(eikonal_fan(optics_, true));
     fan_s_ = std::make_shared<const EikonalFan>(eikonal_fan(optics_, false));
   }
-  sin_cos(sum_rad_, sin_sum_, cos_sum_);
   sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
   symmetry_ = round_symmetry(scene, value, optics_.coupled());
   shell_ = optics_.director == DropletOptics<S>::Director::shell;
@@ -257,9 +253,12 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       inverse_core_ = inverse(core_um_);
       core_root_ = root(1.0 - core_um_ * inverse_edge_);
       inverse_core_root_ = inverse(core_root_);
+      by_inverse_core_ = Sensitivity<S>(inverse_core_);
+      by_inverse_core_root_ = Sensitivity<S>(inverse_core_root_);
     }
     if (!can_tabulate()) rest_panels_ = 0;
   }
+  by_inverse_edge_ = Sensitivity<S>(inverse_edge_);
   open_ = cos_between_ * cos_between_;
   dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
 }
@@ -318,91 +317,102 @@ void DropletImage<S>::eikonal_terms_at(const S& rho_um, S* out) const {
   intensity_terms(Mat2<S>{Complex<S>(p_field * cs, p_field * sn), zero, zero, Complex<S>(s_field, S(0.0))}, S(1.0), cos_between_, sin_between_, true, out);
 }
 
-/// sum_k basis[k] f_k(rho), rho < edge.
+// The light at rho_um < edge by a ray of its own.
 template <class S>
-S DropletImage<S>::through(const S& rho_um, const P* basis, const P* turned, P* turned_sum) const {
-  if (rest_panels_ == 0) {
-    S f[kMostTerms];
+S DropletImage<S>::traced(const P& rho_um, const typename RoundView<S>::Place& place) const {
+  const auto basis = RoundView<S>::basis(place);
+  S f[kMostTerms], total(P(0.0));
+  if constexpr (ScalarTraits<S>::derivatives == 0) {
     terms_at(rho_um, f);
-    S total(P(0.0));
-    if (turned) *turned_sum = P(0.0);
-    for (int k = 0; k < number_of_terms(); ++k) {
-      if constexpr (ScalarTraits<S>::derivatives > 0)
-        total = total + f[k].chain(f[k].value * basis[k], basis[k]);
-      else
-        total = total + f[k] * basis[k];
-      if (turned) *turned_sum = *turned_sum + plain(f[k]) * turned[k];
-    }
-    return total;
-  }
-  // Slopes by hand: one chain rule instead of every derivative through every root.
-  const auto place = [](const S& x, const P& value, const P& slope) {
-    if constexpr (ScalarTraits<S>::derivatives > 0)
-      return x.chain(value, slope);
-    else
-      return value;
-  };
-  const S fraction = rho_um * inverse_edge_;
-  const P to_rim = root(P(1.0) - plain(fraction)), slope = P(-0.5) * inverse(to_rim);
-  const auto central = shell_ ? plain(rho_um) < plain(core_um_) : to_rim > P(1 - kCentre);
-  S total(P(0.0));
-  if (!birefit::all(central)) {
-    constexpr double kScale = 1 / (1 - kCentre);
-    const S v = shell_ ? place(fraction, to_rim, slope) * inverse_core_root_ : place(fraction, to_rim * P(kScale), slope * P(kScale));
-    total = tabulated_sum(Part::rest, v, basis, turned, turned_sum);
-  }
-  if (birefit::none(central)) return total;
-  P turned_here;
-  S v(P(0.0));
-  if (shell_) {
-    const S of_core = rho_um * inverse_core_;
-    const P to_core = root(max_of(P(1.0) - plain(of_core), P(1e-30)));
-    v = place(of_core, to_core, P(-0.5) * inverse(to_core));
+    for (int k = 0; k < number_of_terms(); ++k) total = total + f[k] * basis[static_cast<std::size_t>(k)];
   } else {
-    const P w = plain(fraction) * inverse(P(1.0) + to_rim), root4 = root(root(w * P(1 / kCentre)));
-    v = place(fraction, root4, P(-0.25) * root4 * inverse(w) * slope);
+    const auto turned = RoundView<S>::turned(place);
+    S rho(rho_um);
+    view_.add_moves(place, P(1.0), P(0.0), rho);
+    terms_at(rho, f);
+    P by_angle(0.0);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(number_of_terms()); ++k) {
+      total = total + f[k].chain(f[k].value * basis[k], basis[k]);
+      by_angle = by_angle + f[k].value * turned[k];
+    }
+    view_.add_moves(place, P(0.0), by_angle, total);
   }
-  const S centre = tabulated_sum(Part::centre, v, basis, turned, &turned_here);
-  if (turned) *turned_sum = birefit::all(central) ? turned_here : select(central, turned_here, *turned_sum);
-  return birefit::all(central) ? centre : select(central, centre, total);
+  return total;
+}
+
+// The same from the tables. Slopes by hand: one chain rule at the end instead of every derivative through every root.
+template <class S>
+S DropletImage<S>::read(const P& rho_um, const typename RoundView<S>::Place& place) const {
+  constexpr bool kSlopes = ScalarTraits<S>::derivatives > 0;
+  using Slopes = typename RadialTable<S>::Slopes;
+  const auto basis = RoundView<S>::basis(place);
+  [[maybe_unused]] std::array<P, kMostTerms> turned;
+  if constexpr (kSlopes) turned = RoundView<S>::turned(place);
+  const P edge_inverse = plain(inverse_edge_), fraction = rho_um * edge_inverse, to_rim = root(P(1.0) - fraction);
+  const auto central = shell_ ? rho_um < plain(core_um_) : to_rim > P(1 - kCentre);
+  S total(P(0.0));
+  // By the radius, by 2 azimuth and by the scales of the tables.
+  P by_rho(0.0), by_angle(0.0), by_edge(0.0), by_core(0.0), by_core_root(0.0);
+  // d to_rim / d fraction
+  const auto rim_slope = [&] { return P(-0.5) * inverse(to_rim); };
+  if (!birefit::all(central)) {
+    const P scale = shell_ ? plain(inverse_core_root_) : P(1 / (1 - kCentre));
+    if constexpr (kSlopes) {
+      Slopes slopes;
+      total = tabulated_sum(Part::rest, to_rim * scale, basis.data(), turned.data(), &slopes);
+      const P by_fraction = slopes.by_v * scale * rim_slope();
+      by_angle = slopes.turned, by_rho = by_fraction * edge_inverse, by_edge = by_fraction * rho_um, by_core_root = slopes.by_v * to_rim;
+    } else {
+      total = tabulated_sum(Part::rest, to_rim * scale, basis.data());
+    }
+  }
+  if (!birefit::none(central)) {
+    const P of_core = rho_um * plain(inverse_core_), w = fraction * inverse(P(1.0) + to_rim);
+    const P v = shell_ ? root(max_of(P(1.0) - of_core, P(1e-30))) : root(root(w * P(1 / kCentre)));
+    if constexpr (kSlopes) {
+      Slopes slopes;
+      total = select(central, tabulated_sum(Part::centre, v, basis.data(), turned.data(), &slopes), total);
+      const auto here = [&](const P& there, P& everywhere) { everywhere = select(central, there, everywhere); };
+      here(slopes.turned, by_angle);
+      if (shell_) {
+        const P by_of_core = slopes.by_v * P(-0.5) * inverse(v);
+        here(by_of_core * plain(inverse_core_), by_rho);
+        here(by_of_core * rho_um, by_core);
+        here(P(0.0), by_edge);
+        here(P(0.0), by_core_root);
+      } else {
+        const P by_fraction = slopes.by_v * P(-0.25) * v * inverse(w) * rim_slope();
+        here(by_fraction * edge_inverse, by_rho);
+        here(by_fraction * rho_um, by_edge);
+      }
+    } else {
+      total = select(central, tabulated_sum(Part::centre, v, basis.data()), total);
+    }
+  }
+  if constexpr (kSlopes) {
+    view_.add_moves(place, by_rho, by_angle, total);
+    by_inverse_edge_.add(by_edge, total);
+    if (shell_) {
+      by_inverse_core_.add(by_core, total);
+      by_inverse_core_root_.add(by_core_root, total);
+    }
+  }
+  return total;
 }
 
 template <class S>
 S DropletImage<S>::intensity(const P& column, const P& row) const {
-  const P x = (column - plain(center_x_)) * P(pixel_um_), y = (plain(center_y_) - row) * P(pixel_um_);
-  const P rho2 = x * x + y * y + P(1e-18), over_rho = inverse_root(rho2), rho_um = rho2 * over_rho;
-  const P edge = plain(edge_um_) * P(1 - 1e-12);
-  const auto inside = rho_um < edge;
-  S rho(select(inside, rho_um, plain(edge_um_) * P(0.5)));
-  if constexpr (ScalarTraits<S>::derivatives > 0) {
-    const P px(pixel_um_);
-    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j) rho.d[j] = (y * center_y_.d[j] - x * center_x_.d[j]) * over_rho * px;
-  }
+  const auto place = view_.at(column, row);
+  const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
   S result(P(0.0));
-  if (!dark_ && !birefit::all(rho_um < plain(optics_.radius_um) - P(pixel_um_))) {  // light that passes by; averaged over a pixel
-    S everywhere(rho);
-    if constexpr (ScalarTraits<S>::derivatives > 0)
-      everywhere.value = rho_um;
-    else
-      everywhere = rho_um;
-    result = open_ * min_of(max_of((everywhere - optics_.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
+  if (!dark_ && !birefit::all(place.rho_um < plain(optics_.radius_um) - P(view_.pixel_um()))) {  // light that passes by; averaged over a pixel
+    S rho(place.rho_um);
+    view_.add_moves(place, P(1.0), P(0.0), rho);
+    result = open_ * min_of(max_of((rho - optics_.radius_um) * (1 / view_.pixel_um()) + 0.5, S(0.0)), S(1.0));
   }
   if (birefit::none(inside)) return result;
-  const P square = over_rho * over_rho, c2 = (x * x - y * y) * square, s2 = P(2.0) * x * y * square;
-  const P q = plain(cos_sum_) * c2 + plain(sin_sum_) * s2, s = plain(cos_sum_) * s2 - plain(sin_sum_) * c2;
-  const P basis[kMostTerms] = {q * q, q, P(1.0), s, q * s};
-  S light;
-  if constexpr (ScalarTraits<S>::derivatives == 0) {
-    light = through(rho, basis, nullptr, nullptr);
-  } else {
-    // The basis by 2 azimuth: q' = -s, s' = q.
-    const P turned[kMostTerms] = {P(-2.0) * q * s, -s, P(0.0), q, q * q - s * s};
-    P by_angle(0.0);
-    light = through(rho, basis, turned, &by_angle);
-    const P to_angle = by_angle * P(2 * pixel_um_) * square;
-    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
-      light.d[j] = light.d[j] + to_angle * (x * center_y_.d[j] + y * center_x_.d[j]) - by_angle * sum_rad_.d[j];
-  }
+  const P rho_um = select(inside, place.rho_um, plain(edge_um_) * P(0.5));
+  const S light = rest_panels_ == 0 ? traced(rho_um, place) : read(rho_um, place);
   return result + select(inside, light, S(0.0));
 }
 

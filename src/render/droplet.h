@@ -8,6 +8,7 @@
 #include "medium/families/radial.h"
 #include "render/pixel_model.h"
 #include "render/radial_table.h"
+#include "render/round_view.h"
 #include "transport/method.h"
 
 namespace birefit {
@@ -144,22 +145,23 @@ class DropletImage final : public PixelModel<S> {
   /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim; of a shell what is seen
   /// through the core, up to the kink at its edge, and what is seen beside it.
   enum class Part { centre, rest };
-  static constexpr int kMostTerms = 5;
+  static constexpr int kMostTerms = RoundView<S>::kMostTerms;
   int number_of_terms() const { return optics_.coupled() ? 5 : 3; }
   /// False where one ray a point is needed whatever the plan says: a shell whose core's edge no ray of the image meets.
   bool can_tabulate() const { return !shell_ || lane(plain(core_um_), 0) > 0; }
   /// f_k at v of the part; out has number_of_terms() places.
   void terms(Part part, const S& v, S* out) const;
   /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with plan.radial_panels > 0.
-  S tabulated_sum(Part part, const S& v, const P* basis, const P* turned = nullptr, P* turned_sum = nullptr) const {
+  S tabulated_sum(Part part, const P& v, const P* basis, const P* turned = nullptr, typename RadialTable<S>::Slopes* slopes = nullptr) const {
     const RadialTable<S>& table = part == Part::centre ? centre_ : rest_;
-    return optics_.coupled() ? table.template sum<5>(v, basis, turned, turned_sum) : table.template sum<3>(v, basis, turned, turned_sum);
+    return optics_.coupled() ? table.template sum<5>(v, basis, turned, slopes) : table.template sum<3>(v, basis, turned, slopes);
   }
 
  private:
   void terms_at(const S& rho_um, S* out) const;
   void eikonal_terms_at(const S& rho_um, S* out) const;
-  S through(const S& rho_um, const P* basis, const P* turned, P* turned_sum) const;
+  S traced(const P& rho_um, const typename RoundView<S>::Place&) const;
+  S read(const P& rho_um, const typename RoundView<S>::Place&) const;
 
   DropletOptics<S> optics_;
   RimTable rim_;
@@ -169,10 +171,11 @@ class DropletImage final : public PixelModel<S> {
   Symmetry symmetry_;
   std::shared_ptr<const EikonalFan> fan_p_, fan_s_;  ///< of curved rays; else none
   double objective_na_;
-  S cos_between_, sin_between_, cos_sum_, sin_sum_, sum_rad_;  ///< of analyser - polarizer, of analyser + polarizer
-  double pixel_um_;
-  S center_x_, center_y_, edge_um_, inverse_edge_, open_;
+  RoundView<S> view_;
+  S cos_between_, sin_between_;  ///< of analyser - polarizer
+  S edge_um_, inverse_edge_, open_;
   S core_um_, inverse_core_, core_root_, inverse_core_root_;  ///< image radius of a shell's core, sqrt(1 - that / edge)
+  Sensitivity<S> by_inverse_edge_, by_inverse_core_, by_inverse_core_root_;
   bool dark_ = false;  ///< no light beside the droplet
   int centre_panels_, rest_panels_;
   RadialTable<S> centre_, rest_;

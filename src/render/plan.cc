@@ -126,7 +126,7 @@ void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double 
 
 /// Of the accuracy asked for: the table's error stays far below it, so that neither the image nor its slope shows the
 /// panels.
-constexpr double kTableShare = 1e-4;
+constexpr double kTableShare = 1e-3;
 /// In two dimensions digits are dearer.
 constexpr double kPolarShare = 1e-2;
 
@@ -134,7 +134,7 @@ constexpr double kPolarShare = 1e-2;
 void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
   using Image = DropletImage<Pack>;
   // A director from elements has small kinks between them, which no polynomial follows to more than this.
-  const double share = std::holds_alternative<AxialDirector>(std::get<Droplet>(scene.sample).director) ? 100 * kTableShare : kTableShare;
+  const double share = std::holds_alternative<AxialDirector>(std::get<Droplet>(scene.sample).director) ? 10 * kTableShare : kTableShare;
   const double target = std::max(share * scene.intensity_accuracy, 2e-11);
   const double points = static_cast<double>(scene.view.width) * scene.view.height;
   const Values<Pack> lanes = value.template as<Pack>();

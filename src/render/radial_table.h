@@ -84,14 +84,18 @@ class RadialTable {
     directions_.clear();
   }
 
-  /// sum_k basis[k] f_k(v) over the F functions that were tabulated, with its derivatives at fixed basis; with `turned`
-  /// also sum_k turned[k] f_k(v), the value alone, in *turned_sum. v outside [0, 1] is extrapolated from the end panels.
-  /// Functions after the last one that is not negligible are left out.
+  /// How a sum moves with the place: by v, and the same sum over another basis (its derivative by the angle).
+  struct Slopes {
+    P by_v = P(0.0), turned = P(0.0);
+  };
+  /// sum_k basis[k] f_k(v) over the F functions that were tabulated, with its derivatives at fixed v and basis; with `slopes` also
+  /// those, turned[k] in the place of basis[k]. v outside [0, 1] is extrapolated from the end panels. Functions after the last
+  /// one that is not negligible are left out.
   template <int F>
-  BIREFIT_INLINE S sum(const S& v, const P* basis, const P* turned = nullptr, P* turned_sum = nullptr) const {
-    if (F > 1 && live_ <= 1) return sum_of_live<1, F>(v, basis, turned, turned_sum);
-    if (F > 3 && live_ <= 3) return sum_of_live<3, F>(v, basis, turned, turned_sum);
-    return sum_of_live<F, F>(v, basis, turned, turned_sum);
+  BIREFIT_INLINE S sum(const P& v, const P* basis, const P* turned = nullptr, Slopes* slopes = nullptr) const {
+    if (F > 1 && live_ <= 1) return sum_of_live<1, F>(v, basis, turned, slopes);
+    if (F > 3 && live_ <= 3) return sum_of_live<3, F>(v, basis, turned, slopes);
+    return sum_of_live<F, F>(v, basis, turned, slopes);
   }
 
  private:
@@ -160,55 +164,58 @@ class RadialTable {
     for (int k = 1; k < L; ++k) total = total + basis[k] * f[k];
     return total;
   }
-  /// Adds the derivatives of which the first L functions are not negligible, contracted with the basis.
+  /// The derivatives of which the first L functions are not negligible, contracted with the basis.
   template <int L>
-  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const P& x, const P* basis, S& total, P* read) const {
+  BIREFIT_INLINE void add_planes(const Planes& planes, const double* c, const P& x, const P* basis, S& total) const {
     for (int i = 0; i < planes.count; ++i) {
       const int j = planes.list[static_cast<std::size_t>(i)];
       P f[L];
       horner<L, false>(c + (static_cast<std::size_t>(j) + 1) * plane_, x, f, nullptr);
-      read[j] = contract<L>(basis, f);
-      total.d[j] = total.d[j] + read[j];
+      total.d[j] = contract<L>(basis, f);
     }
   }
   template <int L, int F>
-  BIREFIT_INLINE S sum_of_live(const S& v, const P* basis, const P* turned, P* turned_sum) const {
-    const P scaled = plain(v) * P(static_cast<double>(panels_));
+  BIREFIT_INLINE S sum_of_live(const P& v, const P* basis, const P* turned, Slopes* slopes) const {
+    const P scaled = v * P(static_cast<double>(panels_));
     using std::floor;
     const P cell = min_of(max_of(floor(scaled), P(0.0)), P(panels_ - 1.0));
     const P x = P(2.0) * (scaled - cell) - P(1.0);
     // Lanes are neighbours in the image and mostly lie on one panel: its coefficients are single numbers for all of them.
     double panel = smallest(cell);
-    S total = on_panel<L, F>(panel, x, v, basis, turned, turned_sum);
+    S total = on_panel<L, F>(panel, x, basis, turned, slopes);
     for (const double last = largest(cell); panel < last;) {
       panel += 1;
       const auto here = cell == P(panel);
       if (birefit::none(here)) continue;
-      P turned_here;
-      total = select(here, on_panel<L, F>(panel, x, v, basis, turned, &turned_here), total);
-      if (turned) *turned_sum = select(here, turned_here, *turned_sum);
+      Slopes there;
+      total = select(here, on_panel<L, F>(panel, x, basis, turned, slopes ? &there : nullptr), total);
+      if (slopes) {
+        slopes->by_v = select(here, there.by_v, slopes->by_v);
+        slopes->turned = select(here, there.turned, slopes->turned);
+      }
     }
     return total;
   }
   template <int L, int F>
-  BIREFIT_INLINE S on_panel(double panel, const P& x, const S& v, const P* basis, const P* turned, P* turned_sum) const {
+  BIREFIT_INLINE S on_panel(double panel, const P& x, const P* basis, const P* turned, Slopes* slopes) const {
     const double* c = coefficients_.data() + static_cast<std::size_t>(panel) * kPlanes * plane_;
-    P value[L], slope[L];
-    horner<L, (kPlanes > 1)>(c, x, value, slope);
-    if (turned) *turned_sum = contract<L>(turned, value);
-    if constexpr (kPlanes == 1) {
-      return contract<L>(basis, value);
+    P value[L];
+    if (slopes) {
+      P slope[L];
+      horner<L, true>(c, x, value, slope);
+      slopes->by_v = contract<L>(basis, slope) * P(2.0 * panels_);
+      slopes->turned = contract<L>(turned, value);
     } else {
-      S total(contract<L>(basis, value));
-      const P along = contract<L>(basis, slope) * P(2.0 * panels_);
-      for (std::size_t j = 0; j + 1 < kPlanes; ++j) total.d[j] = along * v.d[j];
-      P read[kPlanes - 1];
-      add_planes<1>(of_one_, c, x, basis, total, read);
-      add_planes<(F > 3 ? 3 : F)>(of_three_, c, x, basis, total, read);
-      add_planes<F>(of_all_, c, x, basis, total, read);
-      for (const Combined& w : combined_) total.d[w.plane] = total.d[w.plane] + P(w.weight) * read[w.of];
-      return total;
+      horner<L, false>(c, x, value, nullptr);
     }
+    S total(contract<L>(basis, value));
+    if constexpr (kPlanes > 1) {
+      add_planes<1>(of_one_, c, x, basis, total);
+      add_planes<(F > 3 ? 3 : F)>(of_three_, c, x, basis, total);
+      add_planes<F>(of_all_, c, x, basis, total);
+      for (const Combined& w : combined_) total.d[w.plane] = total.d[w.plane] + P(w.weight) * total.d[w.of];
+    }
+    return total;
   }
 
   int panels_ = 0;

@@ -66,6 +66,7 @@ constexpr std::array<double, kLanes> kCount = [] {
   return a;
 }();
 
+/// Of a pixel in each lane.
 template <class S>
 S mean_over_pixel(const PixelModel<S>& model, const PlainOf<S>& column, const PlainOf<S>& row, int n) {
   const PixelRule& rule = rule_of(n);
@@ -76,6 +77,36 @@ S mean_over_pixel(const PixelModel<S>& model, const PlainOf<S>& column, const Pl
       sum = sum + (rule.w[a] * rule.w[b]) * model.intensity(column + PlainOf<S>(rule.x[a]), row + PlainOf<S>(rule.x[b]));
     }
   return sum;
+}
+
+/// Of one pixel, a sample in each lane: neighbours, which read the same parts of tables. n n must be a multiple of the lanes.
+template <class S>
+S mean_over_one_pixel(const PixelModel<S>& model, double column, double row, int n) {
+  static const std::array<std::array<std::vector<double>, 3>, 9> all = [] {
+    std::array<std::array<std::vector<double>, 3>, 9> r;
+    for (std::size_t m = 1; m <= 8; ++m) {
+      const PixelRule& rule = rule_of(static_cast<int>(m));
+      for (std::size_t j = 0; j < m; ++j)
+        for (std::size_t i = 0; i < m; ++i) {
+          r[m][0].push_back(rule.x[i]);
+          r[m][1].push_back(rule.x[j]);
+          r[m][2].push_back(rule.w[i] * rule.w[j]);
+        }
+    }
+    return r;
+  }();
+  using P = PlainOf<S>;
+  const auto& [x, y, w] = all[static_cast<std::size_t>(n)];
+  S sum(0.0);
+  for (std::size_t i = 0; i < x.size(); i += static_cast<std::size_t>(kLanesOf<S>))
+    sum = sum + S(load_lanes<P>(&w[i])) * model.intensity(P(column) + load_lanes<P>(&x[i]), P(row) + load_lanes<P>(&y[i]));
+  if constexpr (ScalarTraits<S>::derivatives > 0) {
+    sum.value = P(sum_of_lanes(sum.value));
+    for (auto& d : sum.d) d = P(sum_of_lanes(d));
+    return sum;
+  } else {
+    return S(sum_of_lanes(sum));
+  }
 }
 
 /// Writes lanes [first, first + count) of value and derivatives to out[0], out[1..N].
@@ -151,20 +182,20 @@ class NeededPoints {
   std::vector<std::uint8_t> near_, flags_;
 };
 
-/// What a thread works on: a band of rows with one more on either side. Point values are at row(field * planes + plane,
-/// r), r = 0 the row above the band, each row with at least width + 2 + kLanes readable places; one field, the intensity,
-/// or with plan.fringe_means the four of a FringePoint.
+/// What a thread works on: a band of rows with one more on either side, r = 0 the row above the band. Point values of the last three
+/// rows are at row(field * planes + plane, r), each with at least width + 2 + kLanes readable places; one field, the intensity, or
+/// with plan.fringe_means the four of a FringePoint.
 class Band {
  public:
-  /// Many rows, so that few are computed twice; few, so that a band stays in the second cache.
+  /// Many rows, so that few are computed twice; few, so that threads end together.
   static constexpr int kRows = 25;
   void resize(int width, int planes) {
     wide_ = static_cast<std::size_t>(width) + 2;
-    plane_ = wide_ * (kRows + 2);
+    plane_ = wide_ * 3;
     points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes) + kLanes));
     samples_.resize(wide_ * (kRows + 4));
   }
-  double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(r) * wide_; }
+  double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(r % 3) * wide_; }
   /// Samples of row r, from -1 (two above the band) on, of the picture with its rim.
   std::uint8_t* samples(int r) { return samples_.data() + static_cast<std::size_t>(r + 1) * wide_; }
 
@@ -208,7 +239,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
     band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes);
     for (int r = -1; r <= rows + 2; ++r) rings.fill(std::clamp(top + r, 0, h + 1), band.samples(r), wide);
-    for (int r = 0; r < rows + 2; ++r) {
+    const auto compute = [&](int r) {
       needed.find(band.samples(r - 1), band.samples(r), band.samples(r + 1), wide);
       for (int c0 = 0; c0 < wide; c0 += kStep) {
         const int count = std::min(kStep, wide - c0);
@@ -227,8 +258,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
           put(model->intensity(column, row), 0);
         }
       }
-    }
-    for (int r = 0; r < rows; ++r) {
+    };
+    const auto finish = [&](int r) {
       const auto targets = [&](int column) {
         Targets out{};
         for (std::size_t p = 0; p < images.size(); ++p) out[p] = images[p]->row(top + r) + column;
@@ -255,7 +286,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       }
       // Pixels of several samples, packed into lanes by their number.
       const std::uint8_t* n = band.samples(r + 1) + 1;
-      if (std::all_of(n, n + w, [](std::uint8_t k) { return k == 1; })) continue;
+      if (std::all_of(n, n + w, [](std::uint8_t k) { return k == 1; })) return;
       std::array<std::array<int, kLanes>, 9> waiting;
       std::array<int, 9> count{};
       const auto flush = [&](std::size_t most) {
@@ -268,11 +299,19 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       for (int c = 0; c < w; ++c) {
         if (n[c] == 1) continue;
         const std::size_t most = n[c];
+        if ((n[c] * n[c]) % kStep == 0) {
+          store(mean_over_one_pixel(*model, c, top + r, n[c]), targets(c), planes, 0, 1);
+          continue;
+        }
         waiting[most][static_cast<std::size_t>(count[most]++)] = c;
         if (count[most] == kStep) flush(most);
       }
       for (std::size_t most = 2; most < 9; ++most)
         if (count[most] > 0) flush(most);
+    };
+    for (int r = 0; r < rows + 2; ++r) {
+      compute(r);
+      if (r >= 2) finish(r - 2);
     }
     if (symmetry == Symmetry::none) return;
     for (int row = top; row < top + rows; ++row)

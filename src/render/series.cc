@@ -9,6 +9,7 @@
 #include "render/droplet.h"
 #include "render/pixel_mean.h"
 #include "render/radial_table.h"
+#include "render/round_view.h"
 #include "render/sampling.h"
 #include "render/wave.h"
 #include "wave/radial_series.h"
@@ -45,12 +46,8 @@ class SeriesImage final : public PixelModel<S> {
         na_(scene.microscope.objective_na),
         pupil_(scene.microscope.aplanatic ? Pupil::aplanatic : Pupil::focal_plane),
         focus_um_(value.get(scene.microscope.focus_um, 0.0)),
-        sum_rad_(value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg)),
-        pixel_um_(scene.view.pixel_size_um),
-        center_x_(value(scene.view.center_x_px)),
-        center_y_(value(scene.view.center_y_px)) {
+        view_(scene, value) {
     symmetry_ = round_symmetry(scene, value, false);
-    sin_cos(sum_rad_, sin_sum_, cos_sum_);
     S unused;
     sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), unused, cos_between_);
     RadialBall<Single> ball;
@@ -96,24 +93,16 @@ class SeriesImage final : public PixelModel<S> {
 
   // Behind the analyser the field is (1 + A0) cos(analyser - polarizer) + A2 q, q = cos(2 azimuth - analyser - polarizer).
   S intensity(const P& column, const P& row) const override {
-    const P x = (column - plain(center_x_)) * P(pixel_um_), y = (plain(center_y_) - row) * P(pixel_um_);
-    const P rho2 = x * x + y * y + P(1e-18), over_rho = inverse_root(rho2), square = over_rho * over_rho;
-    const P v = rho2 * over_rho * P(1 / reach_um_);
-    const P c2 = (x * x - y * y) * square, s2 = P(2.0) * x * y * square;
-    const P q = plain(cos_sum_) * c2 + plain(sin_sum_) * s2, s = plain(cos_sum_) * s2 - plain(sin_sum_) * c2;
-    const P basis[kTerms] = {q * q, q, P(1.0)};
+    const auto place = view_.at(column, row);
+    const auto basis = RoundView<S>::basis(place);
+    const P v = place.rho_um * P(1 / reach_um_);
     if constexpr (ScalarTraits<S>::derivatives == 0) {
-      return table_.template sum<kTerms>(v, basis);
+      return table_.template sum<kTerms>(v, basis.data());
     } else {
-      S place(v);
-      const P px(pixel_um_ / reach_um_);
-      for (std::size_t j = 0; j < place.d.size(); ++j) place.d[j] = (y * center_y_.d[j] - x * center_x_.d[j]) * over_rho * px;
-      const P turned[kTerms] = {P(-2.0) * q * s, -s, P(0.0)};
-      P by_angle(0.0);
-      S light = table_.template sum<kTerms>(place, basis, turned, &by_angle);
-      const P to_angle = by_angle * P(2 * pixel_um_) * square;
-      for (std::size_t j = 0; j < light.d.size(); ++j)
-        light.d[j] = light.d[j] + to_angle * (x * center_y_.d[j] + y * center_x_.d[j]) - by_angle * sum_rad_.d[j];
+      typename RadialTable<S>::Slopes slopes;
+      const auto turned = RoundView<S>::turned(place);
+      S light = table_.template sum<kTerms>(v, basis.data(), turned.data(), &slopes);
+      view_.add_moves(place, slopes.by_v * P(1 / reach_um_), slopes.turned, light);
       return light;
     }
   }
@@ -130,7 +119,7 @@ class SeriesImage final : public PixelModel<S> {
       for (int t = 0; t < kTerms; ++t) {
         P basis[kTerms] = {P(0.0), P(0.0), P(0.0)};
         basis[t] = P(1.0);
-        error = std::max(error, std::abs(lane(plain(table_.template sum<kTerms>(S(P(v)), basis)), 0) - plain(f[t])));
+        error = std::max(error, std::abs(lane(plain(table_.template sum<kTerms>(P(v), basis)), 0) - plain(f[t])));
       }
     }
     return error;
@@ -149,9 +138,8 @@ class SeriesImage final : public PixelModel<S> {
   int panels_;
   double na_;
   Pupil pupil_;
-  S focus_um_, sum_rad_, cos_sum_, sin_sum_, cos_between_;
-  double pixel_um_;
-  S center_x_, center_y_;
+  S focus_um_, cos_between_;
+  RoundView<S> view_;
   Symmetry symmetry_;
   RadialSeries<Single> series_;
   RadialTable<S> table_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -166,35 +165,6 @@ std::vector<double> padded(std::vector<double> x) {
   x.resize(x.size() + kLanes);
   return x;
 }
-
-/// Phases last some ten microseconds and there are thousands of them: who waits looks again for about as long as a phase before
-/// it sleeps, because to be woken takes longer (std::barrier sleeps after some 16 looks: two threads were hardly faster than one).
-class Barrier {
- public:
-  explicit Barrier(int threads) : threads_(threads) {}
-  void arrive_and_wait() {
-    constexpr int kLooks = 4000;
-    const unsigned phase = phase_.load(std::memory_order_acquire);
-    if (arrived_.fetch_add(1, std::memory_order_acq_rel) + 1 == threads_) {
-      arrived_.store(0, std::memory_order_relaxed);
-      phase_.store(phase + 1, std::memory_order_release);
-      phase_.notify_all();
-      return;
-    }
-    for (int i = 0; i < kLooks; ++i) {
-      if (phase_.load(std::memory_order_acquire) != phase) return;
-#if defined(__x86_64__)
-      _mm_pause();
-#endif
-    }
-    phase_.wait(phase, std::memory_order_acquire);
-  }
-
- private:
-  const int threads_;
-  std::atomic<int> arrived_{0};
-  std::atomic<unsigned> phase_{0};
-};
 
 /// The walk of a worker through work that all share: phases end at a barrier.
 struct Crew {

@@ -43,12 +43,6 @@ struct Ball {
     return render(scene, plan(scene, theta), theta, {}, 1).intensity;
   }
 };
-double largest_difference(const Image& a, const Image& b) {
-  double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(a.values()[i] - b.values()[i]));
-  return worst;
-}
-
 // Nested spheres solved once more by bisection elsewhere; printed with nine digits.
 TEST(Ball, EccentricShellDirectorAgreesWithTheTable) {
   const ReferenceTable table(data_path("physics/shell_eccentric_director.csv"));

@@ -1,0 +1,85 @@
+#pragma once
+// Pictures that are the same all around a centre: sums of a few functions of the radius times cosines and sines of the azimuth.
+
+#include <array>
+
+#include "core/scalar.h"
+#include "render/pixel_model.h"
+#include "render/radial_table.h"
+
+namespace birefit {
+
+/// Those derivatives of a quantity that do not vanish; the same for all points of a picture.
+template <class S>
+class Sensitivity {
+ public:
+  Sensitivity() = default;
+  explicit Sensitivity([[maybe_unused]] const S& x) {
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (std::size_t j = 0; j < x.d.size(); ++j)
+        if (const double d = lane(x.d[j], 0); d != 0) by_[static_cast<std::size_t>(count_++)] = {j, d};
+  }
+  /// Adds what `slope`, the derivative of `to` by the quantity, brings.
+  BIREFIT_INLINE void add([[maybe_unused]] const PlainOf<S>& slope, [[maybe_unused]] S& to) const {
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (int k = 0; k < count_; ++k) {
+        const auto& [j, d] = by_[static_cast<std::size_t>(k)];
+        to.d[j] = to.d[j] + slope * PlainOf<S>(d);
+      }
+  }
+
+ private:
+  struct By {
+    std::size_t parameter;
+    double derivative;
+  };
+  std::array<By, static_cast<std::size_t>(ScalarTraits<S>::derivatives) + 1> by_{};
+  int count_ = 0;
+};
+
+/// Where points lie about the centre. Light is sum_k basis_k f_k(radius), basis = (q^2, q, 1, s, q s) with q, s = cos, sin of (2 azimuth -
+/// analyser - polarizer).
+template <class S>
+class RoundView {
+ public:
+  using P = PlainOf<S>;
+  static constexpr int kMostTerms = 5;
+  RoundView(const Scene& scene, const Values<S>& value)
+      : pixel_um_(scene.view.pixel_size_um), center_x_(plain(value(scene.view.center_x_px))), center_y_(plain(value(scene.view.center_y_px))) {
+    const S sum = value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg);
+    sin_cos(plain(sum), sin_sum_, cos_sum_);
+    by_center_x_ = Sensitivity<S>(value(scene.view.center_x_px));
+    by_center_y_ = Sensitivity<S>(value(scene.view.center_y_px));
+    by_sum_ = Sensitivity<S>(sum);
+  }
+  struct Place {
+    P x, y, inverse_rho, rho_um, q, s;
+  };
+  Place at(const P& column, const P& row) const {
+    Place p;
+    p.x = (column - center_x_) * P(pixel_um_), p.y = (center_y_ - row) * P(pixel_um_);
+    const P rho2 = p.x * p.x + p.y * p.y + P(1e-18);
+    p.inverse_rho = inverse_root(rho2), p.rho_um = rho2 * p.inverse_rho;
+    const P square = p.inverse_rho * p.inverse_rho, c2 = (p.x * p.x - p.y * p.y) * square, s2 = P(2.0) * p.x * p.y * square;
+    p.q = cos_sum_ * c2 + sin_sum_ * s2, p.s = cos_sum_ * s2 - sin_sum_ * c2;
+    return p;
+  }
+  static std::array<P, kMostTerms> basis(const Place& p) { return {p.q * p.q, p.q, P(1.0), p.s, p.q * p.s}; }
+  /// Its derivative by 2 azimuth: q' = -s, s' = q.
+  static std::array<P, kMostTerms> turned(const Place& p) { return {P(-2.0) * p.q * p.s, -p.s, P(0.0), p.q, p.q * p.q - p.s * p.s}; }
+  /// Adds the derivatives that light has because its place moves, from its slopes by the radius (um) and by 2 azimuth.
+  void add_moves(const Place& p, const P& by_rho, const P& by_angle, S& light) const {
+    const P outwards = by_rho * p.inverse_rho * P(pixel_um_), around = by_angle * P(2 * pixel_um_) * p.inverse_rho * p.inverse_rho;
+    by_center_x_.add(around * p.y - outwards * p.x, light);
+    by_center_y_.add(around * p.x + outwards * p.y, light);
+    by_sum_.add(-by_angle, light);
+  }
+  double pixel_um() const { return pixel_um_; }
+
+ private:
+  double pixel_um_;
+  P center_x_, center_y_, sin_sum_, cos_sum_;
+  Sensitivity<S> by_center_x_, by_center_y_, by_sum_;
+};
+
+}  // namespace birefit
