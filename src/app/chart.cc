@@ -46,6 +46,64 @@ std::string frames_csv(const MethodChart& chart) {
   return text;
 }
 
+double fastest_seconds(const ChartPoint& p) { return std::isfinite(p.seconds_in_lanes) ? p.seconds_in_lanes : p.seconds; }
+
+/// " order=3" of a series that is shorter or longer than usual; such are lines of their own.
+std::string line_of(const ChartPoint& p) {
+  const std::size_t at = p.effort.find(' ');
+  return at == std::string::npos ? "" : p.effort.substr(at);
+}
+
+/// The fastest point of a method (of any: "") on a ray whose intensity errs by at most `error`, and so does every slower one on that
+/// line: not by chance. Null where there is none.
+const ChartPoint* fastest_within(const MethodChart& chart, const std::string& scene, const std::string& method, double error) {
+  const ChartPoint* best = nullptr;
+  for (const ChartPoint& p : chart.points) {
+    if (p.scene != scene || (!method.empty() && p.method != method) || !(p.intensity_error <= error)) continue;
+    const bool holds = std::all_of(chart.points.begin(), chart.points.end(), [&](const ChartPoint& q) {
+      return q.scene != scene || q.method != p.method || line_of(q) != line_of(p) || fastest_seconds(q) <= fastest_seconds(p) || q.intensity_error <= error;
+    });
+    if (holds && (!best || fastest_seconds(p) < fastest_seconds(*best))) best = &p;
+  }
+  return best;
+}
+
+/// What docs/methods.md quotes of the measurements.
+std::string summary_md(const MethodChart& chart) {
+  const auto number = [](double x) {
+    if (x < 10) return fmt::format("{:.1f}", x);
+    const double digit = std::pow(10, std::floor(std::log10(x)) - 1);  // the second
+    return fmt::format("{:.0f}", digit * std::round(x / digit));
+  };
+  std::string text = "Microseconds a ray for an intensity within 1e-4, one core (- : not reached):\n\n| ray |", rule = "|---|";
+  for (const char* method : kChartedMethods) text += fmt::format(" {} |", method), rule += "---|";
+  text += "\n" + rule + "\n";
+  for (const ChartScene& scene : chart.scenes) {
+    text += fmt::format("| {} |", scene.name);
+    for (const char* method : kChartedMethods) {
+      const ChartPoint* p = fastest_within(chart, scene.name, method, 1e-4);
+      text += p ? fmt::format(" {} |", number(1e6 * fastest_seconds(*p))) : " - |";
+    }
+    text += "\n";
+  }
+  text += "\nAgainst the source paper's 4,096 layers (layers_edge) and, at an error of 1e-4, layers of their middle:\n\n"
+          "| ray | 4,096 layers: us a ray, error | fastest at no larger error | times faster | layers_midpoint at 1e-4: us a ray | fastest at 1e-4 | times faster |\n|---|---|---|---|---|---|---|\n";
+  for (const ChartScene& scene : chart.scenes) {
+    const auto edge = std::find_if(chart.points.begin(), chart.points.end(), [&](const ChartPoint& p) { return p.scene == scene.name && p.method == "layers_edge" && p.effort == "n=4096"; });
+    const ChartPoint *middle = fastest_within(chart, scene.name, "layers_midpoint", 1e-4), *best = fastest_within(chart, scene.name, "", 1e-4);
+    if (edge == chart.points.end() || !middle || !best) continue;
+    const ChartPoint* no_worse = fastest_within(chart, scene.name, "", edge->intensity_error);
+    text += fmt::format("| {} | {}, {:.0e} | {} {} | {} | {} | {} {} | {} |\n", scene.name, number(1e6 * fastest_seconds(*edge)), edge->intensity_error, no_worse->method, no_worse->effort,
+                        number(fastest_seconds(*edge) / fastest_seconds(*no_worse)), number(1e6 * fastest_seconds(*middle)), best->method, best->effort,
+                        number(fastest_seconds(*middle) / fastest_seconds(*best)));
+  }
+  if (chart.frames.empty()) return text;
+  text += "\nFrames of 500 x 500 pixels for 1e-4:\n\n| scene | method | ms | worst error |\n|---|---|---|---|\n";
+  for (const ChartFrame& f : chart.frames)
+    if (f.asked == 1e-4) text += fmt::format("| {} | {} | {} | {:.0e} |\n", f.scene, f.method, number(1e3 * f.seconds), f.worst_error);
+  return text;
+}
+
 std::string rays_script(const MethodChart& chart, const std::string& svg) {
   std::string script = fmt::format(
       "set terminal svg size 1500,820 dynamic font 'sans,13' background rgb 'white'\nset output {}\n"
@@ -59,11 +117,8 @@ std::string rays_script(const MethodChart& chart, const std::string& svg) {
       // A line for each length of series.
       std::map<std::string, std::string> lines;
       for (const ChartPoint& p : chart.points) {
-        const double seconds = std::isfinite(p.seconds_in_lanes) ? p.seconds_in_lanes : p.seconds;
-        if (p.scene == scene.name && p.method == kChartedMethods[m] && std::isfinite(p.intensity_error) && p.intensity_error < 2) {
-          const std::size_t order = p.effort.find(' ');
-          lines[order == std::string::npos ? "" : p.effort.substr(order)] += fmt::format("{:.6g} {:.6g}\n", std::max(p.intensity_error, 1e-14), 1e6 * seconds);
-        }
+        if (p.scene == scene.name && p.method == kChartedMethods[m] && std::isfinite(p.intensity_error) && p.intensity_error < 2)
+          lines[line_of(p)] += fmt::format("{:.6g} {:.6g}\n", std::max(p.intensity_error, 1e-14), 1e6 * fastest_seconds(p));
       }
       std::string block;
       for (const auto& [order, line] : lines) block += (block.empty() ? "" : "\n") + line;
@@ -156,6 +211,7 @@ int run_chart(const Arguments& arguments) {
   });
   write_file((out / "chart.csv").string(), points_csv(chart));
   write_file((out / "scenes.csv").string(), scenes_csv(chart));
+  write_file((out / "summary.md").string(), summary_md(chart));
   if (!chart.frames.empty()) write_file((out / "frames.csv").string(), frames_csv(chart));
   if (draw(rays_script(chart, plot_path(out / "chart.svg"))) && !chart.frames.empty())
     draw(frames_script(chart, plot_path(out / "frames.svg")));
@@ -173,7 +229,7 @@ int run_chart(const Arguments& arguments) {
 Command add_chart_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("chart", "speed against accuracy of every transport method, measured here: tables and pictures");
-  command->add_option("--out", arguments->out, "folder for chart.csv, scenes.csv, frames.csv, waves.csv and the SVGs")->capture_default_str();
+  command->add_option("--out", arguments->out, "folder for chart.csv, scenes.csv, frames.csv, waves.csv, summary.md (the tables that methods.md quotes) and the SVGs")->capture_default_str();
   command->add_flag("--quick", arguments->quick, "fewer efforts, no frames");
   command->add_flag("-q,--quiet", arguments->quiet, "say nothing");
   return {command, [arguments] { return run_chart(*arguments); }};
