@@ -10,7 +10,6 @@
 #include "render/pixel_mean.h"
 #include "render/radial_table.h"
 #include "render/round_view.h"
-#include "render/sampling.h"
 #include "render/wave.h"
 #include "wave/radial_series.h"
 
@@ -180,19 +179,20 @@ RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
     if (error <= target || plan.radial_panels > finest) break;
   }
   plan.reasons.push_back(fmt::format("its field at {} radii serves all pixels (interpolated to {:.1e})", plan.radial_panels * RadialTable<double>::kPoints, error));
-  // Pixels on a spiral over the sphere and what the focus spreads around it; few stand for many, hence twice the worst.
+  // Pixels on a spiral over the sphere and what the focus spreads around it; few stand for many, hence thrice the worst.
   const double over = std::min(plan.series_reach_um / 1.1, o.radius_um + 1 + std::abs(value.get(scene.microscope.focus_um, 0.0)) * na / o.n_host) / px;
   const Values<Pack> lanes = value.as<Pack>();
   SeriesImage<Pack> image(scene, plan, lanes);
   image.tabulate(PixelModel<Pack>::Wanted::picture, 1);
+  constexpr int kPixels = 96;
   double left = 0;
-  plan.samples = {samples_for(2 * o.k0 * na * px)};
+  plan.samples = {1};
   for (int& n = plan.samples[0];; n += n < 4 ? 1 : 2) {
     left = 0;
-    for (int i = 0; i < 24; ++i) {
-      const double radius = over * (i + 0.5) / 24, azimuth = 2.399963 * i, column = std::round(cx + radius * std::cos(azimuth)), row = std::round(cy + radius * std::sin(azimuth));
+    for (int i = 0; i < kPixels; ++i) {
+      const double radius = over * (i + 0.5) / kPixels, azimuth = 2.399963 * i, column = std::round(cx + radius * std::cos(azimuth)), row = std::round(cy + radius * std::sin(azimuth));
       if (column < 0 || row < 0 || column >= scene.view.width || row >= scene.view.height) continue;
-      left = std::max(left, 2 * std::abs(pixel_mean(image, column, row, n) - pixel_mean(image, column, row, 16)));
+      left = std::max(left, 3 * std::abs(pixel_mean(image, column, row, n) - pixel_mean(image, column, row, 16)));
     }
     if (left <= 0.5 * scene.intensity_accuracy || n >= 8) break;
   }
