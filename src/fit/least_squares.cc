@@ -43,6 +43,17 @@ Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::M
                                                                                (scale.asDiagonal() * right))));
 }
 
+/// body(part, first row, rows) over the rows of a frame, some thousand at a time. What the parts sum up is added in their order, so that it
+/// does not depend on the number of threads.
+template <class Body>
+void for_parts(Eigen::Index rows, int threads, const Body& body) {
+  parallel_for(static_cast<int>((rows + kTileRows - 1) / kTileRows), threads, [&](int part) {
+    const Eigen::Index begin = part * kTileRows;
+    body(static_cast<std::size_t>(part), begin, std::min(kTileRows, rows - begin));
+  });
+}
+std::size_t parts_of(Eigen::Index rows) { return static_cast<std::size_t>((rows + kTileRows - 1) / kTileRows); }
+
 int position(const std::vector<int>& indices, int index) {
   const auto found = std::find(indices.begin(), indices.end(), index);
   return found == indices.end() ? -1 : static_cast<int>(found - indices.begin());
@@ -105,11 +116,12 @@ void LeastSquares::set_misfit(const std::vector<Misfit>& misfit) {
     frame.mean_factor = misfit_[g].mean_follows_shape ? frame.shape_factor : 1 / std::sqrt(1 + ratio * ratio);
     auto value = whitened_value_.segment(frame.begin, frame.count);
     value = frame.set.value;
-    whiten(frame, value);
+    const int threads = thread_count(job_.options.threads);
+    whiten(frame, value, threads);
     for (Term& term : frame.terms) {
       if (term.of_intensity) continue;
       term.whitened = term.shape ? term.at_pixels : Eigen::VectorXd::Ones(frame.count);
-      whiten(frame, term.whitened);
+      whiten(frame, term.whitened, threads);
     }
   }
 }
@@ -117,17 +129,21 @@ void LeastSquares::set_misfit(const std::vector<Misfit>& misfit) {
 /// Multiplies by the inverse square root of diag(sigma^2) with the misfit's two parts. With u = 1/sigma normalised the
 /// generalised mean is the component along u of the noise-whitened vector, so that the inverse square root of
 /// I + (mean_sd |1/sigma|)^2 u u^T is another factor along u (Sherman & Morrison).
-void LeastSquares::whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const {
-  rows.array() *= frame.inverse_sigma.array();
-  if (frame.shape_factor == 1 && frame.mean_factor == 1) return;
-  if (frame.shape_factor == frame.mean_factor) {
-    rows *= frame.shape_factor;
-    return;
-  }
-  const double norm = frame.inverse_sigma_norm;
-  const double along = frame.inverse_sigma.dot(rows) / norm;
-  rows *= frame.shape_factor;
-  rows += ((frame.mean_factor - frame.shape_factor) * along / norm) * frame.inverse_sigma;
+void LeastSquares::whiten(const Frame& frame, Eigen::Ref<Eigen::MatrixXd> columns, int threads) const {
+  const bool alike = frame.shape_factor == frame.mean_factor;
+  std::vector<Eigen::RowVectorXd> parts(alike ? 0 : parts_of(frame.count));
+  for_parts(frame.count, threads, [&](std::size_t part, Eigen::Index begin, Eigen::Index rows) {
+    const auto inverse_sigma = frame.inverse_sigma.segment(begin, rows);
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j).segment(begin, rows).array() *= frame.shape_factor * inverse_sigma.array();
+    if (!alike) parts[part] = inverse_sigma.transpose() * columns.middleRows(begin, rows);
+  });
+  if (alike) return;
+  Eigen::RowVectorXd along = Eigen::RowVectorXd::Zero(columns.cols());  // times the norm and the shape's factor
+  for (const Eigen::RowVectorXd& part : parts) along += part;
+  along *= (frame.mean_factor / frame.shape_factor - 1) / (frame.inverse_sigma_norm * frame.inverse_sigma_norm);
+  for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j).segment(begin, rows) += along[j] * frame.inverse_sigma.segment(begin, rows);
+  });
 }
 
 void LeastSquares::set_priors() {
@@ -182,11 +198,13 @@ void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, in
   if (2 * pixels.size() > static_cast<std::size_t>(scene.view.width) * scene.view.height) {
     render(scene, plans_[g], theta_, active, threads, frame.rendering);
     const Rendering& rendering = frame.rendering;
-    const auto gather = [&](const Image& image, auto&& out) {
-      for (Eigen::Index i = 0; i < frame.count; ++i) out[i] = image(pixels[i][0], pixels[i][1]);
-    };
-    gather(rendering.intensity, intensity);
-    for (std::size_t j = 0; j < active.size(); ++j) gather(rendering.derivatives[j], derivative(j));
+    for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
+      const auto gather = [&](const Image& image, auto&& out) {
+        for (Eigen::Index i = begin; i < begin + rows; ++i) out[i] = image(pixels[static_cast<std::size_t>(i)][0], pixels[static_cast<std::size_t>(i)][1]);
+      };
+      gather(rendering.intensity, intensity);
+      for (std::size_t j = 0; j < active.size(); ++j) gather(rendering.derivatives[j], derivative(j));
+    });
   } else {
     const PixelRendering rendering = render_pixels(scene, plans_[g], theta_, pixels, active, threads);
     intensity = rendering.intensity;
@@ -209,15 +227,21 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
   if (derivatives)
     for (const int j : frame.read) active.push_back(unknowns_.searched[static_cast<std::size_t>(j)]);
   auto intensity = intensity_.segment(frame.begin, frame.count);
-  if (derivatives) searched_columns_.middleRows(frame.begin, frame.count).setZero();
+  if (derivatives)
+    for (int j = 0; j < searched_size(); ++j)
+      if (std::find(frame.read.begin(), frame.read.end(), j) == frame.read.end()) searched_columns_.col(j).segment(frame.begin, frame.count).setZero();
   render_used(g, active, threads, intensity, [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
   frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
   frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
   for (Term& term : frame.terms) {
     if (!term.of_intensity) continue;
-    term.whitened = intensity;
-    if (term.shape) term.whitened.array() *= term.at_pixels.array();
-    whiten(frame, term.whitened);
+    term.whitened.resize(frame.count);
+    for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
+      auto whitened = term.whitened.segment(begin, rows);
+      whitened = intensity.segment(begin, rows);
+      if (term.shape) whitened.array() *= term.at_pixels.segment(begin, rows).array();
+    });
+    whiten(frame, term.whitened, threads);
   }
 }
 
@@ -236,26 +260,56 @@ Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change, 
   Eigen::VectorXd change = intensity_change;
   for (const Frame& frame : frames_) {
     auto part = change.segment(frame.begin, frame.count);
-    part.array() *= light(frame, true).array();
-    whiten(frame, part);
+    part.array() *= light(frame, true, 0, frame.count).array();
+    whiten(frame, part, thread_count(job_.options.threads));
   }
   for (const Tile& tile : tiles_)
     if (tile.micrograph >= 0) pull += full_rows(tile).transpose() * change.segment(frames_[tile.micrograph].begin + tile.begin, tile.count);
   return -covariance * pull;
 }
 
-/// Sum of the coefficients of the intensity, or of those by themselves, at every pixel.
-Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(frame.count);
+/// Sum of the coefficients of the intensity, or of those by themselves, at these pixels.
+Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity, Eigen::Index begin, Eigen::Index rows) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows);
   for (const Term& term : frame.terms) {
     if (term.of_intensity != of_intensity) continue;
     const double coefficient = term.coefficient_in(theta_);
     if (term.shape)
-      sum += coefficient * term.at_pixels;
+      sum += coefficient * term.at_pixels.segment(begin, rows);
     else
       sum.array() += coefficient;
   }
   return sum;
+}
+
+/// Sums of products of the linear unknowns' rows with each other and with `columns`, over one frame.
+template <class Columns>
+void LeastSquares::add_products(const Frame& frame, int threads, const Columns& columns, Eigen::MatrixXd& gram, Eigen::MatrixXd& cross) const {
+  struct Products {
+    Eigen::MatrixXd gram, cross;
+  };
+  std::vector<const Term*> terms;
+  for (const Term& term : frame.terms)
+    if (term.unknown >= 0) terms.push_back(&term);
+  const Eigen::Index l = static_cast<Eigen::Index>(terms.size());
+  std::vector<Products> parts(parts_of(frame.count));
+  for_parts(frame.count, threads, [&](std::size_t part, Eigen::Index begin, Eigen::Index rows) {
+    Products& sum = parts[part];
+    sum.gram.resize(l, l);
+    const auto& right = columns(begin, rows);
+    sum.cross.resize(l, right.cols());
+    for (Eigen::Index i = 0; i < l; ++i) {
+      const auto row = terms[static_cast<std::size_t>(i)]->whitened.segment(begin, rows);
+      for (Eigen::Index j = 0; j <= i; ++j) sum.gram(i, j) = sum.gram(j, i) = row.dot(terms[static_cast<std::size_t>(j)]->whitened.segment(begin, rows));
+      for (Eigen::Index j = 0; j < right.cols(); ++j) sum.cross(i, j) = row.dot(right.col(j));
+    }
+  });
+  for (const Products& sum : parts)
+    for (Eigen::Index i = 0; i < l; ++i) {
+      const int at = terms[static_cast<std::size_t>(i)]->unknown;
+      cross.row(at) += sum.cross.row(i);
+      for (Eigen::Index j = 0; j < l; ++j) gram(at, terms[static_cast<std::size_t>(j)]->unknown) += sum.gram(i, j);
+    }
 }
 
 void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
@@ -268,15 +322,15 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   solve_linear();
   if (!derivatives) return;
 
-  const int l = static_cast<int>(unknowns_.linear.size());
-  for (const Frame& frame : frames_) {
-    const Eigen::VectorXd gain = light(frame, true);
-    for (Eigen::Index j = 0; j < p; ++j) {
-      auto column = searched_columns_.col(j).segment(frame.begin, frame.count);
-      column.array() *= gain.array();
-      whiten(frame, column);
-    }
-  }
+  const int l = static_cast<int>(unknowns_.linear.size()), threads = thread_count(job_.options.threads);
+  for_frames([&](std::size_t g, int threads) {
+    const Frame& frame = frames_[g];
+    for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
+      const Eigen::VectorXd gain = light(frame, true, begin, rows);
+      for (Eigen::Index j = 0; j < p; ++j) searched_columns_.col(j).segment(frame.begin + begin, rows).array() *= gain.array();
+    });
+    whiten(frame, searched_columns_.middleRows(frame.begin, frame.count), threads);
+  });
   if (prior_root_.rows() > 0) searched_columns_.bottomRows(prior_root_.rows()) = prior_root_.leftCols(p);
 
   // How the freely solved linear unknowns follow: projection = (X^T X)^-1 X^T D.
@@ -289,15 +343,8 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   }
   if (!moving.empty() && p > 0) {
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l), cross = Eigen::MatrixXd::Zero(l, p);
-    for (const Frame& frame : frames_) {
-      const auto d = searched_columns_.middleRows(frame.begin, frame.count);
-      for (const Term& term : frame.terms) {
-        if (term.unknown < 0) continue;
-        cross.row(term.unknown) += term.whitened.transpose() * d;
-        for (const Term& other : frame.terms)
-          if (other.unknown >= 0) gram(term.unknown, other.unknown) += term.whitened.dot(other.whitened);
-      }
-    }
+    for (const Frame& frame : frames_)
+      add_products(frame, threads, [&](Eigen::Index begin, Eigen::Index rows) { return searched_columns_.middleRows(frame.begin + begin, rows); }, gram, cross);
     if (prior_root_.rows() > 0) {
       gram += prior_root_.rightCols(l).transpose() * prior_root_.rightCols(l);
       cross += prior_root_.rightCols(l).transpose() * prior_root_.leftCols(p);
@@ -312,20 +359,18 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
 void LeastSquares::solve_linear() {
   const int l = static_cast<int>(unknowns_.linear.size());
   const int p = static_cast<int>(unknowns_.searched.size());
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(l);
+  const int threads = thread_count(job_.options.threads);
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l), cross = Eigen::MatrixXd::Zero(l, 1);
   for (const Frame& frame : frames_) {
     if (l == 0) break;
-    Eigen::VectorXd left = whitened_value_.segment(frame.begin, frame.count);
-    for (const Term& term : frame.terms)
-      if (const double coefficient = term.coefficient_in(theta_); term.unknown < 0 && coefficient != 0) left -= coefficient * term.whitened;
-    for (const Term& term : frame.terms) {
-      if (term.unknown < 0) continue;
-      right[term.unknown] += term.whitened.dot(left);
-      for (const Term& other : frame.terms)
-        if (other.unknown >= 0) gram(term.unknown, other.unknown) += term.whitened.dot(other.whitened);
-    }
+    add_products(frame, threads, [&](Eigen::Index begin, Eigen::Index rows) {
+      Eigen::VectorXd left = whitened_value_.segment(frame.begin + begin, rows);
+      for (const Term& term : frame.terms)
+        if (const double coefficient = term.coefficient_in(theta_); term.unknown < 0 && coefficient != 0) left -= coefficient * term.whitened.segment(begin, rows);
+      return left;
+    }, gram, cross);
   }
+  Eigen::VectorXd right = cross.col(0);
   Eigen::VectorXd searched(p);
   for (int j = 0; j < p; ++j) searched[j] = theta_[unknowns_.searched[j]];
   if (prior_root_.rows() > 0 && l > 0) {
@@ -360,23 +405,40 @@ void LeastSquares::solve_linear() {
   }
   for (int j = 0; j < l; ++j) theta_[unknowns_.linear[j]] = linear[j];
 
-  for (const Frame& frame : frames_) {
-    auto residual = residual_.segment(frame.begin, frame.count);
-    residual = -whitened_value_.segment(frame.begin, frame.count);
-    for (const Term& term : frame.terms)
-      if (const double coefficient = term.coefficient_in(theta_); coefficient != 0) residual += coefficient * term.whitened;
-  }
+  for_frames([&](std::size_t g, int threads_of_frame) {
+    const Frame& frame = frames_[g];
+    for_parts(frame.count, threads_of_frame, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
+      auto residual = residual_.segment(frame.begin + begin, rows);
+      residual = -whitened_value_.segment(frame.begin + begin, rows);
+      for (const Term& term : frame.terms)
+        if (const double coefficient = term.coefficient_in(theta_); coefficient != 0) residual += coefficient * term.whitened.segment(begin, rows);
+    });
+  });
   if (prior_root_.rows() > 0)
     residual_.tail(prior_root_.rows()) =
         prior_root_.leftCols(p) * searched + prior_root_.rightCols(l) * linear - prior_target_;
 }
 
+/// Triangular factor of the rows that rows_of(tile) gives, of some tiles at a time and then of those factors.
+template <class Rows>
+Eigen::MatrixXd LeastSquares::factor_of(Eigen::Index columns, const Rows& rows_of) const {
+  constexpr std::size_t kTogether = 4;
+  std::vector<Eigen::MatrixXd> factors((tiles_.size() + kTogether - 1) / kTogether);
+  parallel_for(static_cast<int>(factors.size()), thread_count(job_.options.threads), [&](int part) {
+    TallQr qr(static_cast<int>(columns));
+    const std::size_t first = static_cast<std::size_t>(part) * kTogether;
+    for (std::size_t t = first; t < std::min(first + kTogether, tiles_.size()); ++t) qr.add(rows_of(tiles_[t]));
+    factors[static_cast<std::size_t>(part)] = qr.factor();
+  });
+  TallQr all(static_cast<int>(columns));
+  for (const Eigen::MatrixXd& factor : factors) all.add(factor);
+  return all.factor();
+}
+
 Eigen::MatrixXd LeastSquares::projected_factor(const Eigen::VectorXd& scale) const {
   const Eigen::Index p = scale.size();
-  TallQr qr(static_cast<int>(p) + 1);
-  Eigen::MatrixXd rows;
-  for (const Tile& tile : tiles_) {
-    rows.resize(tile.count, p + 1);
+  return factor_of(p + 1, [&](const Tile& tile) {
+    Eigen::MatrixXd rows(tile.count, p + 1);
     const Eigen::Index begin = tile.micrograph < 0 ? pixel_rows_ : frames_[static_cast<std::size_t>(tile.micrograph)].begin + tile.begin;
     rows.leftCols(p) = searched_columns_.middleRows(begin, tile.count);
     if (tile.micrograph < 0) {
@@ -387,9 +449,8 @@ Eigen::MatrixXd LeastSquares::projected_factor(const Eigen::VectorXd& scale) con
     }
     rows.leftCols(p) *= scale.asDiagonal();
     rows.col(p) = residual_.segment(begin, tile.count);
-    qr.add(rows);
-  }
-  return qr.factor();
+    return rows;
+  });
 }
 
 Eigen::MatrixXd LeastSquares::full_rows(const Tile& tile) const {
@@ -405,10 +466,10 @@ Eigen::MatrixXd LeastSquares::full_rows(const Tile& tile) const {
 }
 
 Eigen::MatrixXd LeastSquares::factor(bool with_priors) const {
-  TallQr qr(unknowns_.size());
-  for (const Tile& tile : tiles_)
-    if (tile.micrograph >= 0 || with_priors) qr.add(full_rows(tile));
-  return qr.factor();
+  return factor_of(unknowns_.size(), [&](const Tile& tile) -> Eigen::MatrixXd {
+    if (tile.micrograph < 0 && !with_priors) return Eigen::MatrixXd::Zero(1, unknowns_.size());
+    return full_rows(tile);
+  });
 }
 
 Eigen::VectorXd LeastSquares::gradient() const {
@@ -505,7 +566,7 @@ LeastSquares::FrameMisfit LeastSquares::frame_misfit(int micrograph) const {
 
 Eigen::VectorXd LeastSquares::noise_whitened_residual(int micrograph) const {
   const Frame& frame = frames_[micrograph];
-  const Eigen::VectorXd gain = light(frame, true), offset = light(frame, false);
+  const Eigen::VectorXd gain = light(frame, true, 0, frame.count), offset = light(frame, false, 0, frame.count);
   return ((gain.array() * intensity_.segment(frame.begin, frame.count).array() + offset.array() - frame.set.value.array()) *
           frame.inverse_sigma.array())
       .matrix();

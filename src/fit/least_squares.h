@@ -139,8 +139,10 @@ class LeastSquares {
                    const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative);
   template <class Body>
   void for_frames(const Body& body);
-  Eigen::VectorXd light(const Frame& frame, bool of_intensity) const;
-  void whiten(const Frame& frame, Eigen::Ref<Eigen::VectorXd> rows) const;
+  Eigen::VectorXd light(const Frame& frame, bool of_intensity, Eigen::Index begin, Eigen::Index rows) const;
+  void whiten(const Frame& frame, Eigen::Ref<Eigen::MatrixXd> columns, int threads) const;
+  template <class Columns>
+  void add_products(const Frame& frame, int threads, const Columns& columns, Eigen::MatrixXd& gram, Eigen::MatrixXd& cross) const;
   void set_priors();
   void solve_linear();
   /// Some thousand rows of one micrograph, or the priors'.
@@ -149,6 +151,8 @@ class LeastSquares {
     Eigen::Index begin = 0, count = 0;
   };
   Eigen::MatrixXd full_rows(const Tile& tile) const;
+  template <class Rows>
+  Eigen::MatrixXd factor_of(Eigen::Index columns, const Rows& rows_of) const;
 
   const FitJob& job_;
   Unknowns unknowns_;
