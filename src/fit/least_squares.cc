@@ -525,7 +525,8 @@ Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) co
         const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(tile.begin + i)];
         const int cell = (y - top) * kSide / (bottom - top + 1) * kSide + (x - left) * kSide / (right - left + 1);
         const int ring = std::min(kRings - 1, static_cast<int>(kRings * std::hypot(x - center_x, y - center_y) / farthest));
-        const Eigen::RowVectorXd pull = influence.row(i) * residual_[frame.begin + tile.begin + i], square = influence.row(i).cwiseAbs2();
+        const auto pull = influence.row(i) * residual_[frame.begin + tile.begin + i];
+        const auto square = influence.row(i).cwiseAbs2();
         sum[0].row(cell) += pull, squares[0].row(cell) += square;
         sum[1].row(ring) += pull, squares[1].row(ring) += square;
       }

@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "birefit/fit.h"
+#include "birefit/render.h"
+#include "fit/least_squares.h"
 
 namespace birefit {
 namespace {
@@ -586,7 +588,7 @@ TEST(Fit, GivesTheSameBitsWithOneAndTwoThreads) {
     bar.free(bar.bias, 500, 100, 4000);
     bar.free(bar.tilt, 0.3, 0.1, 0.7);
     bar.free_linear();
-    Micrograph& micrograph = bar.add_image(64, 64, bar.bias);
+    Micrograph& micrograph = bar.add_image(160, 150, bar.bias);  // some parts of a few thousand pixels
     Gaussian gaussian(17);
     expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return std::round(20 * gaussian()); });
     return fit(bar.job);
@@ -595,6 +597,59 @@ TEST(Fit, GivesTheSameBitsWithOneAndTwoThreads) {
   EXPECT_EQ(one.theta, two.theta);
   EXPECT_EQ(one.covariance, two.covariance);
   EXPECT_EQ(one.evaluations, two.evaluations);
+}
+
+// Three parts of some thousand pixels. Whitened, the residual's generalised mean has its own variance and what lies across it another
+// (Misfit): chi-square is the sum of both, its gradient the difference of two chi-squares, the triangular factor has the same chi-square and
+// gradient, and gain and offset are where theirs vanishes.
+TEST(LeastSquares, WeightsMeanAndShapeApartOverAllParts) {
+  Bar bar(700, 0.4);
+  bar.free(bar.bias, 690, 100, 4000);
+  bar.free(bar.tilt, 0.38, 0.1, 0.7);
+  bar.free_linear();
+  Micrograph& micrograph = bar.add_image(110, 100, bar.bias);
+  Gaussian gaussian(23);
+  expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
+  estimation::PixelSet set;
+  std::vector<double> value, sigma;
+  for (int y = 0; y < 100; ++y)
+    for (int x = 0; x < 110; ++x) {
+      set.pixels.push_back({x, y});
+      value.push_back(micrograph.values(x, y));
+      sigma.push_back(15 + 0.1 * x);
+    }
+  set.value = Eigen::Map<const Eigen::VectorXd>(value.data(), static_cast<Eigen::Index>(value.size()));
+  set.sigma = Eigen::Map<const Eigen::VectorXd>(sigma.data(), static_cast<Eigen::Index>(sigma.size()));
+  const estimation::Unknowns unknowns = estimation::Unknowns::of(bar.job);
+  estimation::LeastSquares problem(bar.job, unknowns, {plan(micrograph.scene, bar.job.parameters.values())}, {set});
+  const estimation::Misfit misfit{0.9, 2.5, false};
+  problem.set_misfit({misfit});
+  const auto objective_at = [&](double bias, double tilt) {
+    problem.evaluate(Eigen::Vector2d(bias, tilt), false);
+    return problem.objective();
+  };
+  const double by_bias = (objective_at(690.01, 0.38) - objective_at(689.99, 0.38)) / 0.02;
+  const double by_tilt = (objective_at(690, 0.3801) - objective_at(690, 0.3799)) / 0.0002;
+  problem.evaluate(Eigen::Vector2d(690, 0.38), true);
+  const Theta& theta = problem.theta();
+  Eigen::VectorXd noise(set.value.size());
+  for (Eigen::Index i = 0; i < noise.size(); ++i) {
+    const double signal = theta[bar.gain.index] * intensity(690, 0.38, set.pixels[static_cast<std::size_t>(i)][1], 100) + theta[bar.offset.index];
+    noise[i] = (signal - set.value[i]) / set.sigma[i];
+  }
+  const Eigen::VectorXd along = set.sigma.cwiseInverse().normalized();
+  const double mean = along.dot(noise), ratio = misfit.mean_sd * set.sigma.cwiseInverse().norm();
+  const double chi_square = (noise - mean * along).squaredNorm() / misfit.shape_variance + mean * mean / (1 + ratio * ratio);
+  // Pixel means of the intensity are within 1e-4 of the formula's points.
+  EXPECT_NEAR(problem.objective(), chi_square, 1e-3 * chi_square);
+  const Eigen::VectorXd gradient = problem.gradient();
+  EXPECT_NEAR(gradient[0], by_bias, 1e-5 * std::abs(by_bias));
+  EXPECT_NEAR(gradient[1], by_tilt, 1e-5 * std::abs(by_tilt));
+  const Eigen::MatrixXd all = problem.factor();
+  for (int j = 2; j < 4; ++j) EXPECT_LT(std::abs(gradient[j]), 1e-9 * all.col(j).norm() * std::sqrt(chi_square));
+  const Eigen::MatrixXd reduced = problem.projected_factor(Eigen::Vector2d::Ones());
+  EXPECT_NEAR(reduced.col(2).squaredNorm(), problem.objective(), 1e-11 * chi_square);
+  for (int j = 0; j < 2; ++j) EXPECT_NEAR(2 * reduced.col(j).dot(reduced.col(2)), gradient[j], 1e-9 * std::abs(gradient[j]));
 }
 
 TEST(Fit, FramesWithVoltagesOfTheirOwnGiveTheSameBitsWithOneAndTwoThreads) {
