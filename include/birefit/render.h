@@ -33,7 +33,7 @@ struct RenderPlan {
   double numerical_error = 0;
   double model_error = 0;           ///< of what the ceiling leaves out, same unit
   std::vector<std::string> warnings;  ///< what is not modelled and may matter here
-  double cost_seconds = 0;          ///< expected for one image without derivatives, one thread
+  double cost_seconds = 0;          ///< of a picture by wave optics: expected without derivatives, one thread; rays are quick to try
 
   // The numerical choices themselves.
   int steps = 1;                    ///< equal mesh steps in u (diagonal: Gauss nodes)

@@ -54,16 +54,16 @@ std::string line_of(const ChartPoint& p) {
   return at == std::string::npos ? "" : p.effort.substr(at);
 }
 
-/// The fastest point of a method (of any: "") on a ray whose intensity errs by at most `error`, and so does every slower one on that
-/// line: not by chance. Null where there is none.
+/// The fastest point of a method (of any: "") on a ray whose intensity errs by at most `error`, and so does every later one on that line, which
+/// are listed from the least effort to the most: not by chance. Null where there is none.
 const ChartPoint* fastest_within(const MethodChart& chart, const std::string& scene, const std::string& method, double error) {
   const ChartPoint* best = nullptr;
-  for (const ChartPoint& p : chart.points) {
-    if (p.scene != scene || (!method.empty() && p.method != method) || !(p.intensity_error <= error)) continue;
-    const bool holds = std::all_of(chart.points.begin(), chart.points.end(), [&](const ChartPoint& q) {
-      return q.scene != scene || q.method != p.method || line_of(q) != line_of(p) || fastest_seconds(q) <= fastest_seconds(p) || q.intensity_error <= error;
+  for (auto p = chart.points.begin(); p != chart.points.end(); ++p) {
+    if (p->scene != scene || (!method.empty() && p->method != method)) continue;
+    const bool holds = std::all_of(p, chart.points.end(), [&](const ChartPoint& q) {
+      return q.scene != scene || q.method != p->method || line_of(q) != line_of(*p) || q.intensity_error <= error;
     });
-    if (holds && (!best || fastest_seconds(p) < fastest_seconds(*best))) best = &p;
+    if (holds && (!best || fastest_seconds(*p) < fastest_seconds(*best))) best = &*p;
   }
   return best;
 }
@@ -91,8 +91,9 @@ std::string summary_md(const MethodChart& chart) {
   for (const ChartScene& scene : chart.scenes) {
     const auto edge = std::find_if(chart.points.begin(), chart.points.end(), [&](const ChartPoint& p) { return p.scene == scene.name && p.method == "layers_edge" && p.effort == "n=4096"; });
     const ChartPoint *middle = fastest_within(chart, scene.name, "layers_midpoint", 1e-4), *best = fastest_within(chart, scene.name, "", 1e-4);
-    if (edge == chart.points.end() || !middle || !best) continue;
+    if (edge == chart.points.end() || !middle || !best) continue;  // a quick run
     const ChartPoint* no_worse = fastest_within(chart, scene.name, "", edge->intensity_error);
+    if (!no_worse) no_worse = &*edge;
     text += fmt::format("| {} | {}, {:.0e} | {} {} | {} | {} | {} {} | {} |\n", scene.name, number(1e6 * fastest_seconds(*edge)), edge->intensity_error, no_worse->method, no_worse->effort,
                         number(fastest_seconds(*edge) / fastest_seconds(*no_worse)), number(1e6 * fastest_seconds(*middle)), best->method, best->effort,
                         number(fastest_seconds(*middle) / fastest_seconds(*best)));

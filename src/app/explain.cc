@@ -1,8 +1,10 @@
 // birefit explain: which model and method would run, why, what it is expected to cost and to err.
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -39,6 +41,22 @@ std::string quoted(const std::vector<std::string>& list) {
 
 std::string json_number(double x) { return std::isfinite(x) ? fmt::format("{}", x) : "null"; }
 
+/// Of one image on one thread: measured, the best of three; where the planner foresees more than a second, as it says.
+double seconds_an_image(const Scene& scene, const RenderPlan& chosen, const Theta& theta) {
+  if (chosen.cost_seconds > 1) return chosen.cost_seconds;
+  double best = std::numeric_limits<double>::infinity(), all = 0;
+  Rendering image;
+  for (int i = 0; i < 3 && all < 1; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    if (scene.microscope.directions.empty()) render(scene, chosen, theta, {}, 1, image);
+    else jones(scene, chosen, theta);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    best = std::min(best, seconds);
+    all += seconds;
+  }
+  return best;
+}
+
 int run_explain(const Arguments& arguments) {
   const Config config = load_config(arguments.config, ConfigUse::plan);
   const ParameterTable& table = config.job.parameters;
@@ -52,7 +70,8 @@ int run_explain(const Arguments& arguments) {
   bool fitted = false;
   for (int i = 0; i < table.size(); ++i) fitted = fitted || table[i].free;
   constexpr double kMostSeconds = 60;  // images with derivatives
-  const bool quick = chosen.cost_seconds * table.size() < kMostSeconds;
+  const double seconds = seconds_an_image(config.scene, chosen, theta);
+  const bool quick = seconds * table.size() < kMostSeconds;
   const std::optional<Outlook> expected = picture && fitted && quick ? std::optional(outlook(config.job)) : std::nullopt;
   const std::vector<Shot> shots = arguments.next.empty() ? std::vector<Shot>{} : next_shots(config.job, arguments.next);
 
@@ -72,7 +91,7 @@ int run_explain(const Arguments& arguments) {
         "{{\n  \"method\": {},\n  \"physics\": {},\n  \"reasons\": {},\n  \"numerical_error\": {},\n  \"model_error\": {},\n"
         "  \"cost_seconds\": {},\n  \"warnings\": {},\n  \"identifiable\": {},\n  \"next\": [{}],\n  \"parameters\": [{}]\n}}\n",
         quoted(chosen.method), quoted(chosen.physics), quoted(chosen.reasons), chosen.numerical_error, chosen.model_error,
-        chosen.cost_seconds, quoted(warnings), expected ? (expected->identifiable ? "true" : "false") : "null", next, free);
+        seconds, quoted(warnings), expected ? (expected->identifiable ? "true" : "false") : "null", next, free);
     return kExitDone;
   }
   std::cout << fmt::format("Image      {} x {} pixels", config.scene.view.width, config.scene.view.height);
@@ -81,7 +100,7 @@ int run_explain(const Arguments& arguments) {
   for (const std::string& reason : chosen.reasons) std::cout << "           " << reason << "\n";
   std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error, chosen.model_error,
                            chosen.wave ? "RMS over the picture's own RMS" : "intensity, fraction of the incident");
-  std::cout << fmt::format("Cost       {:.3g} s an image on one thread\n", chosen.cost_seconds);
+  std::cout << fmt::format("Cost       {:.2g} s an image on one thread\n", seconds);
   bool any = false;
   for (int i = 0; i < table.size(); ++i) {
     const Parameter& parameter = table[i];

@@ -43,16 +43,17 @@ Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::M
                                                                                (scale.asDiagonal() * right))));
 }
 
+std::size_t parts_of(Eigen::Index rows) { return static_cast<std::size_t>((rows + kTileRows - 1) / kTileRows); }
+
 /// body(part, first row, rows) over the rows of a frame, some thousand at a time. What the parts sum up is added in their order, so that it
 /// does not depend on the number of threads.
 template <class Body>
 void for_parts(Eigen::Index rows, int threads, const Body& body) {
-  parallel_for(static_cast<int>((rows + kTileRows - 1) / kTileRows), threads, [&](int part) {
+  parallel_for(static_cast<int>(parts_of(rows)), threads, [&](int part) {
     const Eigen::Index begin = part * kTileRows;
     body(static_cast<std::size_t>(part), begin, std::min(kTileRows, rows - begin));
   });
 }
-std::size_t parts_of(Eigen::Index rows) { return static_cast<std::size_t>((rows + kTileRows - 1) / kTileRows); }
 
 int position(const std::vector<int>& indices, int index) {
   const auto found = std::find(indices.begin(), indices.end(), index);
@@ -322,7 +323,7 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   solve_linear();
   if (!derivatives) return;
 
-  const int l = static_cast<int>(unknowns_.linear.size()), threads = thread_count(job_.options.threads);
+  const int l = static_cast<int>(unknowns_.linear.size());
   for_frames([&](std::size_t g, int threads) {
     const Frame& frame = frames_[g];
     for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
@@ -344,7 +345,7 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   if (!moving.empty() && p > 0) {
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l), cross = Eigen::MatrixXd::Zero(l, p);
     for (const Frame& frame : frames_)
-      add_products(frame, threads, [&](Eigen::Index begin, Eigen::Index rows) { return searched_columns_.middleRows(frame.begin + begin, rows); }, gram, cross);
+      add_products(frame, thread_count(job_.options.threads), [&](Eigen::Index begin, Eigen::Index rows) { return searched_columns_.middleRows(frame.begin + begin, rows); }, gram, cross);
     if (prior_root_.rows() > 0) {
       gram += prior_root_.rightCols(l).transpose() * prior_root_.rightCols(l);
       cross += prior_root_.rightCols(l).transpose() * prior_root_.leftCols(p);

@@ -412,7 +412,6 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
   plan.reasons.push_back(fmt::format(
       "the droplet does not look the same from all sides of the viewing axis: {} of {} parts of the disc are smooth enough to be interpolated from {} rays each{}, elsewhere one ray a point; {:.0f} rays instead of {:.0f}",
       smooth, plan.disc.size(), PolarTable<Pack>::kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays, inside.back() * share));
-  plan.cost_seconds = 4e-9 * (60 * work + 25.0 * scene.view.width * scene.view.height);
 }
 
 int StepsByPlace::at(double fraction, double x, double y) const {

@@ -278,7 +278,6 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
   });
   plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel",
                                      *std::max_element(plan.samples.begin(), plan.samples.end())));
-  plan.cost_seconds = 1e-9 * scene.view.width * scene.view.height * (100 + 60 * plan.steps) * 4;
   if (scene.method == "auto")
     plan_disc_squares(scene, value, std::max(kPolarShare * scene.intensity_accuracy, 1e-10), plan);
   else
@@ -352,7 +351,6 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
 
   note_rays(scene, value, o, plan);
   note_illumination(scene, value, largest_phase, plan);
-  plan.cost_seconds = 1e-9 * scene.view.width * scene.view.height * (30 + (plan.method == "diagonal" ? 12 : 45) * plan.steps);
   return plan;
 }
 
@@ -511,7 +509,6 @@ RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, con
         "Light of this bandwidth does not interfere between the faces (the phase of a round trip spreads by {:.2g} rad), but is computed "
         "as if it did: ceiling one_way is nearer to what is seen.", round_trip * bandwidth));
   note_illumination(scene, value, largest_phase, plan);
-  plan.cost_seconds = 2e-5 * plan.steps * static_cast<double>(directions.size());
   return plan;
 }
 
@@ -651,9 +648,6 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   if (r > 0.01)
     plan.warnings.push_back(fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by up to about {:.2g}.", r, r));
   note_illumination(scene, value, largest_phase, plan);
-  const double per_ray = plan.method == "diagonal" ? 250 + 8.0 * plan.steps : 400.0 * static_cast<double>(plan.mesh.empty() ? plan.steps : static_cast<int>(plan.mesh.size()));
-  const double rays = cone ? static_cast<double>(scene.view.width) * scene.view.height * 4 : 1;
-  plan.cost_seconds = 1e-9 * rays * per_ray;
   return plan;
 }
 
@@ -704,7 +698,6 @@ RenderPlan plan_disc(const Scene& scene, const Values<double>& value) {
   Scene one_colour = scene;  // the bandwidth is part of a disc's model
   one_colour.microscope.bandwidth_nm = 0;
   note_illumination(one_colour, value, largest_phase, plan);
-  plan.cost_seconds = 4e-8 * scene.view.width * scene.view.height;
   return plan;
 }
 
@@ -792,7 +785,6 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
                       "leave transport.method at auto");
     result.method = "closed_form";
     result.reasons.push_back("a crystal between electrodes is one retarder per pixel: sin^2 in closed form");
-    result.cost_seconds = 5e-9 * scene.view.width * scene.view.height;
     const Crystal& crystal = std::get<Crystal>(scene.sample);
     note_illumination(scene, value, std::abs(kPi * value(crystal.bias_v) / value(crystal.half_wave_voltage_v)), result);
   } else if (std::holds_alternative<StressedDisc>(scene.sample)) {
@@ -808,7 +800,6 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
       throw UserError(Where{}, "a plate with screen_distance_um needs a table of ring radii", "micrograph: {image: rings.csv}");
     result.method = "closed_form";
     result.reasons.push_back("the rings of a plate cut normal to its axis lie where the retardance is a whole number of waves: radii in closed form");
-    result.cost_seconds = 1e-7 * scene.view.width;
   } else {
     result = plan_planar(scene, value);
   }

@@ -5,7 +5,6 @@
 
 #include "core/scalar.h"
 #include "render/pixel_model.h"
-#include "render/radial_table.h"
 
 namespace birefit {
 
@@ -53,7 +52,9 @@ class RoundView {
     by_sum_ = Sensitivity<S>(sum);
   }
   struct Place {
-    P x, y, inverse_rho, rho_um, q, s;
+    P x, y;         ///< right and up from the centre, um
+    P inverse_rho;  ///< 1/um
+    P rho_um, q, s;
   };
   Place at(const P& column, const P& row) const {
     Place p;

@@ -133,7 +133,6 @@ RenderPlan plan_volume(const Scene& scene, const Values<double>& value) {
       turn * 180 / kPi, plan.model_error));
   double points = 0;  // by the area of the rings
   for (std::size_t i = 0; i < plan.samples.size(); ++i) points += plan.samples[i] * plan.samples[i] * kPi * (2.0 * static_cast<double>(i) + 1);
-  plan.cost_seconds = 1e-9 * points * (100 + 60.0 * effort.samples);
   return plan;
 }
 

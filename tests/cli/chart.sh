@@ -29,6 +29,18 @@ awk -F, '
     if (samples["twisted_cell", "magnus4", "n=64"] != 128) fail("magnus4 samples the medium twice a step")
     exit bad
   }' out/scenes.csv out/chart.csv || exit 1
+# The table of the documents: the fastest effort of every method that holds 1e-4 here and at every later one.
+awk -F' *[|] *' '
+  function fail(text) { print "FAILED: summary.md: " text; bad = 1 }
+  /^\| ray \| layers_edge/ && !n { n = NF; for (i = 1; i <= NF; ++i) column[$i] = i; next }
+  n && NF == n && $2 !~ /^-+$/ { ++rows; for (name in column) cell[$2, name] = $column[name] }
+  END {
+    if (rows != 7) fail(rows " rays")
+    if (cell["cholesteric", "diagonal"] != "-") fail("diagonal on the cholesteric: " cell["cholesteric", "diagonal"])
+    if (!(cell["hedgehog", "diagonal"] > 0)) fail("diagonal on the hedgehog: " cell["hedgehog", "diagonal"])
+    if (!(cell["twisted_cell", "magnus4"] > 0)) fail("magnus4 on the twisted cell: " cell["twisted_cell", "magnus4"])
+    exit bad
+  }' out/summary.md || exit 1
 if command -v gnuplot > /dev/null; then
   grep -q "</svg>" out/chart.svg || { echo "FAILED: chart.svg is not complete"; exit 1; }
 fi

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <barrier>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -42,16 +41,21 @@ TEST(Threads, AFailureOfAnyIndexIsThrownAndTheNextLoopWorks) {
   EXPECT_EQ(total, 4950);
 }
 
-TEST(Threads, TogetherMeansAtTheSameTime) {
+TEST(Threads, TogetherMeansAtTheSameTimeAndNoneGoesAhead) {
   constexpr int kThreads = 6;  // more than there may be cores or helpers
-  std::barrier barrier(kThreads);
-  std::atomic<int> arrived{0}, seen_all{0};
+  constexpr int kPhases = 200;
+  Barrier barrier(kThreads);
+  std::atomic<int> arrived{0}, out_of_step{0};
   run_together(kThreads, [&](int) {
-    ++arrived;
-    barrier.arrive_and_wait();
-    if (arrived == kThreads) ++seen_all;
+    for (int phase = 1; phase <= kPhases; ++phase) {
+      ++arrived;
+      barrier.arrive_and_wait();
+      if (arrived != phase * kThreads) ++out_of_step;
+      barrier.arrive_and_wait();  // nobody arrives anew before all have looked
+    }
   });
-  EXPECT_EQ(seen_all, kThreads);
+  EXPECT_EQ(arrived, kPhases * kThreads);
+  EXPECT_EQ(out_of_step, 0);
 }
 
 }  // namespace
