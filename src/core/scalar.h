@@ -16,8 +16,10 @@
 // instructions would make such a chain take minutes to compile.
 #if defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__)
 #define BIREFIT_INLINE [[gnu::always_inline]] inline
+#define BIREFIT_INLINE_LAMBDA __attribute__((always_inline))  // after the parameters
 #else
 #define BIREFIT_INLINE inline
+#define BIREFIT_INLINE_LAMBDA
 #endif
 
 namespace birefit {

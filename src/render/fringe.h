@@ -5,6 +5,8 @@
 // vanishes): one ray a pixel serves where sampling the intensity itself needs several a fringe, and one ray for many
 // pixels where the functions are interpolated.
 
+#include <array>
+
 #include "core/scalar.h"
 
 namespace birefit {
@@ -15,60 +17,161 @@ struct FringePoint {
 };
 
 /// Moments of e^{i g x} over x in [-1/2, 1/2]: m0 = int e^{igx} = sinc(g/2), int x e^{igx} = -i m0', int x^2 e^{igx} =
-/// -m0''. With s(q) = sin(sqrt q)/sqrt q, q = g^2/4: m0' = (g/2) s', and 4 q s'' + 6 s' + s = 0 gives m0'' = -s' - s/4.
-template <class S>
+/// -m0''. With s(q) = sin(sqrt q)/sqrt q, q = g^2/4: m0' = (g/2) s', and 4 q s'' + 6 s' + s = 0 gives m0'' = -s' - s/4,
+/// m0''' = -(g/2) (s'' + s'/4).
+template <class P>
 struct PixelMoments {
-  S m0, slope, curvature;  ///< m0, m0', m0''
-  explicit PixelMoments(const S& g) {
-    const S half = 0.5 * g, q = half * half;
-    const CosSinc<S> f = cos_sinc_sq(q);
-    const S s1 = sinc_slope(q, f.cos_sq, f.sinc_sq);
-    m0 = f.sinc_sq;
-    slope = half * s1;
-    curvature = S(0.0) - s1 - 0.25 * f.sinc_sq;
+  P m0, slope, curvature, third;  ///< m0 and its first three derivatives
+  BIREFIT_INLINE explicit PixelMoments(const P& g) {
+    const P half = P(0.5) * g, q = half * half;
+    P s0, s1, s2;
+    // s = sum (-q)^k/(2k + 1)!, up to half a turn a pixel; beyond, which no camera resolves, q is large enough to divide by.
+    constexpr double kTurn = 2.5;
+    if (largest(q) < kTurn) [[likely]] {
+      s0 = sum<0>(q), s1 = sum<1>(q), s2 = sum<2>(q);
+    } else {
+      const CosSinc<P> f = cos_sinc_sq(q);
+      const auto small = q < P(0.1);
+      const P share = inverse(select(small, P(1.0), q));
+      s0 = f.sinc_sq;
+      s1 = select(small, sum<1>(q), P(0.5) * (f.cos_sq - f.sinc_sq) * share);
+      s2 = select(small, sum<2>(q), P(-0.25) * (P(6.0) * s1 + s0) * share);
+    }
+    m0 = s0, slope = half * s1, curvature = P(-0.25) * s0 - s1, third = -half * (s2 + P(0.25) * s1);
+  }
+
+ private:
+  /// The series' derivative of order kOrder.
+  template <int kOrder>
+  BIREFIT_INLINE static P sum(const P& q) {
+    constexpr int kTerms = 12;  // the next is below 1e-17 of the first for q < 2.5
+    static constexpr std::array<double, kTerms> c = [] {
+      std::array<double, kTerms> a{};
+      double factorial = 1;  // (2k + 1)! with its sign
+      for (int k = 0; k < kTerms; ++k) {
+        if (k > 0) factorial *= -2.0 * k * (2 * k + 1);
+        double falling = 1;
+        for (int m = 0; m < kOrder; ++m) falling *= k - m;
+        if (k >= kOrder) a[static_cast<std::size_t>(k - kOrder)] = falling / factorial;
+      }
+      return a;
+    }();
+    P total(c[kTerms - 1 - kOrder]);
+    for (int k = kTerms - 2 - kOrder; k >= 0; --k) total = total * q + P(c[static_cast<std::size_t>(k)]);
+    return total;
   }
 };
 
-/// Mean over the middle pixel of nine at unit distance, p[row][column], rows counted downwards (the sign of y does not
-/// matter). Second order in the curvature of phase and amplitude, exact in the phase's slope. kQuadrature = false: it is
-/// zero and not read.
-template <bool kQuadrature, class S>
-S fringe_mean(const FringePoint<S> (&p)[3][3]) {
-  const auto differences = [&](auto of, S& x, S& y, S& xx, S& xy, S& yy) {
-    const S middle = of(p[1][1]), l = of(p[1][0]), r = of(p[1][2]), u = of(p[0][1]), d = of(p[2][1]);
-    x = 0.5 * (r - l);
-    y = 0.5 * (d - u);
-    xx = r + l - 2.0 * middle;
-    yy = d + u - 2.0 * middle;
-    xy = 0.25 * ((of(p[2][2]) - of(p[2][0])) - (of(p[0][2]) - of(p[0][0])));
+/// A quadratic through nine pixels at unit distance, rows counted downwards (the sign of y does not matter).
+template <class P>
+struct NinePoints {
+  P f, x, y, xx, xy, yy;  ///< value and derivatives in the middle
+  /// at(row, column)
+  template <class At>
+  BIREFIT_INLINE static NinePoints of(const At& at) {
+    const P middle = at(1, 1), l = at(1, 0), r = at(1, 2), u = at(0, 1), d = at(2, 1);
+    return {middle, P(0.5) * (r - l), P(0.5) * (d - u), r + l - P(2.0) * middle, P(0.25) * ((at(2, 2) - at(2, 0)) - (at(0, 2) - at(0, 0))), d + u - P(2.0) * middle};
+  }
+};
+
+/// What a change of nine points changes, once its derivatives by the quadratic's six numbers are known.
+template <class P>
+class NineWeights {
+ public:
+  NineWeights() = default;
+  explicit NineWeights(const NinePoints<P>& by)
+      : middle_(by.f - P(2.0) * (by.xx + by.yy)), left_(by.xx - P(0.5) * by.x), right_(by.xx + P(0.5) * by.x), up_(by.yy - P(0.5) * by.y), down_(by.yy + P(0.5) * by.y),
+        corners_(P(0.25) * by.xy) {}
+  template <class At>
+  BIREFIT_INLINE P times(const At& at) const {
+    return middle_ * at(1, 1) + left_ * at(1, 0) + right_ * at(1, 2) + up_ * at(0, 1) + down_ * at(2, 1) + corners_ * ((at(2, 2) - at(2, 0)) - (at(0, 2) - at(0, 0)));
+  }
+
+ private:
+  P middle_, left_, right_, up_, down_, corners_;
+};
+
+/// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact in the
+/// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others their derivatives by
+/// parameters; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. What a change of
+/// any of the nine points does to the mean is found once, backwards through the formula, and serves all derivatives.
+template <bool kQuadrature, class P, class Load, class Put>
+BIREFIT_INLINE void fringe_means(int planes, const Load& load, const Put& put) {
+  const auto field = [&load](int plane, int f) BIREFIT_INLINE_LAMBDA { return [&load, plane, f](int row, int column) BIREFIT_INLINE_LAMBDA { return load(plane, f, row, column); }; };
+  const auto mean_of = [&](int plane) BIREFIT_INLINE_LAMBDA {
+    const auto at = field(plane, 2);
+    return P(1 - 4.0 / 24) * at(1, 1) + P(1.0 / 24) * ((at(1, 0) + at(1, 2)) + (at(0, 1) + at(2, 1)));
   };
-  S gx, gy, hxx, hxy, hyy, fx, fy, fxx, fxy, fyy;
-  differences([](const FringePoint<S>& q) { return q.phase; }, gx, gy, hxx, hxy, hyy);
-  const PixelMoments<S> mx(gx), my(gy);
+  const NinePoints<P> phase = NinePoints<P>::of(field(0, 1)), amplitude = NinePoints<P>::of(field(0, 0));
+  const PixelMoments<P> mx(phase.x), my(phase.y);
   // (amplitude + i quadrature) e^{i phase} to second order about the middle:
   //   f + fx x + .. + (i f hxx + fxx) x^2/2 + (i f hxy + fxy) x y + ..
   // times e^{i (gx x + gy y)}; real and imaginary part of its mean without e^{i phase(middle)}.
-  const S xx = mx.curvature * my.m0, yy = mx.m0 * my.curvature, xy = mx.slope * my.slope;
-  const S zero = mx.m0 * my.m0, one_x = mx.slope * my.m0, one_y = mx.m0 * my.slope;
-  const S bend = 0.5 * (hxx * xx + hyy * yy) + hxy * xy;
-  const auto parts = [&](const S& f, S& even, S& odd) {
-    even = f * zero - 0.5 * (fxx * xx + fyy * yy) - fxy * xy;
-    odd = S(0.0) - fx * one_x - fy * one_y - f * bend;
-  };
-  S re, im;
-  differences([](const FringePoint<S>& q) { return q.amplitude; }, fx, fy, fxx, fxy, fyy);
-  parts(p[1][1].amplitude, re, im);
+  const P xx = mx.curvature * my.m0, yy = mx.m0 * my.curvature, xy = mx.slope * my.slope;
+  const P zero = mx.m0 * my.m0, one_x = mx.slope * my.m0, one_y = mx.m0 * my.slope;
+  const P bend = P(0.5) * (phase.xx * xx + phase.yy * yy) + phase.xy * xy;
+  const auto even_of = [&](const NinePoints<P>& f) BIREFIT_INLINE_LAMBDA { return f.f * zero - P(0.5) * (f.xx * xx + f.yy * yy) - f.xy * xy; };
+  const auto odd_of = [&](const NinePoints<P>& f) BIREFIT_INLINE_LAMBDA { return P(0.0) - f.x * one_x - f.y * one_y - f.f * bend; };
+  P re = even_of(amplitude), im = odd_of(amplitude);
+  NinePoints<P> quadrature{};
   if constexpr (kQuadrature) {
-    S even, odd;
-    differences([](const FringePoint<S>& q) { return q.quadrature; }, fx, fy, fxx, fxy, fyy);
-    parts(p[1][1].quadrature, even, odd);
-    re = re - odd;
-    im = im + even;
+    quadrature = NinePoints<P>::of(field(0, 3));
+    re = re - odd_of(quadrature);
+    im = im + even_of(quadrature);
   }
-  S s, c;
-  sin_cos(p[1][1].phase, s, c);
-  const S around = (p[1][0].mean + p[1][2].mean) + (p[0][1].mean + p[2][1].mean) - 4.0 * p[1][1].mean;
-  return p[1][1].mean + around * (1.0 / 24) + re * c - im * s;
+  P s, c;
+  sin_cos(phase.f, s, c);
+  put(0, mean_of(0) + re * c - im * s);
+  if (planes <= 1) return;
+
+  // Backwards: by_* is the mean's derivative by *.
+  P by_zero(0.0), by_one_x(0.0), by_one_y(0.0), by_xx(0.0), by_yy(0.0), by_xy(0.0), by_bend(0.0);
+  const auto back = [&](const NinePoints<P>& f, const P& even, const P& odd) BIREFIT_INLINE_LAMBDA {
+    by_zero = by_zero + even * f.f, by_one_x = by_one_x - odd * f.x, by_one_y = by_one_y - odd * f.y;
+    by_xx = by_xx - P(0.5) * even * f.xx, by_yy = by_yy - P(0.5) * even * f.yy, by_xy = by_xy - even * f.xy;
+    by_bend = by_bend - odd * f.f;
+    return NineWeights<P>({even * zero - odd * bend, P(0.0) - odd * one_x, P(0.0) - odd * one_y, P(-0.5) * even * xx, P(0.0) - even * xy, P(-0.5) * even * yy});
+  };
+  const NineWeights<P> by_amplitude = back(amplitude, c, -s);
+  [[maybe_unused]] NineWeights<P> by_quadrature;
+  if constexpr (kQuadrature) by_quadrature = back(quadrature, -s, -c);
+  by_xx = by_xx + P(0.5) * phase.xx * by_bend, by_yy = by_yy + P(0.5) * phase.yy * by_bend, by_xy = by_xy + phase.xy * by_bend;
+  const P xxx = mx.third * my.m0, yyy = mx.m0 * my.third, xxy = mx.curvature * my.slope, xyy = mx.slope * my.curvature;
+  const NineWeights<P> by_phase({P(0.0) - re * s - im * c, by_zero * one_x + by_one_x * xx + by_one_y * xy + by_xx * xxx + by_yy * xyy + by_xy * xxy,
+                                 by_zero * one_y + by_one_x * xy + by_one_y * yy + by_xx * xxy + by_yy * yyy + by_xy * xyy, P(0.5) * xx * by_bend, xy * by_bend,
+                                 P(0.5) * yy * by_bend});
+  for (int plane = 1; plane < planes; ++plane) {
+    P d = mean_of(plane) + by_phase.times(field(plane, 1)) + by_amplitude.times(field(plane, 0));
+    if constexpr (kQuadrature) d = d + by_quadrature.times(field(plane, 3));
+    put(plane, d);
+  }
+}
+
+/// The same of nine points p[row][column].
+template <bool kQuadrature, class S>
+S fringe_mean(const FringePoint<S> (&p)[3][3]) {
+  using P = PlainOf<S>;
+  S mean(0.0);
+  const auto load = [&p](int plane, int field, int row, int column) -> P {
+    const FringePoint<S>& q = p[row][column];
+    const S& part = field == 0 ? q.amplitude : field == 1 ? q.phase : field == 2 ? q.mean : q.quadrature;
+    if constexpr (ScalarTraits<S>::derivatives > 0) {
+      if (plane > 0) return part.d[static_cast<std::size_t>(plane - 1)];
+    }
+    return plain(part);
+  };
+  fringe_means<kQuadrature, P>(1 + ScalarTraits<S>::derivatives, load, [&mean](int plane, const P& value) {
+    if constexpr (ScalarTraits<S>::derivatives > 0) {
+      if (plane > 0) {
+        mean.d[static_cast<std::size_t>(plane - 1)] = value;
+        return;
+      }
+      mean.value = value;
+    } else {
+      mean = value;
+    }
+  });
+  return mean;
 }
 
 }  // namespace birefit

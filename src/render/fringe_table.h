@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "core/threads.h"
@@ -22,112 +23,191 @@ struct FringeBlocks {
   int count() const { return columns * rows; }
 };
 
-/// Polynomials of degree 7 in column and row through 8 x 8 Chebyshev points of every square that is asked for.
+/// A parameter that moves all fringes and changes none: by the centre's column and row, and by the logarithm of the scale around it.
+struct FringeMove {
+  std::size_t derivative;  ///< of the table's scalar
+  double column, row, log_scale;
+};
+struct FringeCentre {
+  double column, row;
+};
+
+/// What a thread keeps of one row of one picture while it goes along it.
+struct FringeScratch {
+  double row = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> lines;
+};
+
+/// Polynomials of degree 11 in column and row through 12 x 12 Chebyshev points of every square that is asked for.
 template <class S>
 class FringeTable {
  public:
-  static constexpr int kPoints = 8;
+  static constexpr int kPoints = 12;
   static constexpr int kRays = kPoints * kPoints;
   using P = PlainOf<S>;
 
   FringeTable() = default;
-  /// ray(column, row): the fringe at points of the picture, one a lane. `wanted`: one flag a square.
+  /// ray(column, row): the fringe at points of the picture, one a lane, in a scalar whose k-th derivative is the derivatives[k]-th of S.
+  /// Its other derivatives are `moves` about `centre`. `wanted`: one flag a square.
   template <class Ray>
-  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, int threads, const Ray& ray)
-      : blocks_(blocks), start_(wanted.size(), -1) {
+  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, int threads, const std::vector<std::size_t>& derivatives,
+              const std::vector<FringeMove>& moves, const FringeCentre& centre, const Ray& ray)
+      : blocks_(blocks), start_(wanted.size(), -1), derivatives_(derivatives), moves_(moves), centre_(centre), planes_(1 + derivatives.size()) {
     std::vector<int> list;
     for (std::size_t b = 0; b < wanted.size(); ++b)
       if (wanted[b]) {
         start_[b] = static_cast<int>(list.size());
         list.push_back(static_cast<int>(b));
       }
-    coefficients_.resize(list.size() * kBlock);
-    parallel_for(static_cast<int>(list.size()), threads, [&](int i) {
-      const int b = list[static_cast<std::size_t>(i)];
-      std::vector<double> values(kBlock);
-      constexpr int kStep = kLanesOf<S>;
-      for (int first = 0; first < kRays; first += kStep) {
-        alignas(64) double column[kLanes], row[kLanes];
-        for (int k = 0; k < kStep; ++k) {
-          const int n = std::min(first + k, kRays - 1);
-          column[k] = place(b % blocks_.columns, rule().x[static_cast<std::size_t>(n % kPoints)]);
-          row[k] = place(b / blocks_.columns, rule().x[static_cast<std::size_t>(n / kPoints)]);
-        }
-        FringePoint<S> p;
-        if constexpr (kStep == 1)
-          p = ray(column[0], row[0]);
-        else
-          p = ray(Pack::load_aligned(column), Pack::load_aligned(row));
-        for (int k = 0; k < std::min(kStep, kRays - first); ++k) {
-          const S* parts[kFields] = {&p.amplitude, &p.phase, &p.mean, &p.quadrature};
-          for (int f = 0; f < kFields; ++f) {
-            double* to = values.data() + f * kPlanes * kRays + first + k;
-            to[0] = lane(plain(*parts[f]), k);
-            if constexpr (kPlanes > 1)
-              for (int j = 1; j < kPlanes; ++j) to[j * kRays] = lane(parts[f]->d[static_cast<std::size_t>(j - 1)], k);
-          }
-        }
+    const std::size_t block_size = kFields * planes_ * kRays;
+    std::vector<double> values(list.size() * block_size);
+    coefficients_.resize(values.size());
+    constexpr int kStep = kLanesOf<S>, kSteps = (kRays + kStep - 1) / kStep;
+    parallel_for(static_cast<int>(list.size()) * kSteps, threads, [&](int step) {
+      const int i = step / kSteps, b = list[static_cast<std::size_t>(i)], first = step % kSteps * kStep;
+      alignas(64) double column[kLanes], row[kLanes];
+      for (int k = 0; k < kStep; ++k) {
+        const int n = std::min(first + k, kRays - 1);
+        column[k] = place(b % blocks_.columns, rule().x[static_cast<std::size_t>(n % kPoints)]);
+        row[k] = place(b / blocks_.columns, rule().x[static_cast<std::size_t>(n / kPoints)]);
       }
-      double* out = coefficients_.data() + static_cast<std::size_t>(i) * kBlock;
-      for (int plane = 0; plane < kFields * kPlanes; ++plane) to_powers<kPoints>(values.data() + plane * kRays, out + plane * kRays);
+      const auto p = [&] {
+        if constexpr (kStep == 1)
+          return ray(column[0], row[0]);
+        else
+          return ray(Pack::load_aligned(column), Pack::load_aligned(row));
+      }();
+      using R = decltype(p.amplitude);
+      const R* parts[kFields] = {&p.amplitude, &p.phase, &p.mean, &p.quadrature};
+      for (int k = 0; k < std::min(kStep, kRays - first); ++k)
+        for (std::size_t f = 0; f < kFields; ++f) {
+          double* to = values.data() + static_cast<std::size_t>(i) * block_size + f * planes_ * kRays + first + k;
+          to[0] = lane(plain(*parts[f]), k);
+          if constexpr (ScalarTraits<R>::derivatives > 0)
+            for (std::size_t j = 1; j < planes_; ++j) to[j * kRays] = lane(parts[f]->d[j - 1], k);
+        }
+    });
+    parallel_for(static_cast<int>(list.size() * kFields * planes_), threads, [&](int plane) {
+      const std::size_t at = static_cast<std::size_t>(plane) * kRays;
+      to_powers<kPoints>(values.data() + at, coefficients_.data() + at);
     });
   }
 
-  /// False where the lanes do not lie in one square that was asked for, or not in one row of the picture.
-  bool read(const P& column, const P& row, bool quadrature, FringePoint<S>& out) const {
-    if (start_.empty()) return false;
-    const double y = lane(row, 0);
-    if (kLanesOf<S> > 1 && (smallest(row) != y || largest(row) != y)) return false;
-    const auto at = [&](double x) { return static_cast<int>(std::floor((x + 1) / blocks_.block_px)); };
-    const int bx = at(smallest(column)), by = at(y);
-    if (at(largest(column)) != bx || bx < 0 || by < 0 || bx >= blocks_.columns || by >= blocks_.rows) return false;
-    const int start = start_[static_cast<std::size_t>(by * blocks_.columns + bx)];
-    if (start < 0) return false;
-    const double per_px = 2.0 / blocks_.block_px;
-    const P x = (column - P(bx * blocks_.block_px - 1.0)) * P(per_px) - P(1.0);
-    const double down = (y - (by * blocks_.block_px - 1.0)) * per_px - 1;
-    const double* c = coefficients_.data() + static_cast<std::size_t>(start) * kBlock;
-    S* parts[kFields] = {&out.amplitude, &out.phase, &out.mean, &out.quadrature};
-    for (int f = 0; f < kFields; ++f) {
-      if (f == 3 && !quadrature) {
-        *parts[f] = S(0.0);
-        continue;
+  /// The fringes of up to `count` columns of a row of the picture from `column` on: out[field * (1 + derivatives of S) + plane][i] becomes
+  /// those of column + i, fields in the order of FringePoint. Returns of how many: up to the end of a square, 0 in one that was not asked for. Places up
+  /// to the next whole number of lanes are overwritten. `scratch` belongs to this table and one thread.
+  int run(int column, double row, int count, bool quadrature, FringeScratch& scratch, double* const* out) const {
+    const double* line = line_at(column, row, scratch);
+    if (!line) return 0;
+    const int bx = (column + 1) / blocks_.block_px, end = std::min(column + count, (bx + 1) * blocks_.block_px - 1);
+    const double per_px = 2.0 / blocks_.block_px, first = (column + 1 - bx * blocks_.block_px) * per_px - 1;
+    alignas(64) double steps[kLanes];
+    for (int k = 0; k < kLanes; ++k) steps[k] = first + k * per_px;
+    P x0;
+    if constexpr (kLanesOf<S> > 1)
+      x0 = P::load_aligned(steps);
+    else
+      x0 = first;
+    for (std::size_t f = 0; f < (quadrature ? kFields : kFields - 1); ++f, line += kOut * kPoints)
+      for (std::size_t plane = 0; plane < kOut; ++plane) {
+        if (!used(plane)) continue;
+        std::array<P, kPoints> c;
+        for (std::size_t i = 0; i < kPoints; ++i) c[i] = P(line[plane * kPoints + i]);
+        double* to = out[f * kOut + plane];
+        P x = x0;
+        for (int i = 0; i < end - column; i += kLanesOf<S>, x = x + P(kLanesOf<S> * per_px)) {
+          const P square = x * x;
+          P even = c[kPoints - 2], odd = c[kPoints - 1];
+          for (std::size_t k = kPoints - 2; k >= 2; k -= 2) {
+            even = even * square + c[k - 2];
+            odd = odd * square + c[k - 1];
+          }
+          const P value = odd * x + even;
+          if constexpr (kLanesOf<S> > 1)
+            value.store_unaligned(to + i);
+          else
+            to[i] = value;
+        }
       }
-      const double* field = c + f * kPlanes * kRays;
-      if constexpr (kPlanes == 1) {
-        *parts[f] = polynomial(field, x, down);
-      } else {
-        parts[f]->value = polynomial(field, x, down);
-        for (int j = 1; j < kPlanes; ++j) parts[f]->d[static_cast<std::size_t>(j - 1)] = polynomial(field + j * kRays, x, down);
-      }
+    return end - column;
+  }
+
+  /// Values at one place; false in a square that was not asked for.
+  bool read(double column, double row, FringeScratch& scratch, FringePoint<double>& out) const {
+    const double* line = line_at(static_cast<int>(std::floor(column)), row, scratch);
+    if (!line) return false;
+    const double at = (column + 1) / blocks_.block_px, x = 2 * (at - std::floor(at)) - 1;
+    double* parts[kFields] = {&out.amplitude, &out.phase, &out.mean, &out.quadrature};
+    for (double* part : parts) {
+      *part = 0;
+      for (std::size_t i = kPoints; i-- > 0;) *part = *part * x + line[i];
+      line += kOut * kPoints;
     }
     return true;
   }
 
  private:
-  static constexpr int kFields = 4;
-  static constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
-  static constexpr int kBlock = kFields * kPlanes * kRays;  ///< [field][plane][power of row][power of column]
+  static constexpr std::size_t kFields = 4, kOut = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
 
   double place(int block, double x) const { return (block + 0.5 + 0.5 * x) * blocks_.block_px - 1; }
-  static P polynomial(const double* c, const P& x, double y) {
-    alignas(64) double row[kPoints];
-    for (int i = 0; i < kPoints; ++i) row[i] = c[(kPoints - 1) * kPoints + i];
-    for (int j = kPoints - 2; j >= 0; --j)
-      for (int i = 0; i < kPoints; ++i) row[i] = row[i] * y + c[j * kPoints + i];
-    const P square = x * x;
-    P even(row[kPoints - 2]), odd(row[kPoints - 1]);
-    for (int i = kPoints - 4; i >= 0; i -= 2) {
-      even = even * square + P(row[i]);
-      odd = odd * square + P(row[i + 1]);
+  bool used(std::size_t plane) const {
+    return plane == 0 || std::any_of(derivatives_.begin(), derivatives_.end(), [&](std::size_t d) { return d + 1 == plane; }) ||
+           std::any_of(moves_.begin(), moves_.end(), [&](const FringeMove& m) { return m.derivative + 1 == plane; });
+  }
+  const double* line_at(int column, double row, FringeScratch& scratch) const {
+    if (start_.empty()) return nullptr;
+    const int bx = (column + 1) / blocks_.block_px, by = static_cast<int>(std::floor((row + 1) / blocks_.block_px));
+    if (column < -1 || by < 0 || bx >= blocks_.columns || by >= blocks_.rows || start_[static_cast<std::size_t>(by * blocks_.columns + bx)] < 0) return nullptr;
+    if (scratch.row != row) follow_row(row, by, scratch);
+    return scratch.lines.data() + static_cast<std::size_t>(bx) * kFields * kOut * kPoints;
+  }
+  /// Polynomials of the column alone for one row: [square][field][value and derivatives of S][power].
+  void follow_row(double row, int by, FringeScratch& scratch) const {
+    using Line = std::array<double, kPoints>;
+    const double per_px = 2.0 / blocks_.block_px, y = (row - (by * blocks_.block_px - 1.0)) * per_px - 1;
+    scratch.row = row;
+    scratch.lines.assign(static_cast<std::size_t>(blocks_.columns) * kFields * kOut * kPoints, 0.0);
+    for (int bx = 0; bx < blocks_.columns; ++bx) {
+      const int start = start_[static_cast<std::size_t>(by * blocks_.columns + bx)];
+      if (start < 0) continue;
+      const double middle = (bx + 0.5) * blocks_.block_px - 1 - centre_.column;  // columns from the centre: middle + x/per_px
+      for (std::size_t f = 0; f < kFields; ++f) {
+        const double* c = coefficients_.data() + (static_cast<std::size_t>(start) * kFields + f) * planes_ * kRays;
+        double* line = scratch.lines.data() + (static_cast<std::size_t>(bx) * kFields + f) * kOut * kPoints;
+        Line value, by_y;
+        for (std::size_t plane = 0; plane < planes_; ++plane) {
+          const double* powers = c + plane * kRays;
+          std::copy(powers + kRays - kPoints, powers + kRays, value.begin());
+          by_y.fill(0);
+          for (std::size_t j = kPoints - 1; j-- > 0;)
+            for (std::size_t i = 0; i < kPoints; ++i) {
+              by_y[i] = by_y[i] * y + value[i];
+              value[i] = value[i] * y + powers[j * kPoints + i];
+            }
+          std::copy(value.begin(), value.end(), line + (plane == 0 ? 0 : derivatives_[plane - 1] + 1) * kPoints);
+          if (plane > 0) continue;
+          // A move's derivative along the row is a polynomial, too: u = a + b x columns and v rows to the point.
+          for (const FringeMove& m : moves_) {
+            const double a = middle * m.log_scale - m.column, b = m.log_scale / per_px, v = (row - centre_.row) * m.log_scale - m.row;
+            double* to = line + (m.derivative + 1) * kPoints;
+            for (std::size_t i = 0; i < kPoints; ++i) {
+              const double slope = i + 1 < kPoints ? static_cast<double>(i + 1) * value[i + 1] : 0.0;  // of power i in d/dx, and x d/dx
+              to[i] = per_px * (a * slope + b * static_cast<double>(i) * value[i] + v * by_y[i]);
+            }
+          }
+        }
+      }
     }
-    return odd * x + even;
   }
   static const ChebyshevRule<kPoints>& rule() { return chebyshev_rule<kPoints>(); }
 
   FringeBlocks blocks_{0, 0, 1};
-  std::vector<int> start_;  ///< place among the coefficients, -1 = not asked for
-  std::vector<double> coefficients_;
+  std::vector<int> start_;                ///< place among the coefficients, -1 = not asked for
+  std::vector<std::size_t> derivatives_;  ///< of S, one a plane after the first
+  std::vector<FringeMove> moves_;
+  FringeCentre centre_{0, 0};
+  std::size_t planes_ = 1;
+  std::vector<double> coefficients_;      ///< [square][field][plane][power of row][power of column]
 };
 
 }  // namespace birefit

@@ -52,6 +52,8 @@ inline constexpr int kLanesOf = std::is_same_v<PlainOf<S>, Pack> ? kLanes : 1;
 /// What leaves a picture as it is: half a turn about its middle, or a mirror that exchanges its upper and its lower half.
 enum class Symmetry { none, half_turn, mirror };
 
+struct FringeScratch;
+
 /// Intensity at image points (pixel units; docs/conventions.md), one a lane.
 template <class S>
 class PixelModel {
@@ -60,6 +62,8 @@ class PixelModel {
   virtual S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const = 0;
   /// The parts of intensity() as smooth functions; only with plan.fringe_means.
   virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
+  /// The same of up to `count` columns of a row from `column` on, read from a table (FringeTable::run); 0 where there is none.
+  virtual int fringe_run(int /*column*/, double /*row*/, int /*count*/, FringeScratch&, double* const* /*out*/) const { return 0; }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
   /// Of the picture and every derivative.

@@ -428,36 +428,41 @@ bool plan_fringe_means(const Scene& scene, const Values<double>& value, const Pl
   return true;
 }
 
-/// Squares of the picture whose fringes are smooth enough to be interpolated from 64 rays each; of the sizes tried the one
-/// with the fewest rays.
+/// Squares of the picture whose fringes are smooth enough to be interpolated from 144 rays each; of the sizes tried, from the whole
+/// picture on, the one with the fewest rays.
 void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
   const int w = scene.view.width, h = scene.view.height;
   const double target = std::max(kTableShare * scene.intensity_accuracy, 1e-9);
   const Values<Pack> lanes = value.template as<Pack>();
   const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
   double fewest = 0.5 * w * h;
-  for (int size = 128; size >= 16; size /= 2) {
+  for (int parts = 1;; parts *= 2) {
+    constexpr int kWhole = 8;  // lanes do not cross from square to square
+    const int size = ((std::max(w, h) + 2 + parts - 1) / parts + kWhole - 1) / kWhole * kWhole;
     const FringeBlocks blocks(w, h, size);
     const double least = static_cast<double>(blocks.count()) * FringeTable<Pack>::kRays;
     if (least >= fewest) break;
-    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), 0,
+    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), 0, {}, {}, {0, 0},
                                   [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
     std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
     parallel_for(blocks.count(), 0, [&](int b) {
       const double left = (b % blocks.columns) * size - 1.0, top = (b / blocks.columns) * size - 1.0;
       double error = 0;
+      FringeScratch scratch;
       for (const double down : {0.02, 0.31, 0.77, 0.98}) {  // none a Chebyshev point, the ends among them
         alignas(64) double column[kLanes];
         for (int k = 0; k < kLanes; ++k) column[k] = left + size * (0.01 + 0.98 * k / std::max(1, kLanes - 1));
-        const Pack x = Pack::load_aligned(column), y(top + down * size);
-        const FringePoint<Pack> exact = model->fringe(x, y);
-        FringePoint<Pack> read;
-        if (!table.read(x, y, true, read)) return;
-        const auto distance = [](const Pack& a, const Pack& c) { return max_of(a - c, c - a); };
-        // Every part counts as the intensity it changes.
-        const Pack size_of_fringe = max_of(exact.amplitude, -exact.amplitude) + max_of(exact.quadrature, -exact.quadrature);
-        error = std::max(error, largest(distance(exact.mean, read.mean) + distance(exact.amplitude, read.amplitude) +
-                                        distance(exact.quadrature, read.quadrature) + size_of_fringe * distance(exact.phase, read.phase)));
+        const double row = top + down * size;
+        const FringePoint<Pack> exact = model->fringe(Pack::load_aligned(column), Pack(row));
+        for (int k = 0; k < kLanes; ++k) {
+          FringePoint<double> read;
+          if (!table.read(column[k], row, scratch, read)) return;
+          const auto distance = [k](const Pack& a, double c) { return std::abs(lane(a, k) - c); };
+          // Every part counts as the intensity it changes.
+          const double size_of_fringe = std::abs(lane(exact.amplitude, k)) + std::abs(lane(exact.quadrature, k));
+          error = std::max(error, distance(exact.mean, read.mean) + distance(exact.amplitude, read.amplitude) + distance(exact.quadrature, read.quadrature) +
+                                      size_of_fringe * distance(exact.phase, read.phase));
+        }
       }
       smooth[static_cast<std::size_t>(b)] = error <= target;
     });

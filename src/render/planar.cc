@@ -1,6 +1,7 @@
 // Cells and slabs seen along one direction, plates and slabs in a converging cone.
 
 #include <algorithm>
+#include <mutex>
 
 #include "medium/build.h"
 #include "render/fringe_table.h"
@@ -103,12 +104,15 @@ class PlanarModel final : public PixelModel<S> {
  public:
   using P = PlainOf<S>;
   PlanarModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
-      : optics_(planar_optics(scene, value)),
+      : scene_(scene),
+        value_(value),
+        optics_(planar_optics(scene, value)),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.column->breaks) : plan.mesh),
         polarizers_(polarizers(scene, value)),
         compensator_(compensator(scene, value)),
         coupling_(plan.method == "modal"),
+        has_fringes_(plan.fringe_means),
         blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
         tabulated_blocks_(plan.fringe_blocks) {
     if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
@@ -118,17 +122,16 @@ class PlanarModel final : public PixelModel<S> {
       center_x_ = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1));
       center_y_ = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
     }
-    // The first ray fills the column's cache; a cell or slab needs no other.
-    S tx(0.0), ty(0.0);
-    if (!scene.microscope.directions.empty()) {
-      const Direction& d = scene.microscope.directions.front();
-      const double t = std::tan(d.theta_deg * std::numbers::pi / 180), a = d.azimuth_deg * std::numbers::pi / 180;
-      tx = S(t * std::cos(a));
-      ty = S(t * std::sin(a));
+    if (!conoscopic_) {
+      S tx(0.0), ty(0.0);
+      if (!scene.microscope.directions.empty()) {
+        const Direction& d = scene.microscope.directions.front();
+        const double t = std::tan(d.theta_deg * std::numbers::pi / 180), a = d.azimuth_deg * std::numbers::pi / 180;
+        tx = S(t * std::cos(a));
+        ty = S(t * std::sin(a));
+      }
+      constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
     }
-    constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
-    if (plan.fringe_means) planar_fringe(optics_, coupling_, mesh_, polarizers_, tx, ty);
-    optics_.column->freeze();
     if (conoscopic_ && centred(scene, center_x_, center_y_) && axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) {
           return stays_at(p.axis.z, 0.0) || (stays_at(p.axis.x, 0.0) && stays_at(p.axis.y, 0.0));
         }))
@@ -143,36 +146,84 @@ class PlanarModel final : public PixelModel<S> {
   S intensity(const P& column, const P& row) const override {
     if (!conoscopic_) return constant_;
     const S tx = (S(column) - center_x_) * tan_per_px_, ty = (center_y_ - S(row)) * tan_per_px_;
-    return intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
+    return intensity_of(planar_jones(optics(), method_, mesh_, tx, ty));
   }
   FringePoint<S> fringe(const P& column, const P& row) const override {
-    FringePoint<S> p;
-    if (table_.read(column, row, !in_phase(), p)) return p;
-    return fringe_of_ray(column, row);
+    return planar_fringe(optics(), coupling_, mesh_, polarizers_, (S(column) - center_x_) * tan_per_px_, (center_y_ - S(row)) * tan_per_px_);
+  }
+  int fringe_run(int column, double row, int count, FringeScratch& scratch, double* const* out) const override {
+    return table_.run(column, row, count, !in_phase(), scratch, out);
   }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
   Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture || tabulated_blocks_.empty()) return;
-    table_ = FringeTable<S>(blocks_, tabulated_blocks_, threads, [this](const P& column, const P& row) { return fringe_of_ray(column, row); });
+    // Where the cone's middle lies and how wide it is moves fringes and changes none.
+    const std::optional<ParameterRef> half_angle = cone_half_angle(scene_);
+    std::vector<std::size_t> places;
+    std::vector<int> changing;
+    std::vector<FringeMove> moves;
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (std::size_t j = 0; j < value_.active().size(); ++j) {
+        const int index = value_.active()[j];
+        bool moving = false;
+        for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle.value_or(ParameterRef{})}) moving = moving || (ref && ref.index == index);
+        if (moving) {
+          moves.push_back({j, lane(center_x_.d[j], 0), lane(center_y_.d[j], 0), lane(tan_per_px_.d[j], 0) / lane(plain(tan_per_px_), 0)});
+        } else {
+          places.push_back(j);
+          changing.push_back(index);
+        }
+      }
+    constexpr int kMost = ScalarTraits<S>::derivatives;
+    const std::size_t n = changing.size();
+    if constexpr (kMost > 0) {
+      if (n == 0) return fill_table<Pack>(changing, places, moves, threads);
+      if constexpr (kMost > 1)
+        if (n == 1) return fill_table<Dual1>(changing, places, moves, threads);
+      if constexpr (kMost > 2)
+        if (n == 2) return fill_table<Dual2>(changing, places, moves, threads);
+    }
+    fill_table<S>(changing, places, moves, threads);
   }
 
  private:
-  FringePoint<S> fringe_of_ray(const P& column, const P& row) const {
-    return planar_fringe(optics_, coupling_, mesh_, polarizers_, (S(column) - center_x_) * tan_per_px_,
-                         (center_y_ - S(row)) * tan_per_px_);
+  /// With the medium's samples remembered, from the first ray on: a picture that is all tabulated has none.
+  const PlanarOptics<S>& optics() const {
+    std::call_once(first_ray_, [&] {
+      planar_jones(optics_, method_, mesh_, S(0.0), S(0.0));
+      if (has_fringes_) planar_fringe(optics_, coupling_, mesh_, polarizers_, S(0.0), S(0.0));
+      optics_.column->freeze();
+    });
+    return optics_;
+  }
+  /// With rays that carry the derivatives by `changing` and no others.
+  template <class R>
+  void fill_table(const std::vector<int>& changing, const std::vector<std::size_t>& places, const std::vector<FringeMove>& moves, int threads) {
+    const Values<R> value(value_.theta(), changing);
+    const PlanarOptics<R> optics = planar_optics(scene_, value);
+    const Polarizers<R> pair = polarizers(scene_, value);
+    planar_fringe(optics, coupling_, mesh_, pair, R(0.0), R(0.0));
+    optics.column->freeze();
+    const FringeCentre centre{lane(plain(center_x_), 0), lane(plain(center_y_), 0)};
+    table_ = FringeTable<S>(blocks_, tabulated_blocks_, threads, places, moves, centre, [&](const P& column, const P& row) {
+      return planar_fringe(optics, coupling_, mesh_, pair, R((column - plain(center_x_)) * plain(tan_per_px_)), R((plain(center_y_) - row) * plain(tan_per_px_)));
+    });
   }
   S intensity_of(const Mat2<S>& sample) const {
     const Mat2<S> j = compensator_ ? *compensator_ * sample : sample;
     return norm(polarizers_.ax * (polarizers_.px * j.a + polarizers_.py * j.b) +
                 polarizers_.ay * (polarizers_.px * j.c + polarizers_.py * j.d));
   }
+  const Scene& scene_;
+  Values<S> value_;
   PlanarOptics<S> optics_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
   Polarizers<S> polarizers_;
   std::optional<Mat2<S>> compensator_;
-  bool coupling_, conoscopic_ = false;
+  bool coupling_, has_fringes_, conoscopic_ = false;
+  mutable std::once_flag first_ray_;
   Symmetry symmetry_ = Symmetry::none;
   FringeBlocks blocks_;
   std::vector<std::uint8_t> tabulated_blocks_;

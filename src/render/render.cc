@@ -8,6 +8,7 @@
 
 #include "core/threads.h"
 #include "render/ball.h"
+#include "render/fringe_table.h"
 #include "render/pixel_model.h"
 #include "render/planar.h"
 #include "render/sampling.h"
@@ -109,21 +110,23 @@ S mean_over_one_pixel(const PixelModel<S>& model, double column, double row, int
   }
 }
 
-/// Writes lanes [first, first + count) of value and derivatives to out[0], out[1..N].
+/// Writes lanes [first, first + count) to `to`.
+template <class P>
+BIREFIT_INLINE void store_lanes(const P& x, double* to, int first, int count) {
+  if constexpr (std::is_same_v<P, Pack>) {
+    if (first == 0 && count == kLanes) {
+      x.store_unaligned(to);
+      return;
+    }
+  }
+  for (int k = 0; k < count; ++k) to[k] = lane(x, first + k);
+}
+/// The same of value and derivatives, to out[0], out[1..N].
 template <class S, std::size_t N>
 BIREFIT_INLINE void store(const S& value, const std::array<double*, N>& out, int planes, int first, int count) {
-  const auto put = [&](const PlainOf<S>& x, double* to) {
-    if constexpr (kLanesOf<S> > 1) {
-      if (first == 0 && count == kLanes) {
-        x.store_unaligned(to);
-        return;
-      }
-    }
-    for (int k = 0; k < count; ++k) to[k] = lane(x, first + k);
-  };
-  put(plain(value), out[0]);
+  store_lanes(plain(value), out[0], first, count);
   if constexpr (ScalarTraits<S>::derivatives > 0)
-    for (int j = 1; j < planes; ++j) put(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)]);
+    for (int j = 1; j < planes; ++j) store_lanes(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)], first, count);
 }
 
 /// samples_at() of one row of the picture with a rim of one pixel around it (row 0 is the rim). Rings of equal samples
@@ -190,7 +193,7 @@ class Band {
   /// Many rows, so that few are computed twice; few, so that threads end together.
   static constexpr int kRows = 25;
   void resize(int width, int planes) {
-    wide_ = static_cast<std::size_t>(width) + 2;
+    wide_ = (static_cast<std::size_t>(width) + 2 + kLanes - 1) / kLanes * kLanes;
     plane_ = wide_ * 3;
     points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes) + kLanes));
     samples_.resize(wide_ * (kRows + 4));
@@ -204,15 +207,6 @@ class Band {
   std::vector<double> points_;
   std::vector<std::uint8_t> samples_;
 };
-
-template <class S>
-S load(Band& band, int first_plane, int row, int column) {
-  S v(load_lanes<PlainOf<S>>(band.row(first_plane, row) + column));
-  if constexpr (ScalarTraits<S>::derivatives > 0)
-    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
-      v.d[static_cast<std::size_t>(j)] = load_lanes<PlainOf<S>>(band.row(first_plane + 1 + j, row) + column);
-  return v;
-}
 
 /// The intensity and its derivatives by `active`, at most as many as S carries, into `images`; they are made where
 /// missing or of another size.
@@ -239,9 +233,18 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
     band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes);
     for (int r = -1; r <= rows + 2; ++r) rings.fill(std::clamp(top + r, 0, h + 1), band.samples(r), wide);
+    FringeScratch scratch;
     const auto compute = [&](int r) {
       needed.find(band.samples(r - 1), band.samples(r), band.samples(r + 1), wide);
+      std::array<double*, static_cast<std::size_t>(4 * kPlanes)> fields;
       for (int c0 = 0; c0 < wide; c0 += kStep) {
+        if (plan.fringe_means) {
+          for (int p = 0; p < 4 * kPlanes; ++p) fields[static_cast<std::size_t>(p)] = band.row(p, r) + c0;
+          if (const int run = model->fringe_run(c0 - 1, top + r - 1.0, wide - c0, scratch, fields.data()); run > 0) {
+            c0 += run - kStep;
+            continue;
+          }
+        }
         const int count = std::min(kStep, wide - c0);
         if (!needed.any(c0, count)) continue;
         const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), row(top + r - 1.0);
@@ -267,13 +270,13 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       };
       if (plan.fringe_means) {
         for (int c0 = 0; c0 < w; c0 += kStep) {
-          FringePoint<S> p[3][3];
-          for (int j = 0; j < 3; ++j)
-            for (int i = 0; i < 3; ++i)
-              p[j][i] = {load<S>(band, 0, r + j, c0 + i), load<S>(band, kPlanes, r + j, c0 + i),
-                         load<S>(band, 2 * kPlanes, r + j, c0 + i),
-                         in_phase ? S(0.0) : load<S>(band, 3 * kPlanes, r + j, c0 + i)};
-          store(in_phase ? fringe_mean<false>(p) : fringe_mean<true>(p), targets(c0), planes, 0, std::min(kStep, w - c0));
+          using P = PlainOf<S>;
+          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_lanes<P>(band.row(field * kPlanes + plane, r + j) + c0 + i); };
+          const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, images[static_cast<std::size_t>(plane)]->row(top + r) + c0, 0, std::min(kStep, w - c0)); };
+          if (in_phase)
+            fringe_means<false, P>(planes, load, put);
+          else
+            fringe_means<true, P>(planes, load, put);
         }
       } else {
         for (int p = 0; p < planes; ++p) {

@@ -20,6 +20,7 @@
 #include "independent_droplet.h"
 #include "medium/families/radial.h"
 #include "render/droplet.h"
+#include "study/frames.h"
 #include "transport/one_way.h"
 
 namespace birefit {
@@ -56,10 +57,16 @@ using namespace birefit;
 
 namespace {
 
+/// Of one call, in a row of them that lasts some ten milliseconds: a fit makes pictures one after the other, and threads that slept
+/// take a tenth of the shortest picture to wake.
 double seconds_of(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  int calls = 0;
+  double seconds = 0;
+  for (const auto start = std::chrono::steady_clock::now(); seconds < 0.01; ++calls) {
+    work();
+    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  return seconds / calls;
 }
 
 struct DropletScene {
@@ -185,6 +192,28 @@ void time_waves(int rounds) {
                 median(one) / image);
     std::printf("    four derivatives            %8.2f ms   %.2f times the image; all four by what light meets %.2f ms, %.2f times\n", 1e3 * median(four), median(four) / image,
                 1e3 * median(four_light), median(four_light) / image);
+  }
+}
+
+/// Pictures of directions: every pixel a ray of its own, but few are traced.
+void time_cones(int rounds) {
+  for (const study::FrameScene& f : study::frame_scenes()) {
+    if (!std::holds_alternative<Plate>(f.scene.sample) && !std::holds_alternative<Slab>(f.scene.sample)) continue;
+    const Theta theta = f.table.values();
+    const RenderPlan p = plan(f.scene, theta);
+    const std::vector<int> four(f.parameters.begin(), f.parameters.begin() + 4);
+    Rendering out, out_four, out_all;
+    std::vector<double> both, one, by_four, by_all;
+    for (int i = 0; i < rounds; ++i) {
+      both.push_back(seconds_of([&] { render(f.scene, p, theta, {}, 0, out); }));
+      one.push_back(seconds_of([&] { render(f.scene, p, theta, {}, 1, out); }));
+      by_four.push_back(seconds_of([&] { render(f.scene, p, theta, four, 0, out_four); }));
+      by_all.push_back(seconds_of([&] { render(f.scene, p, theta, f.parameters, 0, out_all); }));
+    }
+    std::printf("500 x 500 %s (%s):\n", f.name.c_str(), p.method.c_str());
+    std::printf("  image, all threads            %8.2f ms   one thread %.2f ms, %.2f times\n", 1e3 * median(both), 1e3 * median(one), median(one) / median(both));
+    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image; %zu: %.2f ms, %.2f times\n", 1e3 * median(by_four), median(by_four) / median(both),
+                f.parameters.size(), 1e3 * median(by_all), median(by_all) / median(both));
   }
 }
 
@@ -337,6 +366,7 @@ int main(int argc, char** argv) {
   }
 
   time_shell(rounds);
+  time_cones(rounds);
   time_unsymmetric(rounds);
   const auto peak_mb = [] {
     rusage usage{};
