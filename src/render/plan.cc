@@ -128,7 +128,7 @@ void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double 
 /// panels.
 constexpr double kTableShare = 1e-3;
 /// In two dimensions digits are dearer.
-constexpr double kPolarShare = 1e-2;
+constexpr double kSquaresShare = 1e-2;
 
 /// One ray a radius instead of one a point, when that is fewer rays.
 void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
@@ -279,7 +279,7 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
   plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel",
                                      *std::max_element(plan.samples.begin(), plan.samples.end())));
   if (scene.method == "auto")
-    plan_disc_squares(scene, value, std::max(kPolarShare * scene.intensity_accuracy, 1e-10), plan);
+    plan_disc_squares(scene, value, std::max(kSquaresShare * scene.intensity_accuracy, 1e-10), plan);
   else
     plan.reasons.push_back("the droplet does not look the same from all sides of the viewing axis: one ray a point");
   plan.samples.push_back(1);  // outside
@@ -432,7 +432,8 @@ bool plan_fringe_means(const Scene& scene, const Values<double>& value, const Pl
 /// picture on, the one with the fewest rays.
 void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
   const int w = scene.view.width, h = scene.view.height;
-  const double target = std::max(kTableShare * scene.intensity_accuracy, 1e-9);
+  // Less than 1e-9 the powers of a phase of some hundred radians do not hold.
+  const double target = std::max(kSquaresShare * scene.intensity_accuracy, 1e-9);
   const Values<Pack> lanes = value.template as<Pack>();
   const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
   double fewest = 0.5 * w * h;

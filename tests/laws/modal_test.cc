@@ -127,7 +127,7 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
       worst = std::max(worst, std::abs(a.intensity.values()[i] - b.intensity.values()[i]));
       brightest = std::max(brightest, b.intensity.values()[i]);
     }
-    EXPECT_LT(worst, 1e-3 * scene.intensity_accuracy);
+    EXPECT_LT(worst, 0.01 * scene.intensity_accuracy);
     EXPECT_GT(brightest, 0.3);
     for (std::size_t j = 0; j < active.size(); ++j) {
       double error = 0, size = 0;
