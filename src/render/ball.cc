@@ -87,9 +87,6 @@ Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, 
 
 namespace {
 
-/// Parts of the disc are planned to interpolate to a hundredth of the accuracy (plan.cc); with more than this share they are left to rays.
-constexpr double kGivenUp = 0.1;
-
 template <class S>
 class BallImage final : public PixelModel<S> {
  public:

@@ -38,6 +38,9 @@ const ChebyshevRule<kPoints>& chebyshev_rule() {
   }();
   return rule;
 }
+/// Squares are planned to interpolate to a hundredth of the accuracy asked for (plan.cc); with a tail of more than this share they are left to
+/// rays.
+constexpr double kGivenUp = 0.1;
 /// Size of the two highest Chebyshev coefficients, along either coordinate and at most, of values at kPoints x kPoints points: how far the
 /// polynomials are from what they follow.
 template <int kPoints>

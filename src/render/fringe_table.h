@@ -48,9 +48,10 @@ class FringeTable {
 
   FringeTable() = default;
   /// ray(column, row): the fringe at points of the picture, one a lane, in a scalar whose k-th derivative is the derivatives[k]-th of S.
-  /// Its other derivatives are `moves` about `centre`. `wanted`: one flag a square.
+  /// Its other derivatives are `moves` about `centre`. `wanted`: one flag a square. What was smooth when it was planned need not be, the image of
+  /// the optic axis may have come in since: squares whose tail (chebyshev.h) would change the intensity by more than `allowed` are left to rays.
   template <class Ray>
-  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, int threads, const std::vector<std::size_t>& derivatives,
+  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, double allowed, int threads, const std::vector<std::size_t>& derivatives,
               const std::vector<FringeMove>& moves, const FringeCentre& centre, const Ray& ray)
       : blocks_(blocks), start_(wanted.size(), -1), derivatives_(derivatives), moves_(moves), centre_(centre), planes_(1 + derivatives.size()) {
     std::vector<int> list;
@@ -87,6 +88,12 @@ class FringeTable {
             for (std::size_t j = 1; j < planes_; ++j) to[j * kRays] = lane(parts[f]->d[j - 1], k);
         }
     });
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const auto field = [&](std::size_t f) { return values.data() + (i * kFields + f) * planes_ * kRays; };
+      const auto largest_of = [&](std::size_t f) { return std::abs(*std::max_element(field(f), field(f) + kRays, [](double a, double b) { return std::abs(a) < std::abs(b); })); };
+      const double left = tail<kPoints>(field(0)) + tail<kPoints>(field(2)) + tail<kPoints>(field(3)) + (largest_of(0) + largest_of(3)) * tail<kPoints>(field(1));
+      if (!(left <= allowed)) start_[static_cast<std::size_t>(list[i])] = -1;
+    }
     parallel_for(static_cast<int>(list.size() * kFields * planes_), threads, [&](int plane) {
       const std::size_t at = static_cast<std::size_t>(plane) * kRays;
       to_powers<kPoints>(values.data() + at, coefficients_.data() + at);

@@ -443,7 +443,7 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
     const FringeBlocks blocks(w, h, size);
     const double least = static_cast<double>(blocks.count()) * FringeTable<Pack>::kRays;
     if (least >= fewest) break;
-    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), 0, {}, {}, {0, 0},
+    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), std::numeric_limits<double>::infinity(), 0, {}, {}, {0, 0},
                                   [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
     std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
     parallel_for(blocks.count(), 0, [&](int b) {

@@ -206,7 +206,7 @@ class PlanarModel final : public PixelModel<S> {
     planar_fringe(optics, coupling_, mesh_, pair, R(0.0), R(0.0));
     optics.column->freeze();
     const FringeCentre centre{lane(plain(center_x_), 0), lane(plain(center_y_), 0)};
-    table_ = FringeTable<S>(blocks_, tabulated_blocks_, threads, places, moves, centre, [&](const P& column, const P& row) {
+    table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places, moves, centre, [&](const P& column, const P& row) {
       return planar_fringe(optics, coupling_, mesh_, pair, R((column - plain(center_x_)) * plain(tan_per_px_)), R((plain(center_y_) - row) * plain(tan_per_px_)));
     });
   }
