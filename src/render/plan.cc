@@ -238,6 +238,26 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
         turned * 180 / kPi));
 }
 
+/// A ring of defects where its tension and the field do not balance is on its way, or something holds it.
+void note_ring(const DropletOptics<double>& o, RenderPlan& plan) {
+  if (!o.axial || !o.axial->has_ring()) return;
+  const double e = o.axial->e(), ring = o.axial->ring();
+  const RingBalance balance = ring_balance(e, ring, axial_production_grid(ring));
+  // Cores of 5 to 10 nm, with up to one more for what they cost themselves.
+  const double least = std::log(o.radius_um / 0.010), most = std::log(o.radius_um / 0.005) + 1;
+  const std::string where = fmt::format("A ring of defects at {:.3g} of the radius under a reduced field of {:.3g}", ring, e);
+  const std::string model = "Strong anchoring and one elastic constant are assumed, and the ring is taken to be where it is given or fitted.";
+  if (!balance.stable)
+    plan.warnings.push_back(fmt::format("{} is not stable, whatever its core: a free one would move in and vanish, or out. {}", where, model));
+  else if (balance.core_length < least || balance.core_length > most)
+    plan.warnings.push_back(fmt::format(
+        "{} is out of balance: {} and a free one would move {}. {}", where,
+        balance.core_length > 1 && balance.core_length < 15
+            ? fmt::format("it would be at rest for ln(radius/core) = {:.2g}, has {:.2g} to {:.2g} (core 5 to 10 nm),", balance.core_length, least, most)
+            : "cores of 5 to 10 nm are far from what would hold it there,",
+        balance.core_length > most ? "out" : "in", model));
+}
+
 RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   const BallOptics<double> o = ball_optics(scene, value);
@@ -810,6 +830,7 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     result = plan_planar(scene, value);
   }
   note_material(scene, theta, result);
+  if (std::holds_alternative<Droplet>(scene.sample)) note_ring(droplet_optics(scene, value), result);
   const Symmetry symmetry = result.wave ? Symmetry::none : symmetry_of(scene, result, value);
   if (symmetry == Symmetry::half_turn) result.reasons.push_back("half a turn about the viewing axis leaves the picture as it is: half of it is computed");
   if (symmetry == Symmetry::mirror) result.reasons.push_back("the lower half of the picture is the upper one's mirror image: half of it is computed");

@@ -288,5 +288,38 @@ TEST(Planner, TotalReflectionOfOnePolarisationIsNoHole) {
     for (const double x : d.values()) EXPECT_TRUE(std::isfinite(x));
 }
 
+// Of droplets of 9.3 um, whose ln(radius/core) is 6.1 to 7.8: the stable ring for 7 lies at 0.9334 of the radius at e = 12 and at 0.8213 at e = 6
+// (tests/data/physics/droplet_ring_equilibrium.csv); it moves out with the field, and half-way in lies the barrier.
+TEST(Planner, SaysWhereNoFreeRingWouldBe) {
+  const auto said = [](double e, double ring) {
+    TableBuilder b;
+    Scene scene;
+    scene.view.width = scene.view.height = 16;
+    scene.view.pixel_size_um = 0.7;
+    scene.view.center_x_px = scene.view.center_y_px = b.fixed("center", 7.5);
+    scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
+    scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+    scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+    Droplet droplet;
+    droplet.diameter_um = b.fixed("diameter_um", 9.3);
+    AxialDirector axial;
+    axial.reduced_field = b.fixed("reduced_field", e);
+    axial.ring_radius = b.fixed("ring_radius", ring);
+    droplet.director = axial;
+    scene.sample = droplet;
+    scene.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fixed("birefringence", 0.22)};
+    scene.surround_index = b.fixed("index", 1.43);
+    for (const std::string& warning : plan(scene, b.table.values()).warnings)
+      for (const char* what : {"not stable", "would move out", "would move in"})
+        if (warning.starts_with("A ring of defects") && warning.find(what) != std::string::npos) return std::string(what);
+    return std::string("nothing");
+  };
+  EXPECT_EQ(said(12, 0.9334), "nothing");
+  EXPECT_EQ(said(6, 0.8213), "nothing");
+  EXPECT_EQ(said(12, 0.8213), "would move out");
+  EXPECT_EQ(said(6, 0.9334), "would move in");
+  EXPECT_EQ(said(6, 0.5), "not stable");
+}
+
 }  // namespace
 }  // namespace birefit

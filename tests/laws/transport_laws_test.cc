@@ -10,6 +10,7 @@
 
 #include "medium/families/planar.h"
 #include "profiles.h"
+#include "reference_table.h"
 #include "transport/methods.h"
 
 namespace birefit {
@@ -279,6 +280,34 @@ Eigen::Matrix4cd berreman(C eo, C ee, const Eigen::Vector3d& a, double kx, doubl
   d(3, 0) += eps(0, 0);
   d(3, 1) += eps(0, 1);
   return d;
+}
+
+// The two forward normal components of uniaxial plates, from the quartic equation (tests/data/physics/README.md): the eigenvalues of N.
+TEST(OneWayOperator, HasTheNormalComponentsOfTheQuartic) {
+  const testing::ReferenceTable table(testing::data_path("physics/plate_wavevectors.csv"));
+  const testing::ReferenceTable tensors(testing::data_path("physics/plate_tensors.csv"));
+  /// eo of a uniaxial case, and ee = trace - 2 eo.
+  const auto medium = [&](const std::string& name, double eo, const Vec3<double>& axis) {
+    std::size_t row = 0;
+    while (tensors.text(row, "case") != name) ++row;
+    return OpticalPoint<double>{axis, eo, tensors.number(row, "exx") + tensors.number(row, "eyy") + tensors.number(row, "ezz") - 2 * eo, 0.0, 0.0, 1.0};
+  };
+  const double a = 1 / std::sqrt(8.0), c = std::sqrt(3.0) / 2;
+  const OpticalPoint<double> e44 = medium("E44_278K_axisA", 1.53 * 1.53, {-a, a, -c}), calcite = medium("calcite_c_axis", 1.6584 * 1.6584, {0, 0, 1});
+  int compared = 0;
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    const std::string name = table.text(row, "case");
+    if (name != "E44_278K_axisA" && name != "calcite_c_axis") continue;  // biaxial
+    const OpticalPoint<double>& p = name == "calcite_c_axis" ? calcite : e44;
+    const double angle = table.number(row, "theta_inc_deg") * std::numbers::pi / 180, azimuth = table.number(row, "azimuth_deg") * std::numbers::pi / 180;
+    const Matrix2<double> n = one_way_lossless(p, std::sin(angle) * std::cos(azimuth), std::sin(angle) * std::sin(azimuth)).index;
+    const double half = 0.5 * (n.a + n.d), root = std::sqrt(std::max(0.25 * (n.a - n.d) * (n.a - n.d) + n.b * n.c, 0.0));
+    const double tolerance = root < 1e-6 ? 3e-7 : 1e-11;  // at double roots, along the axis, theirs are good to 1e-7; tensors have 12 digits
+    EXPECT_NEAR(half - root, table.number(row, "q_small"), tolerance) << name << " " << angle << " " << azimuth;
+    EXPECT_NEAR(half + root, table.number(row, "q_large"), tolerance) << name << " " << angle << " " << azimuth;
+    ++compared;
+  }
+  EXPECT_GT(compared, 50);
 }
 
 TEST(OneWayOperator, IntertwinesWithBerremanInRandomMedia) {

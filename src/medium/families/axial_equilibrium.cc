@@ -2,6 +2,7 @@
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 #include <deque>
 #include <map>
@@ -251,26 +252,62 @@ double AxialEquilibrium::theta(double rho, double z) const {
   return sum;
 }
 
+namespace {
+
+/// 4 pi times half the squared gradient of theta_s over the quarter disc; of a ring less pi^2/2 ring ln(1 / r_c), where all but
+/// that logarithm converges as the tube around the ring that is left out, r_c thick, shrinks. Along rays from the ring.
+double energy_of_boundary_angle(double ring) {
+  if (ring == 0) return 2 * std::numbers::pi;
+  const auto panels = [](const auto& f, double from, double to, int n) {
+    double sum = 0;
+    for (int i = 0; i < n; ++i) sum += boost::math::quadrature::gauss<double, 20>::integrate(f, from + (to - from) * i / n, from + (to - from) * (i + 1) / n);
+    return sum;
+  };
+  const auto along = [&](double angle) {
+    double c, s;
+    sin_cos(angle, s, c);
+    const double to_sphere = std::sqrt(1 - ring * ring * s * s) - ring * c, end = c < 0 ? std::min(to_sphere, -ring / c) : to_sphere;
+    const double core = 0.5 * std::numbers::pi * ring;
+    const auto rest = [&](double d) {
+      Dual<double, 2> rho(ring + d * c), z(d * s);
+      rho.d[0] = z.d[1] = 1;
+      const Dual<double, 2> t = axial_boundary_angle(rho, z, Dual<double, 2>(ring));
+      return 2 * std::numbers::pi * d * (ring + d * c) * (t.d[0] * t.d[0] + t.d[1] * t.d[1]) - core / d;
+    };
+    // The ring's image in the sphere is about as far as the sphere.
+    double sum = core * std::log(end);
+    for (double from = 0, to = std::min(end, 1 - ring); from < end; from = to, to = std::min(end, 2 * to)) sum += panels(rest, from, to, 1);
+    return sum;
+  };
+  const double pole = std::numbers::pi - std::atan(1 / ring);
+  return panels(along, 0, pole, 12) + panels(along, pole, std::numbers::pi, 4);
+}
+
+}  // namespace
+
 double AxialEquilibrium::energy() const {
-  if (ring > 0) throw std::logic_error("the energy of a ring diverges with the logarithm of its core");
-  // Derivatives of theta along the element lines at the nodes of each element; theta_s is the polar angle.
-  const LobattoRule& rule = lobatto_rule(grid.degree);
-  const int p = grid.degree;
+  // theta = theta_s + change: the gradients' product is, by parts, -change laplacian theta_s, since change vanishes on every boundary.
+  const Equations equations(e, ring, grid);
+  const int n = grid.nodes();
+  Eigen::VectorXd inside(equations.inner * equations.inner);
   double sum = 0;
-  for (int a = 0; a < grid.elements; ++a)
-    for (int b = 0; b < grid.elements; ++b) {
-      const double hr = 0.5 * (r[(a + 1) * p] - r[a * p]), hv = 0.5 * (polar_rad[(b + 1) * p] - polar_rad[b * p]);
-      const Eigen::MatrixXd block = change.block(a * p, b * p, p + 1, p + 1);
-      const Eigen::MatrixXd by_r = rule.derivative * block / hr, by_v = block * rule.derivative.transpose() / hv;
-      for (int i = 0; i <= p; ++i)
-        for (int j = 0; j <= p; ++j) {
-          const double rr = r[a * p + i], v = polar_rad[b * p + j], theta = v + block(i, j);
-          const double s = std::sin(v), st = std::sin(theta), over = s > 1e-12 ? st * st / s : 0.0;
-          sum += hr * std::abs(hv) * rule.w[i] * rule.w[j] *
-                 0.5 * (s * (rr * rr * by_r(i, j) * by_r(i, j) + (1 + by_v(i, j)) * (1 + by_v(i, j))) + over + e * e * rr * rr * s * st * st);
-        }
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      if (i > 0 && j > 0 && i < n - 1 && j < n - 1) inside[equations.at(i, j)] = change(i, j);
+      const double x = r[i], v = polar_rad[j], s = std::sin(v);
+      const double boundary = x > 0 ? axial_boundary_angle(x * s, std::max(x * std::cos(v), 0.0), ring) : ring > 0 ? 0.0 : v;
+      const double st = std::sin(boundary + change(i, j)), over = s > 1e-12 ? st * st / s : 0.0;
+      sum += equations.r.w[i] * equations.polar.w[j] * 0.5 * (over + e * e * x * x * s * st * st);
     }
-  return 2 * 2 * std::numbers::pi * sum;  // both halves
+  sum += 0.5 * inside.dot(equations.stiffness * inside) - equations.source.dot(inside);
+  return 4 * std::numbers::pi * sum + energy_of_boundary_angle(ring);  // both halves
+}
+
+RingBalance ring_balance(double e, double ring, const AxialGrid& grid) {
+  const double step = 0.05 * (1 - ring);
+  const auto energy = [&](double at) { return axial_equilibrium(e, at, grid, false).energy(); };
+  const double below = energy(ring - step), here = energy(ring), above = energy(ring + step);
+  return {-(above - below) / (std::numbers::pi * std::numbers::pi * step), above - 2 * here + below > 0};
 }
 
 }  // namespace birefit

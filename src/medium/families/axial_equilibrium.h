@@ -45,9 +45,19 @@ struct AxialEquilibrium {
   int newton_steps = 0;
   /// theta at any place of the upper half.
   double theta(double rho, double z) const;
-  /// F / (K R), the energy of the whole sphere; hedgehog only (the ring's energy diverges with its logarithm).
+  /// F / (K R), the energy of the whole sphere. A ring's diverges with the logarithm of its core radius r_c: of a ring it is what is left when
+  /// pi^2/2 ring ln(R / r_c) is taken off.
   double energy() const;
 };
+
+/// L = ln(R / r_c) + core energy (per length, in pi K / 4) with which a ring is where its tension and the field balance, dF/dring = 0: a ring whose
+/// own L is larger shrinks. Of a droplet of micrometres L is 5 to 10 (r_c 5 to 10 nm, core energy 0 to 1; docs/methods.md). `stable`: it returns
+/// there when moved.
+struct RingBalance {
+  double core_length;
+  bool stable;
+};
+RingBalance ring_balance(double e, double ring, const AxialGrid& grid = {});
 
 /// Newton's method from a closed-form start, always the same: equal arguments give equal bits. e in [0, 60], ring 0 or in
 /// [0.2, 0.995]. Throws std::domain_error where Newton does not converge, which no e and ring in range do.
