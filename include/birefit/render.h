@@ -43,7 +43,7 @@ struct RenderPlan {
   /// Pixels with one sample: the mean of a fringe in closed form from one ray a pixel and its
   /// neighbours' (plates), instead of the point value's correction.
   bool fringe_means = false;
-  /// Which squares of so many pixels have their fringes interpolated from a few rays (render/fringe_table.h); 0 = none.
+  /// Which squares of so many pixels (a multiple of 8) have their fringes interpolated from a few rays (render/fringe_table.h); 0 = none.
   int fringe_block_px = 0;
   std::vector<std::uint8_t> fringe_blocks;
   /// Droplets that look different from all sides: all of the disc, in squares that have their own `steps`. Empty: `steps` everywhere.

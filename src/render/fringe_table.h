@@ -23,7 +23,7 @@ struct FringeBlocks {
   int count() const { return columns * rows; }
 };
 
-/// A parameter that moves all fringes and changes none: by the centre's column and row, and by the logarithm of the scale around it.
+/// A parameter that moves all fringes, changes none and does nothing else: by the centre's column and row, and by the logarithm of the scale around it.
 struct FringeMove {
   std::size_t derivative;  ///< of the table's scalar
   double column, row, log_scale;

@@ -239,10 +239,13 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
 }
 
 /// A ring of defects where its tension and the field do not balance is on its way, or something holds it.
-void note_ring(const DropletOptics<double>& o, RenderPlan& plan) {
-  if (!o.axial || !o.axial->has_ring()) return;
+void note_ring(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
+  const auto* droplet = std::get_if<Droplet>(&scene.sample);
+  const auto* axial = droplet ? std::get_if<AxialDirector>(&droplet->director) : nullptr;
+  if (!axial || !axial->ring_radius) return;
+  const DropletOptics<double> o = droplet_optics(scene, value);
   const double e = o.axial->e(), ring = o.axial->ring();
-  const RingBalance balance = ring_balance(e, ring, axial_production_grid(ring));
+  const RingBalance balance = ring_balance(e, ring);
   // Cores of 5 to 10 nm, with up to one more for what they cost themselves.
   const double least = std::log(o.radius_um / 0.010), most = std::log(o.radius_um / 0.005) + 1;
   const std::string where = fmt::format("A ring of defects at {:.3g} of the radius under a reduced field of {:.3g}", ring, e);
@@ -453,47 +456,56 @@ bool plan_fringe_means(const Scene& scene, const Values<double>& value, const Pl
 void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
   const int w = scene.view.width, h = scene.view.height;
   // Less than 1e-9 the powers of a phase of some hundred radians do not hold.
-  const double target = std::max(kSquaresShare * scene.intensity_accuracy, 1e-9);
+  constexpr double kLeast = 1e-9;
+  if (scene.intensity_accuracy < 10 * kLeast) return;
+  const double target = std::max(kSquaresShare * scene.intensity_accuracy, kLeast);
+  constexpr int kColumns = 8;
   const Values<Pack> lanes = value.template as<Pack>();
   const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
   double fewest = 0.5 * w * h;
   for (int parts = 1;; parts *= 2) {
     constexpr int kWhole = 8;  // lanes do not cross from square to square
+    static_assert(kWhole % kLanes == 0);
     const int size = ((std::max(w, h) + 2 + parts - 1) / parts + kWhole - 1) / kWhole * kWhole;
     const FringeBlocks blocks(w, h, size);
     const double least = static_cast<double>(blocks.count()) * FringeTable<Pack>::kRays;
     if (least >= fewest) break;
-    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), std::numeric_limits<double>::infinity(), 0, {}, {}, {0, 0},
+    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), kGivenUp * scene.intensity_accuracy, 0, {}, {}, {0, 0},
                                   [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
     std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
     parallel_for(blocks.count(), 0, [&](int b) {
       const double left = (b % blocks.columns) * size - 1.0, top = (b / blocks.columns) * size - 1.0;
-      double error = 0;
       FringeScratch scratch;
-      for (const double down : {0.02, 0.31, 0.77, 0.98}) {  // none a Chebyshev point, the ends among them
-        alignas(64) double column[kLanes];
-        for (int k = 0; k < kLanes; ++k) column[k] = left + size * (0.01 + 0.98 * k / std::max(1, kLanes - 1));
-        const double row = top + down * size;
-        const FringePoint<Pack> exact = model->fringe(Pack::load_aligned(column), Pack(row));
-        for (int k = 0; k < kLanes; ++k) {
-          FringePoint<double> read;
-          if (!table.read(column[k], row, scratch, read)) return;
-          const auto distance = [k](const Pack& a, double c) { return std::abs(lane(a, k) - c); };
-          // Every part counts as the intensity it changes.
-          const double size_of_fringe = std::abs(lane(exact.amplitude, k)) + std::abs(lane(exact.quadrature, k));
-          error = std::max(error, distance(exact.mean, read.mean) + distance(exact.amplitude, read.amplitude) + distance(exact.quadrature, read.quadrature) +
-                                      size_of_fringe * distance(exact.phase, read.phase));
+      for (const double down : {0.02, 0.31, 0.77, 0.98})  // none a Chebyshev point, the ends among them
+        for (int first = 0; first < kColumns; first += kLanes) {
+          alignas(64) double column[kLanes];
+          for (int k = 0; k < kLanes; ++k) column[k] = left + size * (0.01 + 0.98 * std::min(first + k, kColumns - 1) / (kColumns - 1.0));
+          const double row = top + down * size;
+          const FringePoint<Pack> exact = model->fringe(Pack::load_aligned(column), Pack(row));
+          for (int k = 0; k < kLanes; ++k) {
+            FringePoint<double> read;
+            if (!table.read(column[k], row, scratch, read)) return;
+            const auto distance = [k](const Pack& a, double c) { return std::abs(lane(a, k) - c); };
+            // Every part counts as the intensity it changes.
+            const double size_of_fringe = std::abs(lane(exact.amplitude, k)) + std::abs(lane(exact.quadrature, k));
+            const double error = distance(exact.mean, read.mean) + distance(exact.amplitude, read.amplitude) + distance(exact.quadrature, read.quadrature) +
+                                 size_of_fringe * distance(exact.phase, read.phase);
+            if (!(error <= target)) return;  // also where there is no number: total reflection outside the picture
+          }
         }
-      }
-      smooth[static_cast<std::size_t>(b)] = error <= target;
+      smooth[static_cast<std::size_t>(b)] = 1;
     });
-    const double left_over = static_cast<double>(std::count(smooth.begin(), smooth.end(), 0)) * size * size;
+    double left_over = 0;  // pixels
+    for (int b = 0; b < blocks.count(); ++b)
+      if (!smooth[static_cast<std::size_t>(b)])
+        left_over += static_cast<double>(std::min(size, w + 2 - b % blocks.columns * size)) * std::min(size, h + 2 - b / blocks.columns * size);
     if (least + left_over < fewest) {
       fewest = least + left_over;
       plan.fringe_block_px = size;
       plan.fringe_blocks = smooth;
     }
   }
+  if (plan.fringe_block_px > 0) plan.numerical_error += target;
   if (plan.fringe_block_px > 0)
     plan.reasons.push_back(fmt::format("{} of {} squares of {} pixels have their fringes interpolated from {} rays each",
                                        std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1), plan.fringe_blocks.size(),
@@ -830,7 +842,7 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     result = plan_planar(scene, value);
   }
   note_material(scene, theta, result);
-  if (std::holds_alternative<Droplet>(scene.sample)) note_ring(droplet_optics(scene, value), result);
+  note_ring(scene, value, result);
   const Symmetry symmetry = result.wave ? Symmetry::none : symmetry_of(scene, result, value);
   if (symmetry == Symmetry::half_turn) result.reasons.push_back("half a turn about the viewing axis leaves the picture as it is: half of it is computed");
   if (symmetry == Symmetry::mirror) result.reasons.push_back("the lower half of the picture is the upper one's mirror image: half of it is computed");

@@ -186,7 +186,7 @@ class NeededPoints {
 };
 
 /// What a thread works on: a band of rows with one more on either side, r = 0 the row above the band. Point values of the last three
-/// rows are at row(field * planes + plane, r), each with at least width + 2 + kLanes readable places; one field, the intensity, or
+/// rows are at row(field * planes + plane, r), each with width + 2 places and more up to a whole number of lanes; one field, the intensity, or
 /// with plan.fringe_means the four of a FringePoint.
 class Band {
  public:

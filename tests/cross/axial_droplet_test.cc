@@ -86,6 +86,7 @@ constexpr AxialGrid kRing{20, 7};
 
 TEST(AxialDroplet, RingEnergyAgreesWithFiniteElements) {
   const ReferenceTable table(data_path("physics/droplet_ring_energy.csv"));
+  int compared = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
     const double e = table.number(row, "e"), ring = table.number(row, "rho_ring_over_R");
     if (ring < 0.2 || (e != 0 && e != 2 && e != 6 && e != 12 && e != 40)) continue;  // others take time
@@ -94,8 +95,11 @@ TEST(AxialDroplet, RingEnergyAgreesWithFiniteElements) {
     double error = 0;
     for (std::size_t near = row > 1 ? row - 2 : 0; near <= std::min(row + 2, table.size() - 1); ++near)
       if (table.number(near, "e") == e) error = std::max(error, 3 * table.number(near, "err_est"));
+    if (error > 0.05) continue;  // says nothing
     EXPECT_NEAR(axial_equilibrium(e, ring, kRing, false).energy(), table.number(row, "Freg_over_KR"), error + 1e-4) << e << " " << ring;
+    ++compared;
   }
+  EXPECT_GT(compared, 50);
 }
 
 // Where the table's ring is in balance ours is, for its L within what moves it by three times 0.003; so do barriers, which are unstable.
@@ -113,7 +117,7 @@ TEST(AxialDroplet, RingsAreInBalanceWhereFiniteElementsSay) {
       const double slope = std::max(std::abs(out.core_length - here.core_length) / (0.3 * (1 - ring)), std::abs(here.core_length - in.core_length) / 0.02);
       EXPECT_NEAR(here.core_length, L, 0.02 + 0.009 * slope) << e << " " << ring;
       const double energy = axial_equilibrium(e, ring, {20, 5}, false).energy() + kTension * ring * L;
-      EXPECT_NEAR(energy, table.number(row, barrier ? "F_barrier_over_KR" : "F_eq_over_KR"), 0.09) << e << " " << ring;
+      EXPECT_NEAR(energy, table.number(row, barrier ? "F_barrier_over_KR" : "F_eq_over_KR"), 0.09) /* three times the README's 0.03 */ << e << " " << ring;
       if (std::abs(here.core_length - L) < 0.1 * std::abs(out.core_length - L)) {  // at a spinodal both are one
         EXPECT_EQ(here.stable, !barrier) << e << " " << ring;
       }
@@ -128,6 +132,7 @@ TEST(AxialDroplet, RingsAreInBalanceWhereFiniteElementsSay) {
 // 0.02.
 TEST(AxialDroplet, TransitionsAreWhereFiniteElementsSay) {
   const ReferenceTable table(data_path("physics/droplet_transitions.csv"));
+  int compared = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
     const double L = table.number(row, "L"), e = table.number(row, "e_ring_spinodal_lower"), together = table.number(row, "e_coexistence");
     if (!(L > 5.5)) continue;  // below, the two are one
@@ -142,8 +147,10 @@ TEST(AxialDroplet, TransitionsAreWhereFiniteElementsSay) {
       const double at = table.number(row, "rho_at_coexistence");
       return axial_equilibrium(field, at, kRing, false).energy() + kTension * at * L - axial_equilibrium(field, 0, {12, 6}, false).energy();
     };
+    ++compared;
     EXPECT_NEAR(excess(together), 0, 0.06 * std::abs(excess(together + 0.1) - excess(together - 0.1)) / 0.2) << L;
   }
+  EXPECT_EQ(compared, 5);
 }
 
 // F - F_hedgehog = pi^2/2 (x/e) (L - ln e + ln x + c(x)), x = e ring.
@@ -158,6 +165,13 @@ TEST(AxialDroplet, SmallRingsScale) {
     ++compared;
   }
   EXPECT_GT(compared, 4);
+}
+
+TEST(AxialDroplet, BalanceHasANumberAtTheEndsOfItsRange) {
+  for (const double e : {0.0, 60.0})
+    for (const double ring : {0.2, 0.995}) EXPECT_TRUE(std::isfinite(ring_balance(e, ring).core_length)) << e << " " << ring;
+  // Near the sphere the ring is repelled like pi^2/2 ln(1/(1 - ring)): no core is small enough to hold it there without a field.
+  EXPECT_LT(ring_balance(0, 0.995).core_length, -50);
 }
 
 // theta = polar - e^2/2 (r^p - r^2) sin cos + O(e^4), p = (sqrt 17 - 1)/2: the linearised equation solved by hand.

@@ -303,11 +303,21 @@ double AxialEquilibrium::energy() const {
   return 4 * std::numbers::pi * sum + energy_of_boundary_angle(ring);  // both halves
 }
 
-RingBalance ring_balance(double e, double ring, const AxialGrid& grid) {
-  const double step = 0.05 * (1 - ring);
-  const auto energy = [&](double at) { return axial_equilibrium(e, at, grid, false).energy(); };
-  const double below = energy(ring - step), here = energy(ring), above = energy(ring + step);
-  return {-(above - below) / (std::numbers::pi * std::numbers::pi * step), above - 2 * here + below > 0};
+RingBalance ring_balance(double e, double ring) {
+  static std::mutex guard;
+  static double known_e = -1, known_ring = -1;
+  static RingBalance known{};
+  {
+    const std::lock_guard lock(guard);
+    if (known_e == e && known_ring == ring) return known;
+  }
+  const double step = 0.05 * (1 - ring), below = std::max(0.2, ring - step), above = std::min(0.995, ring + step), half = 0.5 * (above - below);
+  const auto energy = [&](double at) { return known_axial_equilibrium(e, at, false)->energy(); };
+  const double low = energy(below), here = energy(below + half), high = energy(above);
+  const RingBalance fresh{-(high - low) / (std::numbers::pi * std::numbers::pi * half), high - 2 * here + low > 0};
+  const std::lock_guard lock(guard);
+  known_e = e, known_ring = ring, known = fresh;
+  return fresh;
 }
 
 }  // namespace birefit

@@ -57,7 +57,8 @@ struct RingBalance {
   double core_length;
   bool stable;
 };
-RingBalance ring_balance(double e, double ring, const AxialGrid& grid = {});
+/// On the production grid, by differences of the energy over a tenth of the way to the sphere; the last one is remembered.
+RingBalance ring_balance(double e, double ring);
 
 /// Newton's method from a closed-form start, always the same: equal arguments give equal bits. e in [0, 60], ring 0 or in
 /// [0.2, 0.995]. Throws std::domain_error where Newton does not converge, which no e and ring in range do.
