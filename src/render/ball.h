@@ -40,7 +40,7 @@ Mat2<S> ball_jones(const BallOptics<S>&, const DropletRay<S>&, const S& cos_azim
                    const S& p_scale);
 
 /// Divides the disc into squares with their own steps, and finds those that are smooth: interpolated to `target` of the incident
-/// intensity. To be called with method and samples planned; sets the error, too, and the cost.
+/// intensity. To be called with method and samples planned; sets the error, too.
 void plan_disc_squares(const Scene&, const Values<double>&, double target, RenderPlan& plan);
 /// Mesh steps of a plan's rays by place.
 class StepsByPlace {

@@ -505,11 +505,11 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
       plan.fringe_blocks = smooth;
     }
   }
-  if (plan.fringe_block_px > 0) plan.numerical_error += target;
-  if (plan.fringe_block_px > 0)
-    plan.reasons.push_back(fmt::format("{} of {} squares of {} pixels have their fringes interpolated from {} rays each",
-                                       std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1), plan.fringe_blocks.size(),
-                                       plan.fringe_block_px, FringeTable<Pack>::kRays));
+  if (plan.fringe_block_px == 0) return;
+  plan.numerical_error += target;
+  plan.reasons.push_back(fmt::format("{} of {} squares of {} pixels have their fringes interpolated from {} rays each",
+                                     std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1), plan.fringe_blocks.size(),
+                                     plan.fringe_block_px, FringeTable<Pack>::kRays));
 }
 
 /// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
