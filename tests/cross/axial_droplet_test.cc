@@ -194,6 +194,22 @@ TEST(AxialDroplet, AnchoringAxisEquatorAndRingHoldWhatTheyMust) {
   }
 }
 
+// What images use is found in a few steps from equilibria kept nearby: the same as from the start. Over the whole range and its corners.
+TEST(AxialDroplet, NeighboursLeadToTheSameEquilibrium) {
+  for (const double e : {0.0, 0.11, 1.3, 5.2, 12.7, 29.3, 60.0})
+    for (const double ring : {0.0, 0.2, 0.51, 0.87, 0.955, 0.995}) {
+      const AxialEquilibrium direct = axial_equilibrium(e, ring, axial_production_grid(ring));
+      const auto known = known_axial_equilibrium(e, ring, true);
+      // Steps end at 1e-9 of their size; each leaves at most a third of the error.
+      const auto compare = [&](const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const char* what) {
+        EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-8 * std::max(1.0, a.cwiseAbs().maxCoeff())) << what << ", e " << e << " ring " << ring;
+      };
+      compare(direct.change, known->change, "theta");
+      compare(direct.by_e, known->by_e, "by e");
+      if (ring > 0) compare(direct.by_ring, known->by_ring, "by ring");
+    }
+}
+
 // d theta / d e by the implicit function theorem, on nodes that move, against the table's own.
 TEST(AxialDroplet, DerivativeByFieldAgreesWithFiniteElements) {
   const ReferenceTable table(data_path("physics/droplet_hedgehog_theta.csv"));

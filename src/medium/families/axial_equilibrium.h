@@ -66,7 +66,8 @@ AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid 
 /// Grid that images use. Largest error of a hedgehog 3e-5 rad up to e = 25, 3e-4 at e = 40; of a ring, close to it, 1e-4 at
 /// e = 10, 6e-4 at e = 40, where its distance to the sphere is of the coherence length (tests/cross/axial_droplet_test.cc).
 inline AxialGrid axial_production_grid(double ring) { return {ring > 0 ? 10 : 8, 5}; }
-/// The same on the production grid; the last few are remembered, for images that differ in other parameters.
+/// The same on the production grid to 1e-8 rad, in a few steps from the nearest of a fixed ladder of equilibria, which are made when first needed:
+/// equal arguments give equal bits whatever was asked before. The last few are remembered, for images that differ in other parameters.
 std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring, bool slopes);
 
 // ---- the edges --------------------------------------------------------------------------------------------------------
