@@ -267,6 +267,21 @@ template <class B, int N>
 BIREFIT_INLINE PlainOf<B> plain(const Dual<B, N>& x) {
   return plain(x.value);
 }
+/// A scalar as one with more derivatives: derivative j becomes derivative to[j].
+template <class S, class R>
+struct Raise {
+  std::array<std::size_t, static_cast<std::size_t>(ScalarTraits<S>::derivatives)> to{};
+  BIREFIT_INLINE R operator()(const S& x) const {
+    R r(plain(x));
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (std::size_t j = 0; j < to.size(); ++j) r.d[to[j]] = r.d[to[j]] + x.d[j];  // unused ones are 0 and may share a place
+    return r;
+  }
+};
+template <class S>
+struct Raise<S, S> {
+  BIREFIT_INLINE const S& operator()(const S& x) const { return x; }
+};
 template <class C, class B, int N>
 BIREFIT_INLINE Dual<B, N> select(const C& condition, const Dual<B, N>& a, const Dual<B, N>& b) {
   Dual<B, N> r;

@@ -92,8 +92,11 @@ class FringeTable {
       const auto field = [&](std::size_t f) { return values.data() + (i * kFields + f) * planes_ * kRays; };
       const auto largest_of = [&](std::size_t f) { return std::abs(*std::max_element(field(f), field(f) + kRays, [](double a, double b) { return std::abs(a) < std::abs(b); })); };
       const double left = tail<kPoints>(field(0)) + tail<kPoints>(field(2)) + tail<kPoints>(field(3)) + (largest_of(0) + largest_of(3)) * tail<kPoints>(field(1));
-      if (!(left <= allowed)) start_[static_cast<std::size_t>(list[i])] = -1;
+      if (!(left <= allowed)) start_[static_cast<std::size_t>(list[i])] = kGone;
     }
+    for (std::size_t plane = 1; plane < planes_; ++plane) fields_[derivatives_[plane - 1] + 1] = fields_of(values, list.size(), plane);
+    for (const FringeMove& m : moves_) fields_[m.derivative + 1] = kAllFringeFields;
+    fields_[0] = kAllFringeFields;
     parallel_for(static_cast<int>(list.size() * kFields * planes_), threads, [&](int plane) {
       const std::size_t at = static_cast<std::size_t>(plane) * kRays;
       to_powers<kPoints>(values.data() + at, coefficients_.data() + at);
@@ -117,7 +120,7 @@ class FringeTable {
       x0 = first;
     for (std::size_t f = 0; f < (quadrature ? kFields : kFields - 1); ++f, line += kOut * kPoints)
       for (std::size_t plane = 0; plane < kOut; ++plane) {
-        if (!used(plane)) continue;
+        if (!(fields_[plane] >> f & 1)) continue;
         std::array<P, kPoints> c;
         for (std::size_t i = 0; i < kPoints; ++i) c[i] = P(line[plane * kPoints + i]);
         double* to = out[f * kOut + plane];
@@ -139,6 +142,11 @@ class FringeTable {
     return end - column;
   }
 
+  /// Fields that change with derivative plane - 1 of S, those left out to which no square owes more than rounding of it.
+  FringeFields fields(std::size_t plane) const { return fields_[plane]; }
+  /// All squares that were asked for are there.
+  bool complete() const { return std::none_of(start_.begin(), start_.end(), [](int s) { return s == kGone; }); }
+
   /// Values at one place; false in a square that was not asked for.
   bool read(double column, double row, FringeScratch& scratch, FringePoint<double>& out) const {
     const double* line = line_at(static_cast<int>(std::floor(column)), row, scratch);
@@ -154,12 +162,26 @@ class FringeTable {
   }
 
  private:
+  static constexpr int kGone = -2;
   static constexpr std::size_t kFields = 4, kOut = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
 
   double place(int block, double x) const { return (block + 0.5 + 0.5 * x) * blocks_.block_px - 1; }
-  bool used(std::size_t plane) const {
-    return plane == 0 || std::any_of(derivatives_.begin(), derivatives_.end(), [&](std::size_t d) { return d + 1 == plane; }) ||
-           std::any_of(moves_.begin(), moves_.end(), [&](const FringeMove& m) { return m.derivative + 1 == plane; });
+  /// What of a derivative is not negligible: a phase counts as much as the amplitude that it turns.
+  FringeFields fields_of(const std::vector<double>& values, std::size_t squares, std::size_t plane) const {
+    std::array<double, kFields> value{}, change{};
+    for (std::size_t i = 0; i < squares; ++i)
+      for (std::size_t f = 0; f < kFields; ++f)
+        for (int k = 0; k < kRays; ++k) {
+          const double* at = values.data() + (i * kFields + f) * planes_ * kRays + k;
+          value[f] = std::max(value[f], std::abs(at[0]));
+          change[f] = std::max(change[f], std::abs(at[plane * kRays]));
+        }
+    change[1] *= value[0] + value[3];
+    const double all = change[0] + change[1] + change[2] + change[3];
+    FringeFields fields = 0;
+    for (std::size_t f = 0; f < kFields; ++f)
+      if (!(change[f] <= 1e-14 * all)) fields |= 1u << f;
+    return fields;
   }
   const double* line_at(int column, double row, FringeScratch& scratch) const {
     if (start_.empty()) return nullptr;
@@ -183,6 +205,7 @@ class FringeTable {
         double* line = scratch.lines.data() + (static_cast<std::size_t>(bx) * kFields + f) * kOut * kPoints;
         Line value, by_y;
         for (std::size_t plane = 0; plane < planes_; ++plane) {
+          if (plane > 0 && !(fields_[derivatives_[plane - 1] + 1] >> f & 1)) continue;
           const double* powers = c + plane * kRays;
           std::copy(powers + kRays - kPoints, powers + kRays, value.begin());
           by_y.fill(0);
@@ -209,7 +232,8 @@ class FringeTable {
   static const ChebyshevRule<kPoints>& rule() { return chebyshev_rule<kPoints>(); }
 
   FringeBlocks blocks_{0, 0, 1};
-  std::vector<int> start_;                ///< place among the coefficients, -1 = not asked for
+  std::vector<int> start_;                ///< place among the coefficients, -1 = not asked for, kGone = no longer smooth
+  std::array<FringeFields, kOut> fields_{};
   std::vector<std::size_t> derivatives_;  ///< of S, one a plane after the first
   std::vector<FringeMove> moves_;
   FringeCentre centre_{0, 0};

@@ -42,7 +42,7 @@ class Values {
   std::vector<int> active_;
 };
 
-/// Compiled for pictures that are read from a table over the radius and no others (transport/method.h).
+/// Compiled for pictures that are read from a table and no others (transport/method.h).
 template <class S>
 inline constexpr bool kForTablesOnly = (ScalarTraits<S>::derivatives > 4);
 
@@ -64,6 +64,8 @@ class PixelModel {
   virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
   /// The same of up to `count` columns of a row from `column` on, read from a table (FringeTable::run); 0 where there is none.
   virtual int fringe_run(int /*column*/, double /*row*/, int /*count*/, FringeScratch&, double* const* /*out*/) const { return 0; }
+  /// Which fields the derivative of number plane - 1 changes; plane 0 has all.
+  virtual FringeFields fringe_fields(int /*plane*/) const { return kAllFringeFields; }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
   /// Of the picture and every derivative.

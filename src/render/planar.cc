@@ -54,27 +54,32 @@ Mat2<S> planar_jones(const PlanarOptics<S>& o, const TransportMethod<S>& method,
   return r;
 }
 
-template <class S>
-FringePoint<S> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh& mesh, const Polarizers<S>& polarizers,
+template <class S, class R>
+FringePoint<R> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh& mesh, const R& k0, const Raise<S, R>& raise, const Polarizers<R>& polarizers,
                              const S& tx, const S& ty) {
-  using C = Complex<S>;
+  using C = Complex<R>;
+  const auto raised = [&raise](const Mat2<S>& m) {
+    const auto z = [&raise](const Complex<S>& x) { return C(raise(x.re), raise(x.im)); };
+    return Mat2<R>{z(m.a), z(m.b), z(m.c), z(m.d)};
+  };
   const S c = 1.0 / sqrt(tx * tx + ty * ty + 1.0);
   const Ray<S> ray{o.k0, o.n_host * c * tx, o.n_host * c * ty, o.continuity};
-  const ModalTransfer<S> m = coupling ? modal_transfer(*o.column, ray, mesh) : Diagonal<S>::modal(*o.column, ray, mesh);
-  const Mat2<S> in = inverse(m.first) * entry_factor(*o.column, ray, o.n_host);
-  const Mat2<S> out = exit_factor(*o.column, ray, o.n_host) * m.last;
+  const ModalTransfer<R> m = coupling ? modal_transfer(*o.column, ray, k0, raise, mesh) : diagonal_transfer(*o.column, ray, k0, raise, mesh);
+  const Mat2<R> in = inverse(m.first) * raised(entry_factor(*o.column, ray, o.n_host));
+  const Mat2<R> out = raised(exit_factor(*o.column, ray, o.n_host)) * m.last;
   // The polarizer's field rolled onto the plane of incidence (see planar_jones), the analyser seen from inside.
-  const S g = c * c / (c + 1.0) * (polarizers.px * tx + polarizers.py * ty);
-  const S px = polarizers.px - g * tx, py = polarizers.py - g * ty;
-  const S back = c / (c + 1.0) * (polarizers.ax * tx + polarizers.ay * ty);
-  const S ax = polarizers.ax + back * tx, ay = polarizers.ay + back * ty;
+  const R x = raise(tx), y = raise(ty), roll = raise(c * c / (c + 1.0)), unroll = raise(c / (c + 1.0));
+  const R g = roll * (polarizers.px * x + polarizers.py * y);
+  const R px = polarizers.px - g * x, py = polarizers.py - g * y;
+  const R back = unroll * (polarizers.ax * x + polarizers.ay * y);
+  const R ax = polarizers.ax + back * x, ay = polarizers.ay + back * y;
   C o_wave = (px * in.a + py * in.b) * (ax * out.a + ay * out.c);
   C e_wave = (px * in.c + py * in.d) * (ax * out.b + ay * out.d);
   if (o.column->absorbing) {
     o_wave = exp(m.log_o.re) * o_wave;
     e_wave = exp(m.log_e.re) * e_wave;
   }
-  const C both = S(2.0) * (conj(o_wave) * e_wave);
+  const C both = R(2.0) * (conj(o_wave) * e_wave);
   return {both.re, m.log_e.im - m.log_o.im, norm(o_wave) + norm(e_wave), both.im};
 }
 
@@ -114,7 +119,8 @@ class PlanarModel final : public PixelModel<S> {
         coupling_(plan.method == "modal"),
         has_fringes_(plan.fringe_means),
         blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
-        tabulated_blocks_(plan.fringe_blocks) {
+        tabulated_blocks_(plan.fringe_blocks),
+        left_to_rays_(std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) != plan.fringe_blocks.end()) {
     if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
       conoscopic_ = true;
       const S half = value.radians(*half_angle, 15);
@@ -149,10 +155,13 @@ class PlanarModel final : public PixelModel<S> {
     return intensity_of(planar_jones(optics(), method_, mesh_, tx, ty));
   }
   FringePoint<S> fringe(const P& column, const P& row) const override {
-    return planar_fringe(optics(), coupling_, mesh_, polarizers_, (S(column) - center_x_) * tan_per_px_, (center_y_ - S(row)) * tan_per_px_);
+    return planar_fringe(optics(), coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, (S(column) - center_x_) * tan_per_px_, (center_y_ - S(row)) * tan_per_px_);
   }
   int fringe_run(int column, double row, int count, FringeScratch& scratch, double* const* out) const override {
     return table_.run(column, row, count, !in_phase(), scratch, out);
+  }
+  FringeFields fringe_fields(int plane) const override {
+    return left_to_rays_ || tabulated_blocks_.empty() || !table_.complete() ? kAllFringeFields : table_.fields(static_cast<std::size_t>(plane));
   }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
   Symmetry symmetry() const override { return symmetry_; }
@@ -175,16 +184,10 @@ class PlanarModel final : public PixelModel<S> {
           changing.push_back(index);
         }
       }
-    constexpr int kMost = ScalarTraits<S>::derivatives;
-    const std::size_t n = changing.size();
-    if constexpr (kMost > 0) {
-      if (n == 0) return fill_table<Pack>(changing, places, moves, threads);
-      if constexpr (kMost > 1)
-        if (n == 1) return fill_table<Dual1>(changing, places, moves, threads);
-      if constexpr (kMost > 2)
-        if (n == 2) return fill_table<Dual2>(changing, places, moves, threads);
-    }
-    fill_table<S>(changing, places, moves, threads);
+    with_scalar_for<S>(changing.size(), [&]<class R>(Type<R>) {
+      const std::vector<int> inside = known_inside<R>(changing);
+      with_scalar_for<R>(inside.size(), [&]<class T>(Type<T>) { fill_table<R, T>(changing, inside, places, moves, threads); });
+    });
   }
 
  private:
@@ -192,22 +195,61 @@ class PlanarModel final : public PixelModel<S> {
   const PlanarOptics<S>& optics() const {
     std::call_once(first_ray_, [&] {
       planar_jones(optics_, method_, mesh_, S(0.0), S(0.0));
-      if (has_fringes_) planar_fringe(optics_, coupling_, mesh_, polarizers_, S(0.0), S(0.0));
+      if (has_fringes_) planar_fringe(optics_, coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, S(0.0), S(0.0));
       optics_.column->freeze();
     });
     return optics_;
   }
-  /// With rays that carry the derivatives by `changing` and no others.
+  template <class T>
+  struct Type {};
+  /// f(Type<T>()) with the scalar of the fewest derivatives, at least n and at most those of Most.
+  template <class Most, class F>
+  static void with_scalar_for(std::size_t n, const F& f) {
+    constexpr int kMost = ScalarTraits<Most>::derivatives;
+    if constexpr (kMost > 0) {
+      if (n == 0) return f(Type<Pack>());
+      if constexpr (kMost > 1)
+        if (n == 1) return f(Type<Dual1>());
+      if constexpr (kMost > 2)
+        if (n == 2) return f(Type<Dual2>());
+      if constexpr (kMost > 4)
+        if (n <= 4) return f(Type<Dual4>());
+    }
+    f(Type<Most>());
+  }
+  /// Which of `changing` medium or host know; others, the wavelength where nothing is dispersive, the polarizers, turn what they have done.
   template <class R>
-  void fill_table(const std::vector<int>& changing, const std::vector<std::size_t>& places, const std::vector<FringeMove>& moves, int threads) {
+  std::vector<int> known_inside(const std::vector<int>& changing) const {
+    std::vector<int> inside;
+    if constexpr (ScalarTraits<R>::derivatives > 0) {
+      const PlanarOptics<R> optics = planar_optics(scene_, Values<R>(value_.theta(), changing));
+      for (std::size_t j = 0; j < changing.size(); ++j) {
+        const auto still = [j](const R& x) { return lane(x.d[j], 0) == 0; };
+        const bool outside = still(optics.n_host) && axes_all(*optics.column, mesh_, [&](const OpticalPoint<R>& p) {
+          return still(p.axis.x) && still(p.axis.y) && still(p.axis.z) && still(p.ordinary) && still(p.extraordinary) && still(p.ordinary_im) && still(p.extraordinary_im) &&
+                 still(p.depth_slope_um);
+        });
+        if (!outside) inside.push_back(changing[j]);
+      }
+    }
+    return inside;
+  }
+  /// With rays that carry the derivatives by `changing` and no others, in T those by `inside`.
+  template <class R, class T>
+  void fill_table(const std::vector<int>& changing, const std::vector<int>& inside, const std::vector<std::size_t>& places, const std::vector<FringeMove>& moves, int threads) {
     const Values<R> value(value_.theta(), changing);
-    const PlanarOptics<R> optics = planar_optics(scene_, value);
+    const Values<T> value_inside(value_.theta(), std::is_same_v<R, T> ? changing : inside);
+    Raise<T, R> raise;
+    if constexpr (!std::is_same_v<R, T>)
+      for (std::size_t j = 0; j < inside.size(); ++j) raise.to[j] = static_cast<std::size_t>(std::find(changing.begin(), changing.end(), inside[j]) - changing.begin());
+    const PlanarOptics<T> optics = planar_optics(scene_, value_inside);
     const Polarizers<R> pair = polarizers(scene_, value);
-    planar_fringe(optics, coupling_, mesh_, pair, R(0.0), R(0.0));
+    const R k0 = wavenumber_per_um(scene_, value);
+    planar_fringe(optics, coupling_, mesh_, k0, raise, pair, T(0.0), T(0.0));
     optics.column->freeze();
     const FringeCentre centre{lane(plain(center_x_), 0), lane(plain(center_y_), 0)};
     table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places, moves, centre, [&](const P& column, const P& row) {
-      return planar_fringe(optics, coupling_, mesh_, pair, R((column - plain(center_x_)) * plain(tan_per_px_)), R((plain(center_y_) - row) * plain(tan_per_px_)));
+      return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, T((column - plain(center_x_)) * plain(tan_per_px_)), T((plain(center_y_) - row) * plain(tan_per_px_)));
     });
   }
   S intensity_of(const Mat2<S>& sample) const {
@@ -227,6 +269,7 @@ class PlanarModel final : public PixelModel<S> {
   Symmetry symmetry_ = Symmetry::none;
   FringeBlocks blocks_;
   std::vector<std::uint8_t> tabulated_blocks_;
+  bool left_to_rays_;  ///< some of the picture
   FringeTable<S> table_;
   S tan_per_px_, center_x_, center_y_, constant_;
 };
@@ -239,9 +282,11 @@ std::unique_ptr<PixelModel<S>> make_planar_model(const Scene& scene, const Rende
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                      \
   template std::unique_ptr<PixelModel<S>> make_planar_model<S>(const Scene&, const RenderPlan&, const Values<S>&);  \
-  template FringePoint<S> planar_fringe<S>(const PlanarOptics<S>&, bool, const Mesh&, const Polarizers<S>&, const S&, const S&); \
   template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&);                                        \
   template Mat2<S> planar_jones<S>(const PlanarOptics<S>&, const TransportMethod<S>&, const Mesh&, const S&, const S&);
-BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
+#define BIREFIT_INSTANTIATE_RAISED(S, R) \
+  template FringePoint<R> planar_fringe<S, R>(const PlanarOptics<S>&, bool, const Mesh&, const R&, const Raise<S, R>&, const Polarizers<R>&, const S&, const S&);
+BIREFIT_FOR_EACH_RAISE(BIREFIT_INSTANTIATE_RAISED)
 
 }  // namespace birefit

@@ -27,9 +27,10 @@ template <class S>
 Mat2<S> planar_jones(const PlanarOptics<S>& optics, const TransportMethod<S>& method, const Mesh& mesh, const S& tx,
                      const S& ty);
 
-/// The same between polarizers, for the methods `diagonal` and (with coupling) `modal`.
-template <class S>
-FringePoint<S> planar_fringe(const PlanarOptics<S>& optics, bool coupling, const Mesh& mesh, const Polarizers<S>& polarizers,
+/// The same between polarizers, for the methods `diagonal` and (with coupling) `modal`. Derivatives that the wavenumber k0 (per um) and the
+/// polarizers know and neither medium nor direction cost least in R alone; `raise` brings those of S to their places (optics.k0 is not read).
+template <class S, class R>
+FringePoint<R> planar_fringe(const PlanarOptics<S>& optics, bool coupling, const Mesh& mesh, const R& k0, const Raise<S, R>& raise, const Polarizers<R>& polarizers,
                              const S& tx, const S& ty);
 
 }  // namespace birefit

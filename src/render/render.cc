@@ -23,7 +23,8 @@ std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const Render
   if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
   if (std::holds_alternative<Droplet>(scene.sample)) return make_droplet_model(scene, plan, value);
   if constexpr (kForTablesOnly<S>) {
-    throw std::logic_error("no table over the radius serves this scene");
+    if (plan.fringe_means) return make_planar_model(scene, plan, value);
+    throw std::logic_error("no table serves this scene");
   } else {
     if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
     if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
@@ -220,6 +221,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
   using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
   model->tabulate(PixelModel<S>::Wanted::picture, threads);
   const bool in_phase = model->in_phase();
+  std::array<FringeFields, static_cast<std::size_t>(kPlanes)> fields_of{};
+  for (int p = 0; p < kPlanes; ++p) fields_of[static_cast<std::size_t>(p)] = model->fringe_fields(p);
   const SampleRings rings(plan);
   parallel_for(planes, threads, [&](int p) {
     Image& image = *images[static_cast<std::size_t>(p)];
@@ -273,10 +276,11 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
           using P = PlainOf<S>;
           const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_lanes<P>(band.row(field * kPlanes + plane, r + j) + c0 + i); };
           const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, images[static_cast<std::size_t>(plane)]->row(top + r) + c0, 0, std::min(kStep, w - c0)); };
+          const auto fields = [&](int plane) BIREFIT_INLINE_LAMBDA { return fields_of[static_cast<std::size_t>(plane)]; };
           if (in_phase)
-            fringe_means<false, P>(planes, load, put);
+            fringe_means<false, P>(planes, load, fields, put);
           else
-            fringe_means<true, P>(planes, load, put);
+            fringe_means<true, P>(planes, load, fields, put);
         }
       } else {
         for (int p = 0; p < planes; ++p) {
@@ -368,7 +372,12 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   });
 }
 
+/// Of points one by one, and of a picture: eight where they are read from a table.
 std::size_t derivatives_at_once(const RenderPlan& plan) { return plan.radial_panels > 0 ? 8 : 4; }
+std::size_t derivatives_of_picture(const RenderPlan& plan) {
+  const bool all_from_squares = !plan.fringe_blocks.empty() && std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) == plan.fringe_blocks.end();
+  return all_from_squares ? 8 : derivatives_at_once(plan);
+}
 
 /// Calls body<S>(chunk, first) for the active parameters in chunks of at most `most` (4 or 8) derivatives a pass: every pass
 /// computes the values, too.
@@ -401,7 +410,7 @@ void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, cons
     render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
     return;
   }
-  in_chunks(active, derivatives_at_once(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
+  in_chunks(active, derivatives_of_picture(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
     std::vector<Image*> images{&into.intensity};
     for (std::size_t j = 0; j < chunk.size(); ++j) images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
     render_planes<S>(scene, plan, theta, chunk, threads, images);

@@ -166,7 +166,7 @@ struct RayBench {
 ChartScene describe(const RayBench& bench) {
   ChartScene scene{bench.spec.name, bench.spec.what, bench.agreement, 0, 0, 0};
   const Ray<double> ray = ray_of<double>(bench.spec, Continuity::e_and_h);
-  const ModalTransfer<double> modes = Diagonal<double>::modal(*bench.column, ray, uniform_mesh(64, bench.column->breaks));
+  const ModalTransfer<double> modes = diagonal_transfer(*bench.column, ray, uniform_mesh(64, bench.column->breaks));
   scene.phase_rad = std::abs(modes.log_e.im - modes.log_o.im);
   const Mesh mesh = uniform_mesh(4096, bench.column->breaks);
   const M everything = Berreman<double>().transmission(*bench.column, ray, mesh, bench.spec.host_index);

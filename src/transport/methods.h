@@ -13,8 +13,6 @@ namespace birefit {
 template <class S>
 class Diagonal final : public TransportMethod<S> {
  public:
-  /// transfer() in its parts.
-  static ModalTransfer<S> modal(const Column<S>&, const Ray<S>&, const Mesh&);
   const MethodInfo& info() const override;
   Mat2<S> transfer(const Column<S>&, const Ray<S>&, const Mesh&) const override;
   Su2<S> retarder(const Column<S>&, const Ray<S>&, const Mesh&) const override;
@@ -37,9 +35,21 @@ class Modal final : public TransportMethod<S> {
   int passes_;
 };
 /// Modal::transfer() in its parts, `passes` times through the equation for the ratios; 0 = no coupling, one Gauss node a
-/// step as in Diagonal.
+/// step as in Diagonal. R has derivatives that the medium and the direction do not know, the wavenumber (per um) does; `raise` brings those of S
+/// to their places. The ray's own wavenumber is not read.
+template <class S, class R>
+ModalTransfer<R> modal_transfer(const Column<S>&, const Ray<S>&, const R& k0_per_um, const Raise<S, R>& raise, const Mesh&, int passes = Modal<S>::kPasses);
 template <class S>
-ModalTransfer<S> modal_transfer(const Column<S>&, const Ray<S>&, const Mesh&, int passes = Modal<S>::kPasses);
+ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, int passes = Modal<S>::kPasses) {
+  return modal_transfer(column, ray, ray.k0_per_um, Raise<S, S>(), mesh, passes);
+}
+/// The same of Diagonal::transfer().
+template <class S, class R>
+ModalTransfer<R> diagonal_transfer(const Column<S>&, const Ray<S>&, const R& k0_per_um, const Raise<S, R>& raise, const Mesh&);
+template <class S>
+ModalTransfer<S> diagonal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
+  return diagonal_transfer(column, ray, ray.k0_per_um, Raise<S, S>(), mesh);
+}
 template <class S>
 Mat2<S> together(const ModalTransfer<S>&);
 

@@ -99,11 +99,17 @@ inline Mat2<Series<double>> derivative_of(const Mat2<Series<double>>& m) {
 inline const OpticalPoint<Series<double>>& value_of(const OpticalPoint<Series<double>>& p) { return p; }
 inline const Complex<Series<double>>& value_of(const Complex<Series<double>>& z) { return z; }
 
+/// What makes a ModalGenerator but for the wavenumber, which nothing else here knows.
+template <class T>
+struct ModalRates {
+  Complex<T> q_o, q_e;
+  Mat2<T> turning;  ///< of the modes' fields, in themselves
+};
 /// Of modes scaled to E.E = 1. D = Slope<S> (result in S) or Series<double>; derivatives of p are by depth in um, or by
-/// any coordinate in which depth grows by `um_per_unit`; the series of the result are exact up to one order less than
+/// any coordinate; the series of the result are exact up to one order less than
 /// p's. E and H continuous adds (Y - Y-)^-1 dY/dz of one_way.h to the coupling, which the source paper has not.
 template <class D, class S>
-auto modal_generator(const OpticalPoint<D>& p, const Ray<S>& ray, const S& um_per_unit = S(1.0)) {
+auto modal_rates(const OpticalPoint<D>& p, const Ray<S>& ray) {
   const Modes<D> m = unit_modes(p, D(ray.kx), D(ray.ky));
   const auto fields = value_of(m.fields);
   auto change = derivative_of(m.fields);
@@ -115,10 +121,20 @@ auto modal_generator(const OpticalPoint<D>& p, const Ray<S>& ray, const S& um_pe
     const Mat2<T> backward = one_way(q, T(ray.kx), T(ray.ky), -1.0).admittance;
     change = change + inverse(value_of(admittance) - backward) * derivative_of(admittance) * fields;
   }
-  const Mat2<T> x = inverse(fields) * change;
-  const C ik(T(0.0), T(ray.k0_per_um * um_per_unit));
-  const C o = ik * value_of(m.q_o) - x.a, e = ik * value_of(m.q_e) - x.d;
-  return ModalGenerator<T>{T(0.5) * (o + e), -x.b, -x.c, T(0.5) * (o - e)};
+  return ModalRates<T>{value_of(m.q_o), value_of(m.q_e), inverse(fields) * change};
+}
+/// k: the wavenumber per unit of the coordinate by which the rates are.
+template <class T>
+ModalGenerator<T> modal_generator(const ModalRates<T>& rates, const T& k) {
+  const Complex<T> ik(T(0.0), k), o = ik * rates.q_o - rates.turning.a, e = ik * rates.q_e - rates.turning.d;
+  return {T(0.5) * (o + e), -rates.turning.b, -rates.turning.c, T(0.5) * (o - e)};
+}
+/// Depth grows by `um_per_unit` in the coordinate that p's derivatives are by.
+template <class D, class S>
+auto modal_generator(const OpticalPoint<D>& p, const Ray<S>& ray, const S& um_per_unit = S(1.0)) {
+  const auto rates = modal_rates(p, ray);
+  using T = std::remove_cvref_t<decltype(rates.q_o.re)>;
+  return modal_generator(rates, T(ray.k0_per_um * um_per_unit));
 }
 
 /// p with its derivatives by u turned into derivatives by depth.

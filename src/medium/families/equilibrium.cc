@@ -554,6 +554,7 @@ void director_tangents(const CellForces<Dual<double, N>>& forces, const Director
 }
 template void director_tangents<1>(const CellForces<Dual<double, 1>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 1>>&, std::vector<std::array<double, 1>>&);
 template void director_tangents<2>(const CellForces<Dual<double, 2>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 2>>&, std::vector<std::array<double, 2>>&);
+template void director_tangents<8>(const CellForces<Dual<double, 8>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 8>>&, std::vector<std::array<double, 8>>&);
 template void director_tangents<4>(const CellForces<Dual<double, 4>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 4>>&, std::vector<std::array<double, 4>>&);
 
 }  // namespace birefit

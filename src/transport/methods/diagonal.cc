@@ -43,9 +43,9 @@ const MethodInfo& Diagonal<S>::info() const {
 
 // With E and H continuous, flux-normalised modes of a lossless medium couple antisymmetrically, with zero diagonal: nothing
 // but the two phases is left between the faces.
-template <class S>
-ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
-  if (column.absorbing || ray.continuity != Continuity::e_and_h) return modal_transfer(column, ray, mesh, 0);
+template <class S, class R>
+ModalTransfer<R> diagonal_transfer(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise, const Mesh& mesh) {
+  if (column.absorbing || ray.continuity != Continuity::e_and_h) return modal_transfer(column, ray, k0, raise, mesh, 0);
   const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
   thread_local std::vector<OpticalPoint<S>> points;
@@ -62,13 +62,16 @@ ModalTransfer<S> Diagonal<S>::modal(const Column<S>& column, const Ray<S>& ray, 
   const double ends[2] = {0.0, 1.0};
   OpticalPoint<S> face[2];
   column.sample(ends, face);
-  return {flux_modes(face[0], ray.kx, ray.ky), flux_modes(face[1], ray.kx, ray.ky),
-          Complex<S>(S(0.0), ray.k0_per_um * phase_o), Complex<S>(S(0.0), ray.k0_per_um * phase_e)};
+  const auto modes_at = [&](const OpticalPoint<S>& p) -> Mat2<R> {
+    const Mat2<S> m = flux_modes(p, ray.kx, ray.ky);
+    return {raise(m.a.re), raise(m.b.re), raise(m.c.re), raise(m.d.re)};
+  };
+  return {modes_at(face[0]), modes_at(face[1]), Complex<R>(R(0.0), k0 * raise(phase_o)), Complex<R>(R(0.0), k0 * raise(phase_e))};
 }
 
 template <class S>
 Mat2<S> Diagonal<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  return checked_transfer(kInfo, together(modal(column, ray, mesh)));
+  return checked_transfer(kInfo, together(diagonal_transfer(column, ray, mesh)));
 }
 
 template <class S>
@@ -86,5 +89,8 @@ Su2<S> Diagonal<S>::retarder(const Column<S>& column, const Ray<S>& ray, const M
 
 #define BIREFIT_INSTANTIATE(S) template class Diagonal<S>;
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
+#define BIREFIT_INSTANTIATE_RAISED(S, R) \
+  template ModalTransfer<R> diagonal_transfer<S, R>(const Column<S>&, const Ray<S>&, const R&, const Raise<S, R>&, const Mesh&);
+BIREFIT_FOR_EACH_RAISE(BIREFIT_INSTANTIATE_RAISED)
 
 }  // namespace birefit

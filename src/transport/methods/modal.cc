@@ -26,32 +26,43 @@ const MethodInfo& Modal<S>::info() const {
   return kInfo;
 }
 
+template <class S, class R>
+Complex<R> raised(const Raise<S, R>& raise, const Complex<S>& z) { return {raise(z.re), raise(z.im)}; }
+template <class S, class R>
+Mat2<R> raised(const Raise<S, R>& raise, const Mat2<S>& m) { return {raised(raise, m.a), raised(raise, m.b), raised(raise, m.c), raised(raise, m.d)}; }
+
+template <class S, class R>
+ModalGenerator<R> generator_at(const OpticalPoint<Slope<S>>& p, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise) {
+  const ModalRates<S> rates = modal_rates(p, ray);
+  return modal_generator<R>({raised(raise, rates.q_o), raised(raise, rates.q_e), raised(raise, rates.turning)}, k0 * raise(p.depth_slope_um.value));
+}
+
 /// The phases alone.
-template <class S>
-ModalTransfer<S> uncoupled(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
+template <class S, class R>
+ModalTransfer<R> uncoupled(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise, const Mesh& mesh) {
   const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   thread_local std::vector<OpticalPoint<Slope<S>>> points;
   points.resize(nodes.u.size());
   column.sample_with_slope(nodes.u, points.data());
-  ModalTransfer<S> result;
+  ModalTransfer<R> result;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const ModalGenerator<S> g = modal_generator(points[i], ray, points[i].depth_slope_um.value);
-    const S w(nodes.weight[i]);
+    const ModalGenerator<R> g = generator_at(points[i], ray, k0, raise);
+    const R w(nodes.weight[i]);
     result.log_o = result.log_o + w * (g.a + g.b3);
     result.log_e = result.log_e + w * (g.a - g.b3);
   }
   const double faces[2] = {0.0, 1.0};
   OpticalPoint<S> face[2];
   column.sample(faces, face);
-  result.first = unit_modes(face[0], ray.kx, ray.ky).fields;
-  result.last = unit_modes(face[1], ray.kx, ray.ky).fields;
+  result.first = raised(raise, unit_modes(face[0], ray.kx, ray.ky).fields);
+  result.last = raised(raise, unit_modes(face[1], ray.kx, ray.ky).fields);
   return result;
 }
 
-template <class S>
-ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, int passes) {
-  using C = Complex<S>;
-  if (passes == 0) return uncoupled(column, ray, mesh);
+template <class S, class R>
+ModalTransfer<R> modal_transfer(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise, const Mesh& mesh, int passes) {
+  using C = Complex<R>;
+  if (passes == 0) return uncoupled(column, ray, k0, raise, mesh);
   thread_local Mesh last_mesh;
   thread_local std::vector<double> u, weight;
   if (last_mesh != mesh) {
@@ -62,16 +73,15 @@ ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, cons
   thread_local std::vector<OpticalPoint<Slope<S>>> points;
   points.resize(u.size());
   column.sample_with_slope(u, points.data());
-  ModalTransfer<S> result;
+  ModalTransfer<R> result;
   C r_start, s_start, r_end, s_end;
   const std::size_t steps = mesh.size() - 1;
   for (std::size_t step = 0; step < steps; ++step) {
-    ModalGenerator<S> g[kNodes];
+    ModalGenerator<R> g[kNodes];
     C r[kNodes], s[kNodes], over[kNodes];
     for (std::size_t i = 0; i < kNodes; ++i) {
-      const OpticalPoint<Slope<S>>& p = points[step * kNodes + i];
-      g[i] = modal_generator(p, ray, p.depth_slope_um.value);
-      over[i] = C(S(0.5)) / g[i].b3;
+      g[i] = generator_at(points[step * kNodes + i], ray, k0, raise);
+      over[i] = C(R(0.5)) / g[i].b3;
     }
     const double per_u = 2 / (mesh[step + 1] - mesh[step]);
     for (int pass = 0; pass < passes; ++pass) {
@@ -89,7 +99,7 @@ ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, cons
       }
     }
     for (std::size_t i = 0; i < kNodes; ++i) {
-      const S w(weight[step * kNodes + i]);
+      const R w(weight[step * kNodes + i]);
       result.log_o = result.log_o + w * (g[i].a + g[i].b3 + g[i].b1 * r[i]);
       result.log_e = result.log_e + w * (g[i].a - g[i].b3 + g[i].b2 * s[i]);
     }
@@ -104,9 +114,9 @@ ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, cons
   const double faces[2] = {0.0, 1.0};
   OpticalPoint<S> face[2];
   column.sample(faces, face);
-  const C one(S(1.0));
-  result.first = unit_modes(face[0], ray.kx, ray.ky).fields * Mat2<S>{one, s_start, r_start, one};
-  result.last = unit_modes(face[1], ray.kx, ray.ky).fields * Mat2<S>{one, s_end, r_end, one};
+  const C one(R(1.0));
+  result.first = raised(raise, unit_modes(face[0], ray.kx, ray.ky).fields) * Mat2<R>{one, s_start, r_start, one};
+  result.last = raised(raise, unit_modes(face[1], ray.kx, ray.ky).fields) * Mat2<R>{one, s_end, r_end, one};
   return result;
 }
 
@@ -128,8 +138,10 @@ Su2<S> Modal<S>::retarder(const Column<S>&, const Ray<S>&, const Mesh&) const {
 
 #define BIREFIT_INSTANTIATE(S)                                                                              \
   template class Modal<S>;                                                                                  \
-  template ModalTransfer<S> modal_transfer<S>(const Column<S>&, const Ray<S>&, const Mesh&, int);           \
   template Mat2<S> together<S>(const ModalTransfer<S>&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
+#define BIREFIT_INSTANTIATE_RAISED(S, R) \
+  template ModalTransfer<R> modal_transfer<S, R>(const Column<S>&, const Ray<S>&, const R&, const Raise<S, R>&, const Mesh&, int);
+BIREFIT_FOR_EACH_RAISE(BIREFIT_INSTANTIATE_RAISED)
 
 }  // namespace birefit
