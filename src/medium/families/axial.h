@@ -12,6 +12,13 @@
 
 namespace birefit {
 
+/// The director's angle at a place in the upper half with what bends a ray there and what moves with the field's N directions of derivatives.
+template <int N>
+struct AxialBend {
+  double theta, by_rho, by_z, by_rho2, by_rho_z, by_z2;
+  std::array<double, N> by, by_rho_and, by_z_and;  ///< theta and its slopes by direction k, at a fixed place
+};
+
 /// The equilibrium at scalar e and ring (radii; 0: hedgehog), read at any place. Shared by all rays of an image.
 template <class S>
 class AxialField {
@@ -55,6 +62,73 @@ class AxialField {
       sum = sum + rb[i] * inner;
     }
     return sum;
+  }
+
+  /// The same with first and second slopes at once, term by term: a tenth of the work of duals of duals. S = double or Dual<double, N>; r > 0.
+  AxialBend<ScalarTraits<S>::derivatives> bend(double rho, double z) const {
+    constexpr std::size_t n = kPlanes - 1;
+    const double r = std::sqrt(rho * rho + z * z), inverse_r = 1 / r, polar = std::atan2(rho, z), s = rho * inverse_r, c = z * inverse_r;
+    const Along along_r = along(r, r_edges_, false), along_polar = along(polar, polar_edges_, true);
+    // Sums over the polynomials and their slopes in the element's own coordinates.
+    const int nodes = equilibrium_->grid.nodes();
+    const double* values = values_.data() + static_cast<std::ptrdiff_t>(along_r.first) * nodes + along_polar.first;
+    const auto sum = [&](std::size_t plane, const double* of_r, const double* of_polar) {
+      const double* from = values + plane * stride_;
+      double total = 0;
+      for (int i = 0; i < kPoints; ++i) {
+        double inner = 0;
+        for (int j = 0; j < kPoints; ++j) inner += of_polar[j] * from[i * nodes + j];
+        total += of_r[i] * inner;
+      }
+      return total;
+    };
+    const double *r0 = along_r.value, *r1 = along_r.slope, *p0 = along_polar.value, *p1 = along_polar.slope, a = along_r.scale, b = along_polar.scale;
+    double f = sum(0, r0, p0), fr = a * sum(0, r1, p0), fp = b * sum(0, r0, p1);
+    double frr = 0, frp = 0, fpp = 0;
+    AxialBend<static_cast<int>(n)> out;
+    std::array<double, n> by_r, by_p;
+    if constexpr (n > 0) {
+      frr = a * a * sum(0, along_r.bend, p0), frp = a * b * sum(0, r1, p1), fpp = b * b * sum(0, r0, along_polar.bend);
+      for (std::size_t k = 0; k < n; ++k) {
+        // The element moves with the parameters.
+        const double mr = along_r.moves[k], mp = along_polar.moves[k];
+        out.by[k] = sum(k + 1, r0, p0) + fr * mr + fp * mp;
+        by_r[k] = a * sum(k + 1, r1, p0) + frr * mr + frp * mp + fr * along_r.stretches[k];
+        by_p[k] = b * sum(k + 1, r0, p1) + frp * mr + fpp * mp + fp * along_polar.stretches[k];
+      }
+    }
+    // The hedgehog's part is the polar angle itself; a ring's comes below.
+    if (!has_ring_) f += polar, fp += 1;
+    out.theta = f;
+    out.by_rho = fr * s + fp * c * inverse_r;
+    out.by_z = fr * c - fp * s * inverse_r;
+    if constexpr (n > 0) {
+      const double q = inverse_r * inverse_r, sc = s * c, both = (c * c - s * s) * inverse_r;
+      out.by_rho2 = frr * s * s + 2 * frp * sc * inverse_r + fpp * c * c * q + fr * c * c * inverse_r - 2 * fp * sc * q;
+      out.by_rho_z = frr * sc + frp * both - fpp * sc * q - fr * sc * inverse_r - fp * both * inverse_r;
+      out.by_z2 = frr * c * c - 2 * frp * sc * inverse_r + fpp * s * s * q + fr * s * s * inverse_r + 2 * fp * sc * q;
+      for (std::size_t k = 0; k < n; ++k) {
+        out.by_rho_and[k] = by_r[k] * s + by_p[k] * c * inverse_r;
+        out.by_z_and[k] = by_r[k] * c - by_p[k] * s * inverse_r;
+      }
+    }
+    if (has_ring_) {
+      using Inner = std::conditional_t<n == 0, double, Dual<double, 3>>;  // rho, z, ring
+      using Outer = Dual<Inner, 2>;
+      Inner at[3] = {Inner(rho), Inner(z), Inner(lane(plain(ring_), 0))};
+      if constexpr (n > 0)
+        for (std::size_t k = 0; k < 3; ++k) at[k].d[k] = 1;
+      Outer x(at[0]), y(at[1]);
+      x.d[0] = y.d[1] = Inner(1.0);
+      const Outer angle = axial_boundary_angle(x, y, Outer(at[2]));
+      out.theta += plain(angle), out.by_rho += plain(angle.d[0]), out.by_z += plain(angle.d[1]);
+      if constexpr (n > 0) {
+        out.by_rho2 += angle.d[0].d[0], out.by_rho_z += angle.d[0].d[1], out.by_z2 += angle.d[1].d[1];
+        for (std::size_t k = 0; k < n; ++k)
+          out.by[k] += angle.value.d[2] * ring_.d[k], out.by_rho_and[k] += angle.d[0].d[2] * ring_.d[k], out.by_z_and[k] += angle.d[1].d[2] * ring_.d[k];
+      }
+    }
+    return out;
   }
 
  private:
@@ -105,6 +179,52 @@ class AxialField {
       out[i] = scale * (below[i] * above[i]);
     }
     return first;
+  }
+
+  /// The element's polynomials at a place along one coordinate.
+  struct Along {
+    int first;
+    double scale;                                                ///< of the element's coordinate
+    double value[kPoints], slope[kPoints], bend[kPoints];        ///< by that coordinate
+    std::array<double, kPlanes - 1> moves, stretches;            ///< at a fixed place: of the coordinate, in units of the place, and of log(scale)
+  };
+  Along along(double place, const std::vector<S>& edges, bool falling) const {
+    std::size_t k = 1;
+    while (k + 1 < edges.size() && (falling ? place < plain(edges[k]) : place > plain(edges[k]))) ++k;
+    const S &from = edges[k - 1], &to = edges[k];
+    const double width = plain(to) - plain(from), x = 2 * (place - plain(from)) / width - 1;
+    Along a;
+    a.first = static_cast<int>(k - 1) * (kPoints - 1);
+    a.scale = 2 / width;
+    if constexpr (kPlanes > 1)
+      for (std::size_t d = 0; d + 1 < kPlanes; ++d) {
+        const double wider = (to.d[d] - from.d[d]) / width;
+        a.moves[d] = -(from.d[d] + (place - plain(from)) * wider);
+        a.stretches[d] = -wider;
+      }
+    // Newton's form, without division by what may vanish: value and slopes of the product of all (x - x_m) but one.
+    static const LobattoRule& rule = lobatto_rule(kPoints - 1);
+    static const std::array<double, kPoints> scales = [] {
+      std::array<double, kPoints> result;
+      for (std::size_t i = 0; i < kPoints; ++i) {
+        result[i] = 1;
+        for (std::size_t m = 0; m < kPoints; ++m)
+          if (m != i) result[i] /= rule.x[i] - rule.x[m];
+      }
+      return result;
+    }();
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      double p = scales[i], p1 = 0, p2 = 0;
+      for (std::size_t m = 0; m < kPoints; ++m) {
+        if (m == i) continue;
+        const double f = x - rule.x[m];
+        p2 = p2 * f + 2 * p1;
+        p1 = p1 * f + p;
+        p *= f;
+      }
+      a.value[i] = p, a.slope[i] = p1, a.bend[i] = p2;
+    }
+    return a;
   }
 
   S e_, ring_;
