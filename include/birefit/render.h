@@ -71,6 +71,9 @@ Image image_by_march(const Scene& scene, const Theta& theta, int threads = 0);
 /// The grids of `before` no longer hold what `now` was made for (wave optics, parts of a disc).
 bool outgrown(const RenderPlan& now, const RenderPlan& before);
 
+/// Rays::eikonal knows the scene: radial droplets without twist, shells whose core is in the middle, droplets in a field along the view.
+bool has_curved_rays(const Scene& scene);
+
 /// What Ceiling::wave would cost where it is not yet chosen.
 struct WaveChoice {
   double seconds_an_image = 0;  ///< without derivatives, one thread; infinite where wave optics cannot do the scene

@@ -152,11 +152,11 @@ struct BipolarDirector {
 };
 
 /// Liquid crystal between a sphere and an isotropic core, normal anchoring at both: radial where the core is in the middle, the
-/// normals of nested spheres otherwise. Light is not refracted at the core.
+/// normals of nested spheres otherwise. Straight rays are not refracted at the core, curved ones and waves are.
 struct ShellDirector {
   ParameterRef wall_um;                       ///< difference of the two radii
   std::array<ParameterRef, 3> offset_um = {}; ///< of the core's centre; all or none. The sign of z is not observable
-  ParameterRef core_index;                    ///< not given: the surround's; only judges what refraction at the core would change
+  ParameterRef core_index;                    ///< not given: the surround's. Of straight rays it only judges what refraction at the core would change
 };
 
 // ---- samples --------------------------------------------------------------------------------------------------------
@@ -294,8 +294,8 @@ enum class Ceiling {
   wave,     ///< wave optics: radial droplets and concentric shells exactly, other spheres and sampled fields without reflections. Needs Microscope::objective_na
 };
 
-/// How light runs through a droplet: both modes on the refracted straight chord, or each on its own ray (geometrical optics of
-/// the radial droplet in closed form). What follows from the choice: docs/methods.md.
+/// How light runs through a droplet: both modes on the refracted straight chord, or each on its own ray (geometrical optics; has_curved_rays in
+/// render.h). What follows from the choice: docs/methods.md.
 enum class Rays { straight, eikonal };
 
 struct Scene {

@@ -1145,9 +1145,7 @@ Fit::Shift Fit::largest_shift(const Theta& there) const {
 /// with curved rays from where this one ended says by how much.
 void Fit::foretell_curved_rays() {
   const auto has_curved = [](const Micrograph& m) {
-    const auto* droplet = std::get_if<Droplet>(&m.scene.sample);
-    const auto* radial = droplet ? std::get_if<RadialDirector>(&droplet->director) : nullptr;
-    return radial && !radial->twist_deg && m.scene.rays == Rays::straight;
+    return has_curved_rays(m.scene) && m.scene.rays == Rays::straight;
   };
   if (stopped_ || unknowns_.searched.empty() || !std::all_of(job_.micrographs.begin(), job_.micrographs.end(), has_curved)) return;
   FitJob curved = job_;
@@ -1386,6 +1384,20 @@ FitResult best_branch(const FitJob& job, std::vector<FitResult> results) {
   return result;
 }
 
+/// `by_straight`, what `done` came to, or where the choice is open and curved rays matter, the fit with those.
+FitResult with_chosen_rays(const FitJob& job, const Fit& done, FitResult by_straight) {
+  if (!job.options.choose_rays || !(done.change_by_curved_rays() >= 1)) return by_straight;
+  FitJob curved = job;
+  curved.options.choose_rays = false;
+  for (Micrograph& m : curved.micrographs) m.scene.rays = Rays::eikonal;
+  FitResult better = fit(curved);
+  for (MicrographResult& m : better.micrographs)
+    m.plan.reasons.push_back(fmt::format("curved rays were chosen: they describe the image as well or better, and straight ones shift a parameter by {:.3g} standard errors", done.change_by_curved_rays()));
+  better.seconds += by_straight.seconds;
+  better.evaluations += by_straight.evaluations;
+  return better;
+}
+
 }  // namespace
 
 FitResult fit(const FitJob& job) {
@@ -1434,17 +1446,7 @@ FitResult fit(const FitJob& job) {
   if (job.branches.size() < 2) {
     Fit only(job);
     only.search(kNever);
-    FitResult result = only.finish(false);
-    if (!job.options.choose_rays || !(only.change_by_curved_rays() >= 1)) return result;
-    FitJob curved = job;
-    curved.options.choose_rays = false;
-    for (Micrograph& m : curved.micrographs) m.scene.rays = Rays::eikonal;
-    FitResult better = fit(curved);
-    for (MicrographResult& m : better.micrographs)
-      m.plan.reasons.push_back(fmt::format("curved rays were chosen: they describe the image as well or better, and straight ones shift a parameter by {:.3g} standard errors", only.change_by_curved_rays()));
-    better.seconds += result.seconds;
-    better.evaluations += result.evaluations;
-    return better;
+    return with_chosen_rays(job, only, only.finish(false));
   }
   // A branch whose misfit on the same pixels, by the same noise, is this many times the best one's has lost.
   constexpr double kBeaten = 10;
@@ -1468,7 +1470,7 @@ FitResult fit(const FitJob& job) {
   }
   std::vector<FitResult> results;
   for (std::size_t b = 0; b < fits.size(); ++b) {
-    results.push_back(fits[b].finish(objectives[b] > kBeaten * best));
+    results.push_back(with_chosen_rays(jobs[b], fits[b], fits[b].finish(objectives[b] > kBeaten * best)));
     if (results.back().interrupted) return std::move(results.back());
   }
   return best_branch(job, std::move(results));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "birefit/render.h"
 #include "io/config_disc.h"
 #include "io/config_director.h"
 #include "io/config_rings.h"
@@ -670,13 +671,11 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
 
   const Block physics = reader.block(root, "physics", {"ceiling", "rays", "max_seconds"}, false);
   if (const YamlNode* rays = physics.find("rays")) {
-    const auto* droplet = std::get_if<Droplet>(&scene.sample);
-    const auto* radial = droplet ? std::get_if<RadialDirector>(&droplet->director) : nullptr;
     const std::string which = reader.choice(physics, "rays", {"straight", "eikonal", "auto"}).value_or("straight");
     scene.rays = which == "eikonal" ? Rays::eikonal : Rays::straight;
     reader.choose_rays = which == "auto";  // what a fit does without the key, too
-    if (which == "eikonal" && (!radial || radial->twist_deg))
-      reader.problems.add(rays->where, "rays: eikonal is for radial droplets without twist", "use straight or auto");
+    if (which == "eikonal" && !has_curved_rays(scene))
+      reader.problems.add(rays->where, "rays: eikonal is for radial droplets without twist, shells whose core is in the middle and droplets in a field along the view", "use straight or auto");
   }
   const YamlNode* ceiling = physics.find("ceiling");
   const Slab* slab = std::get_if<Slab>(&scene.sample);

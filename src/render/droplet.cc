@@ -155,6 +155,7 @@ DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
   } else if (const auto* shell = std::get_if<ShellDirector>(&droplet.director)) {
     o.director = Director::shell;
     o.core_um = o.radius_um - value(shell->wall_um);
+    o.core_index = shell->core_index ? value(shell->core_index) : o.n_host;
   } else if (std::holds_alternative<AxialDirector>(droplet.director)) {
     const AxialDirector& axial = std::get<AxialDirector>(droplet.director);
     o.director = Director::axial;
@@ -233,7 +234,6 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       aplanatic_(scene.microscope.aplanatic),
-      objective_na_(scene.microscope.objective_na),
       view_(scene, value),
       edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)),
       inverse_edge_(inverse(edge_um_)),
@@ -241,8 +241,8 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       centre_panels_(plan.centre_panels),
       rest_panels_(plan.radial_panels) {
   if (scene.rays == Rays::eikonal) {
-    fan_p_ = std::make_shared<const EikonalFan>(eikonal_fan(optics_, true));
-    fan_s_ = std::make_shared<const EikonalFan>(eikonal_fan(optics_, false));
+    fan_p_ = std::make_shared<const EikonalFan<S>>(optics_, true, scene.microscope.objective_na);
+    fan_s_ = std::make_shared<const EikonalFan<S>>(optics_, false, scene.microscope.objective_na);
   }
   sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
   symmetry_ = round_symmetry(scene, value, optics_.coupled());
@@ -307,7 +307,7 @@ void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
 
 template <class S>
 void DropletImage<S>::eikonal_terms_at(const S& rho_um, S* out) const {
-  const EikonalRay<S> p = eikonal_ray(optics_, *fan_p_, rho_um, objective_na_), s = eikonal_ray(optics_, *fan_s_, rho_um, objective_na_);
+  const EikonalRay<S> p = fan_p_->at(rho_um), s = fan_s_->at(rho_um);
   // |E|^2 is flux over the cosine; not aplanatic, only the transverse part of the p field counts.
   const S p_field = aplanatic_ ? p.amplitude : p.amplitude * root(p.cos_turn);
   const S s_field = aplanatic_ ? s.amplitude : s.amplitude * inverse_root(s.cos_turn);

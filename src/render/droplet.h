@@ -22,6 +22,7 @@ struct IncidenceTable {
   P at(const P& rho_over_radius) const;   ///< P = double or Pack; within 5e-5 rad
 };
 
+template <class S>
 class EikonalFan;
 
 /// Of straight rays, for one ratio m = n_host / n_o (values only; a start for Newton).
@@ -50,7 +51,7 @@ struct DropletOptics {
   S radius_um, n_o, n_e, n_host, ratio, k0;
   enum class Director { radial, twisted, axial, shell } director = Director::radial;
   S twist_rad = S(0.0);  // not {0.0}: a pack would take that for a list of lanes
-  S core_um = S(0.0);        ///< radius of a shell's core
+  S core_um = S(0.0), core_index = S(1.0);  ///< of a shell's core: radius and index
   std::shared_ptr<const AxialField<S>> axial;
   Continuity continuity = Continuity::e_and_h;
   bool coupled() const { return director == Director::twisted; }  ///< the axis leaves the meridional plane
@@ -147,8 +148,11 @@ class DropletImage final : public PixelModel<S> {
   enum class Part { centre, rest };
   static constexpr int kMostTerms = RoundView<S>::kMostTerms;
   int number_of_terms() const { return optics_.coupled() ? 5 : 3; }
-  /// False where one ray a point is needed whatever the plan says: a shell whose core's edge no ray of the image meets.
-  bool can_tabulate() const { return !shell_ || lane(plain(core_um_), 0) > 0; }
+  /// False where one ray a point is needed whatever the plan says: a shell whose core's edge no ray of the image meets, or where each mode
+  /// has edges of its own.
+  bool can_tabulate() const { return !shell_ || (!fan_p_ && lane(plain(core_um_), 0) > 0); }
+  /// Other ones than the plan's, for the next tabulate().
+  void set_panels(int centre, int rest) { centre_panels_ = centre, rest_panels_ = can_tabulate() ? rest : 0; }
   /// f_k at v of the part; out has number_of_terms() places.
   void terms(Part part, const S& v, S* out) const;
   /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with plan.radial_panels > 0.
@@ -169,8 +173,7 @@ class DropletImage final : public PixelModel<S> {
   Mesh mesh_;
   bool aplanatic_, shell_;
   Symmetry symmetry_;
-  std::shared_ptr<const EikonalFan> fan_p_, fan_s_;  ///< of curved rays; else none
-  double objective_na_;
+  std::shared_ptr<const EikonalFan<S>> fan_p_, fan_s_;  ///< of curved rays; else none
   RoundView<S> view_;
   S cos_between_, sin_between_;  ///< of analyser - polarizer
   S edge_um_, inverse_edge_, open_;

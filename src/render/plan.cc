@@ -12,6 +12,7 @@
 #include "medium/build.h"
 #include "medium/validity.h"
 #include "render/disc.h"
+#include "render/eikonal.h"
 #include "render/ball.h"
 #include "render/fringe_table.h"
 #include "render/pilots.h"
@@ -139,12 +140,14 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
   const double points = static_cast<double>(scene.view.width) * scene.view.height;
   const Values<Pack> lanes = value.template as<Pack>();
   const bool shell = std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
-  if (!Image(scene, plan, lanes).can_tabulate()) {
-    plan.reasons.push_back("retardance has a kink where rays touch the core, too close to the rim for a table over the radius: one ray a point");
+  Image image(scene, plan, lanes);
+  if (!image.can_tabulate()) {
+    plan.reasons.push_back(scene.rays == Rays::eikonal ? "each mode has its own edges where its rays meet the core: no table over the radius, rays are read at every point"
+                                                       : "retardance has a kink where rays touch the core, too close to the rim for a table over the radius: one ray a point");
     return;
   }
   // The largest error of one part read at many places.
-  const auto error_of = [&](const Image& image, Image::Part part, int panels) {
+  const auto error_of = [&](Image::Part part, int panels) {
     std::array<Pack, Image::kMostTerms> direct;
     double error = 0;
     // A panel's error is largest near its ends; the golden ratio meets all places of a panel, the ends of the table too.
@@ -176,10 +179,10 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
   plan.radial_panels = 2;
   plan.centre_panels = 2;
   while ((plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints < points / 4) {
-    Image image(scene, plan, lanes);
+    image.set_panels(plan.centre_panels, plan.radial_panels);
     image.tabulate(Image::Wanted::picture, 1);
-    const double rest = error_of(image, Image::Part::rest, plan.radial_panels);
-    const double centre = error_of(image, Image::Part::centre, plan.centre_panels);
+    const double rest = error_of(Image::Part::rest, plan.radial_panels);
+    const double centre = error_of(Image::Part::centre, plan.centre_panels);
     if (rest <= target && centre <= target) {
       plan.reasons.push_back(fmt::format(
           "the droplet looks the same from all sides of the viewing axis: {} rays, one a radius, serve all pixels "
@@ -208,12 +211,10 @@ double ball_phase(const BallOptics<double>& o, const RimTable& rim, double rho_u
   });
 }
 
-/// What refraction at a shell's core would turn a ray by, half-way to its edge (rad).
-double turned_by_core(const Scene& scene, const Values<double>& value, double n_o) {
-  const auto* shell = std::get_if<ShellDirector>(&std::get<Droplet>(scene.sample).director);
-  if (!shell) return 0;
-  const double core = shell->core_index ? value(shell->core_index) : host_index(scene, value);
-  return 2 * std::abs(std::asin(0.5) - std::asin(std::min(1.0, 0.5 * n_o / core)));
+/// What refraction at a shell's core would turn a straight ray by, half-way to its edge (rad).
+double turned_by_core(const DropletOptics<double>& o) {
+  if (o.director != DropletOptics<double>::Director::shell) return 0;
+  return 2 * std::abs(std::asin(0.5) - std::asin(std::min(1.0, 0.5 * o.n_o / o.core_index)));
 }
 
 void note_rays(const Scene& scene, const Values<double>& value, const DropletOptics<double>& o, RenderPlan& plan) {
@@ -231,7 +232,7 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
         "solutions of 5 to 20 um droplets of birefringence 0.22, ray images differ by 25 to 60 % RMS and a fitted "
         "birefringence comes out 1 to 7 % low; the error bars do not contain this.",
         size));
-  if (const double turned = turned_by_core(scene, value, o.n_o); turned > 0.005)
+  if (const double turned = turned_by_core(o); turned > 0.005 && scene.rays == Rays::straight)
     plan.warnings.push_back(fmt::format(
         "Light is taken straight through the shell's core; refraction there would turn a ray half-way to the core's edge by {:.2g} degrees, "
         "and moves fringes around the edge. The error bars do not contain this.",
@@ -316,9 +317,8 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   if (scene.ceiling == Ceiling::reflections)
     throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
   const Droplet& droplet = std::get<Droplet>(scene.sample);
-  const auto* radial = std::get_if<RadialDirector>(&droplet.director);
-  if (scene.rays == Rays::eikonal && (!radial || radial->twist_deg))
-    throw UserError(Where{}, "physics.rays: eikonal knows the radial droplet only", "use straight");
+  if (scene.rays == Rays::eikonal && !has_curved_rays(scene))
+    throw UserError(Where{}, "physics.rays: eikonal is for radial droplets without twist, shells whose core is in the middle and droplets in a field along the view", "use straight or auto");
   if (!looks_round(droplet)) return plan_ball(scene, value);
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
@@ -344,12 +344,19 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
                                      pilots.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
-  if (scene.rays == Rays::eikonal) plan.reasons.push_back("each mode on its own curved ray, in closed form: the method above is not used");
+  std::vector<double> edges_um;
+  if (scene.rays == Rays::eikonal) {
+    const EikonalFan<double> p(o, true, scene.microscope.objective_na), s(o, false, scene.microscope.objective_na);
+    plan.reasons.push_back(axial ? fmt::format("each mode on its own curved ray, {} of the extraordinary one integrated: the method above is not used", p.rays())
+                                 : "each mode on its own curved ray, in closed form: the method above is not used");
+    for (const EikonalFan<double>* fan : {&p, &s})
+      for (const double edge : fan->edges()) edges_um.push_back(edge * o.radius_um);
+  } else if (o.director == DropletOptics<double>::Director::shell) {
+    edges_um.push_back(core_edge(o, rim));
+  }
   plan_radial_table(scene, value, plan);
 
   const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.radius_um;
-  const bool shell = o.director == DropletOptics<double>::Director::shell;
-  const double core = shell ? core_edge(o, rim) : 0;
   double largest_phase = 0;
   const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
   if (bins > 100000) throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");
@@ -364,7 +371,8 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
     if (r < 3) return r < 2 ? 9.0 : 5.0;
     if (high > edge - px && low < edge + px) return 3.0;
     // A shell's retardance turns back where rays touch the core, with a slope that has no bound.
-    if (shell && high > core - px && low < core + px) return 9.0;
+    for (const double core : edges_um)
+      if (high > core - px && low < core + px) return 9.0;
     return std::abs(phase_at(high) - phase_at(low));
   });
   const int most = *std::max_element(plan.samples.begin(), plan.samples.end());

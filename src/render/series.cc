@@ -51,10 +51,7 @@ class SeriesImage final : public PixelModel<S> {
     sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), unused, cos_between_);
     RadialBall<Single> ball;
     const auto one = [](const S& x) { return SingleOf<S>::of(x); };
-    if (const auto* shell = std::get_if<ShellDirector>(&std::get<Droplet>(scene.sample).director)) {
-      const Single core = shell->core_index ? one(value(shell->core_index)) : one(optics_.n_host);
-      ball.layers.push_back({one(optics_.core_um), core, core});
-    }
+    if (optics_.director == DropletOptics<S>::Director::shell) ball.layers.push_back({one(optics_.core_um), one(optics_.core_index), one(optics_.core_index)});
     ball.layers.push_back({one(optics_.radius_um), one(optics_.n_o), one(optics_.n_e)});
     ball.n_host = one(optics_.n_host);
     ball.k0 = one(optics_.k0);

@@ -156,6 +156,10 @@ config 's/  droplet:/  shell:/; s/director: {radial: {}}/wall_um: 1\n    core_of
 expect_one 'core outside the shell' bad.yaml:11: 'leave the wall'
 config '$aphysics: {rays: eikonal}' 's/radial: {}/radial: {twist_deg: 40}/'
 expect_one 'curved rays through a twist' bad.yaml: 'without twist'
+config '$aphysics: {rays: eikonal}' 's/radial: {}/bipolar: {}/'
+expect_one 'curved rays through a bipolar droplet' bad.yaml: 'rays: eikonal is for radial droplets'
+config '$aphysics: {rays: eikonal}' 's/  droplet:/  shell:/; s/director: {radial: {}}/wall_um: 1\n    core_offset_um: [0.2, 0, 0]/'
+expect_one 'curved rays around a core off the middle' bad.yaml: 'whose core is in the middle'
 
 config '/pixel_size_um/d'
 expect_one 'missing pixel size' bad.yaml:1:1: 'pixel_size_um'
