@@ -40,7 +40,7 @@ struct MeridionalRay {
 /// for n_e. A ray that meets the core goes straight through it, refracted with the same L; where it is totally reflected there it counts as lost.
 ///
 /// In a field the extraordinary ray obeys Hamilton's equations of H = w^2 + (n_e^2 - 1) (n.w)^2 - n_e^2, w the wavevector: the geodesics of
-/// n_e^2 I - (n_e^2 - 1) n n. Boost.Odeint, Dormand-Prince, each step to 1e-9.
+/// n_e^2 I - (n_e^2 - 1) n n. Boost.Odeint, Dormand-Prince, each step to 1e-8.
 template <class T>
 MeridionalRay<T> meridional_ray(const MeridionalDroplet<T>& droplet, bool extraordinary, const T& psi);
 
