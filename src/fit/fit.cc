@@ -1145,7 +1145,7 @@ Fit::Shift Fit::largest_shift(const Theta& there) const {
 /// with curved rays from where this one ended says by how much.
 void Fit::foretell_curved_rays() {
   const auto has_curved = [](const Micrograph& m) {
-    return has_curved_rays(m.scene) && m.scene.rays == Rays::straight;
+    return has_curved_rays(m.scene) && m.scene.rays == Rays::straight && m.scene.ceiling != Ceiling::wave;
   };
   if (stopped_ || unknowns_.searched.empty() || !std::all_of(job_.micrographs.begin(), job_.micrographs.end(), has_curved)) return;
   FitJob curved = job_;
