@@ -277,6 +277,12 @@ struct Microscope {
   bool quarter_wave = false;  ///< circular polariscope: quarter-wave plates at 45 degrees from the polarizer, crossed; discs
 };
 
+/// A camera that looks at a cone's screen from the side: a pinhole whose axis points at the cone's middle.
+struct SideCamera {
+  ParameterRef tilt_x_deg, tilt_y_deg;  ///< it stands in the direction (tan tilt_x, tan tilt_y, 1) of the screen, x right, y up; [-80, 80]
+  ParameterRef half_field_deg;          ///< what half the picture's smaller side subtends, [0, 60]; 0: from far away, no perspective
+};
+
 /// How pixels lie on the sample.
 struct View {
   int width = 0, height = 0;
@@ -284,6 +290,7 @@ struct View {
   ParameterRef center_x_px;     ///< sample centre; pixel centres are integers, (0, 0) the top left pixel's
   ParameterRef center_y_px;
   ParameterRef rotation_deg;    ///< of the sample, counter-clockwise as seen in the image
+  std::optional<SideCamera> camera;  ///< of plates and slabs in a cone; none: it looks along the cone's axis
 };
 
 /// The physics ceiling: what a render may leave out (docs/methods.md).

@@ -283,7 +283,26 @@ ParameterRef read_half_angle(ConfigReader& reader, const Block& view) {
   return reader.number(view, "half_angle_deg", half_angle);
 }
 
-Plate read_plate(ConfigReader& reader, const Block& parent) {
+/// `camera` of a view in a cone.
+std::optional<SideCamera> read_side_camera(ConfigReader& reader, const Block& view) {
+  if (!view.find("camera")) return std::nullopt;
+  const Block block = reader.block(view, "camera", {"tilt_x_deg", "tilt_y_deg", "half_field_deg"}, true);
+  NumberSpec half_field = angle_within(0, 60);
+  half_field.physical_lower = 0;
+  SideCamera camera;
+  camera.tilt_x_deg = reader.number(block, "tilt_x_deg", angle_within(-80, 80), 0);
+  camera.tilt_y_deg = reader.number(block, "tilt_y_deg", angle_within(-80, 80), 0);
+  camera.half_field_deg = reader.number(block, "half_field_deg", half_field, 0);
+  const Parameter &x = reader.table[camera.tilt_x_deg], &y = reader.table[camera.tilt_y_deg], &field = reader.table[camera.half_field_deg];
+  const bool square = x.value == 0 && y.value == 0;
+  // The foreshortening is even in the tilt, the perspective a product of tilt and field: nothing to go by from 0.
+  if (square && (field.free || (field.value == 0 && (x.free || y.free))))
+    reader.problems.add(block.where, "camera starts at tilt 0, where the picture does not change with " + std::string(field.free ? "half_field_deg" : "the tilt"),
+                        "start on the side where the camera stood, e.g. tilt_x_deg: {value: 10, fit: [0, 60]}");
+  return camera;
+}
+
+Plate read_plate(ConfigReader& reader, const Block& parent, View& shown) {
   Plate plate;
   const Block block = reader.block(parent, "plate", {"thickness_um", "director", "heat", "view"}, true);
   plate.thickness_um = reader.number(block, "thickness_um", open_length(100000));
@@ -315,14 +334,16 @@ Plate read_plate(ConfigReader& reader, const Block& parent) {
     step.hot_k = reader.number(heat, "hot_k", kelvin());
     plate.heat = step;
   }
-  const Block view = reader.block(block, "view", {"half_angle_deg", "screen_distance_um", "ring_offset"}, true);
+  const Block view = reader.block(block, "view", {"half_angle_deg", "camera", "screen_distance_um", "ring_offset"}, true);
   if (!view.find("screen_distance_um")) {
     if (const YamlNode* node = view.find("ring_offset")) reader.problems.add(node->where, "ring_offset belongs to a table of rings", "give screen_distance_um too, or leave it out");
     plate.half_angle_deg = read_half_angle(reader, view);
+    shown.camera = read_side_camera(reader, view);
     return plate;
   }
   if (const YamlNode* node = view.find("half_angle_deg"))
     reader.problems.add(node->where, "view has half_angle_deg (a picture) and screen_distance_um (a table of ring radii)", "give one of the two");
+  if (const YamlNode* node = view.find("camera")) reader.problems.add(node->where, "camera belongs to a picture, not to a table of ring radii", "leave it out");
   read_ring_view(reader, view, plate);
   const ParameterRef* axis = plate.director.axis.data();
   const auto upright = [&](ParameterRef ref, double value) { return !reader.table[ref].free && reader.table[ref].value == value; };
@@ -386,10 +407,14 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
   return crystal;
 }
 
-Slab read_slab(ConfigReader& reader, const Block& parent) {
+Slab read_slab(ConfigReader& reader, const Block& parent, View& shown) {
   Slab slab;
   const Block block = reader.block(parent, "slab", {"profile", "interpolation", "view"}, true);
-  if (block.find("view")) slab.half_angle_deg = read_half_angle(reader, reader.block(block, "view", {"half_angle_deg"}, true));
+  if (block.find("view")) {
+    const Block view = reader.block(block, "view", {"half_angle_deg", "camera"}, true);
+    slab.half_angle_deg = read_half_angle(reader, view);
+    shown.camera = read_side_camera(reader, view);
+  }
   const std::string interpolation =
       reader.choice(block, "interpolation", {"constant", "linear", "cubic"}).value_or("constant");
   using Interpolation = SlabProfile::Interpolation;
@@ -544,9 +569,9 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   if (*kind == "shell") scene.sample = read_shell(reader, block);
   if (*kind == "droplet") scene.sample = read_droplet(reader, block);
   if (*kind == "cell") scene.sample = read_cell(reader, block);
-  if (*kind == "plate") scene.sample = read_plate(reader, block);
+  if (*kind == "plate") scene.sample = read_plate(reader, block, scene.view);
   if (*kind == "crystal") scene.sample = read_crystal(reader, block);
-  if (*kind == "slab") scene.sample = read_slab(reader, block);
+  if (*kind == "slab") scene.sample = read_slab(reader, block, scene.view);
   if (*kind == "disc") scene.sample = read_stressed_disc(reader, block);
   if (*kind == "volume") scene.sample = read_sampled_volume(reader, block);
 

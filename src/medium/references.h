@@ -103,6 +103,8 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
   f(scene.view.center_x_px);
   f(scene.view.center_y_px);
   f(scene.view.rotation_deg);
+  if (scene.view.camera)
+    for (auto* ref : {&scene.view.camera->tilt_x_deg, &scene.view.camera->tilt_y_deg, &scene.view.camera->half_field_deg}) f(*ref);
 }
 
 }  // namespace birefit

@@ -1,3 +1,4 @@
+#include "render/cone_view.h"
 #include "render/pilots.h"
 
 #include <algorithm>
@@ -36,7 +37,18 @@ double intensity_distance(const Mat2<double>& a, const Mat2<double>& b) {
 
 std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value, std::size_t most) {
   std::vector<std::pair<double, double>> t;
-  if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
+  if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene); half_angle && scene.view.camera) {
+    // Seen from the side no circle is like another: places of the picture, out to its corners.
+    const ConeView<double> cone(scene, value);
+    const double w = scene.view.width, h = scene.view.height;
+    const auto add = [&](double x, double y) {
+      const auto d = cone.at(0.5 * (w - 1) + 0.5 * w * x, 0.5 * (h - 1) - 0.5 * h * y);
+      t.push_back({d.x, d.y});
+    };
+    t.push_back({0.0, 0.0});
+    for (int i = 0; i < 6; ++i) add(0.5 * std::cos(i * kPi / 3 + 0.2), 0.5 * std::sin(i * kPi / 3 + 0.2));
+    for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {-1, 1}, {1, 1}, {0, 1}, {1, 0}}) add(x, y);
+  } else if (half_angle) {
     const double edge = std::tan(value.radians(*half_angle, 15));
     // Pixels beyond the inscribed circle, up to the corners of the image.
     const double corner = std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);

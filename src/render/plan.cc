@@ -14,6 +14,7 @@
 #include "render/disc.h"
 #include "render/eikonal.h"
 #include "render/ball.h"
+#include "render/cone_view.h"
 #include "render/fringe_table.h"
 #include "render/pilots.h"
 #include "render/planar.h"
@@ -426,10 +427,8 @@ bool plan_fringe_means(const Scene& scene, const Values<double>& value, const Pl
   constexpr int kAround = 10;  // pixels
   trial.samples = {1};
   if (s2 < 1) {
-    const double half = value.radians(*cone_half_angle(scene), 15);
-    const double px = 0.5 * std::min(w, h) / std::tan(half) / std::sqrt(1 - s2);
-    const double column = value.get(scene.view.center_x_px, 0.5 * (w - 1)) + sx * px;
-    const double row = value.get(scene.view.center_y_px, 0.5 * (h - 1)) - sy * px;
+    const double cosine = std::sqrt(1 - s2);
+    const auto [column, row] = ConeView<double>(scene, value).pixel_of({sx / cosine, sy / cosine});
     if (column > -kAround && row > -kAround && column < w + kAround && row < h + kAround) {
       trial.sampling_center_x_px = column;
       trial.sampling_center_y_px = row;
@@ -566,12 +565,10 @@ bool has_fringes(const Effort& effort) {
 /// Whether the slow solutions of the modes hold in the whole picture, not only on the pilots: where the axis comes near the
 /// wavevector the modes turn too fast for them. What their last pass changes tells.
 bool slow_everywhere(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o, const Effort& effort) {
-  const double tangent = std::tan(value.radians(*cone_half_angle(scene), 15));
-  const double side = std::min(scene.view.width, scene.view.height), wide = scene.view.width / side, high = scene.view.height / side;
+  const ConeView<double> cone(scene, value);
+  const double w = scene.view.width, h = scene.view.height;
   const Mesh mesh = uniform_mesh(effort.steps, o.column->breaks);
   constexpr int kAcross = 24, kPasses = Modal<double>::kPasses;
-  const double cx = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1)), cy = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
-  const double right = 2 * (0.5 * (scene.view.width - 1) - cx) / side, up = 2 * (cy - 0.5 * (scene.view.height - 1)) / side;
   const auto medium = [&](double u) {
     OpticalPoint<double> p;
     o.column->sample({&u, 1}, &p);
@@ -579,8 +576,8 @@ bool slow_everywhere(const Scene& scene, const Values<double>& value, const Plan
   };
   for (int i = 0; i <= kAcross; ++i)
     for (int j = 0; j <= kAcross; ++j) {
-      const double tx = tangent * (right + wide * (2.0 * i / kAcross - 1)), ty = tangent * (up + high * (2.0 * j / kAcross - 1));
-      const Ray<double> ray = ray_at(o, tx, ty);
+      const auto t = cone.at(w * i / kAcross - 0.5, h - 0.5 - h * j / kAcross);
+      const Ray<double> ray = ray_at(o, t.x, t.y);
       if (modes_turn_over(medium, ray, 0, 1, 32)) return false;
       const Mat2<double> all = together(modal_transfer(*o.column, ray, mesh, kPasses)),
                          fewer = together(modal_transfer(*o.column, ray, mesh, kPasses - 1));
@@ -589,8 +586,27 @@ bool slow_everywhere(const Scene& scene, const Values<double>& value, const Plan
   return true;
 }
 
+/// What a camera at the side does to the picture, in words.
+void note_camera(const Scene& scene, const Values<double>& value, const ConeView<double>& view, RenderPlan& plan) {
+  if (!scene.view.camera) return;
+  const double x = std::tan(value.radians(scene.view.camera->tilt_x_deg)), y = std::tan(value.radians(scene.view.camera->tilt_y_deg));
+  const double t = std::hypot(x, y), w = scene.view.width - 0.5, h = scene.view.height - 0.5;
+  const auto [far, near] = std::minmax({view.nearness(-0.5, -0.5), view.nearness(-0.5, h), view.nearness(w, -0.5), view.nearness(w, h)});
+  plan.reasons.push_back(fmt::format("the camera sees the screen from {:.3g} degrees aside, azimuth {:.3g}: foreshortened there to {:.3g}; the scale in the picture's corners goes from {:.3g} to {:.3g} of the middle's",
+                                     std::atan(t) * 180 / kPi, std::atan2(y, x) * 180 / kPi, 1 / std::hypot(1.0, t), far, near));
+}
+
 RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
+  if (scene.view.camera) {
+    // A twentieth of the middle's scale: what is twenty times as far away as the middle is not a picture of a screen any more.
+    const ConeView<double> view(scene, value);
+    for (const int column : {0, scene.view.width - 1})
+      for (const int row : {0, scene.view.height - 1})
+        if (!(view.nearness(column, row) > 0.05))
+          throw UserError(Where{}, fmt::format("the corner of the picture at column {}, row {} looks past the horizon of the screen", column, row),
+                          "lower half_field_deg or the tilt of view.camera");
+  }
   const PlanarOptics<double> o = planar_optics(scene, value);
   o.column->freeze();  // no node set comes twice: remembering them would only cost the search
   const auto directions = pilot_directions(scene, value);
@@ -652,19 +668,22 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
   double largest_phase = 0;
   for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
   if (cone) {
-    const int side = std::min(scene.view.width, scene.view.height);
-    const double scale = std::tan(value.radians(*half_angle, 15)) * 2 / side;
-    const double cx = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1));
-    const double cy = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
+    const ConeView<double> view(scene, value);
+    const double cx = view.center_x, cy = view.center_y;
+    note_camera(scene, value, view, plan);
     const int bins = static_cast<int>(std::ceil(std::hypot(std::max(cx, scene.view.width - cx), std::max(cy, scene.view.height - cy)))) + 1;
     // The gradient changes slowly with radius: measure it on 24 radii and 12 azimuths, interpolate.
     std::vector<double> gradient(25);
     for (int i = 0; i <= 24; ++i)
       for (int k = 0; k < 12; ++k) {
-        const double r = scale * bins * i / 24, a = k * kPi / 6, h = scale * 0.5;
-        const double x = r * std::cos(a), y = r * std::sin(a);
-        const double gx = planar_phase(o, x + h, y, 24) - planar_phase(o, x - h, y, 24);
-        const double gy = planar_phase(o, x, y + h, 24) - planar_phase(o, x, y - h, 24);
+        const double r = bins * i / 24.0, a = k * kPi / 6, x = cx + r * std::cos(a), y = cy - r * std::sin(a);
+        // Seen from the side there may be no screen outside the picture.
+        if (scene.view.camera && (x < -1 || y < -1 || x > scene.view.width || y > scene.view.height)) continue;
+        const auto phase = [&](double column, double row) {
+          const auto t = view.at(column, row);
+          return planar_phase(o, t.x, t.y, 24);
+        };
+        const double gx = phase(x + 0.5, y) - phase(x - 0.5, y), gy = phase(x, y + 0.5) - phase(x, y - 0.5);
         gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(gx, gy));
       }
     const double fastest = *std::max_element(gradient.begin(), gradient.end());

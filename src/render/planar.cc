@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "medium/build.h"
+#include "render/cone_view.h"
 #include "render/fringe_table.h"
 #include "render/planar.h"
 #include "render/pixel_model.h"
@@ -121,14 +122,8 @@ class PlanarModel final : public PixelModel<S> {
         blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
         tabulated_blocks_(plan.fringe_blocks),
         left_to_rays_(std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) != plan.fringe_blocks.end()) {
-    if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene)) {
-      conoscopic_ = true;
-      const S half = value.radians(*half_angle, 15);
-      tan_per_px_ = sin(half) / cos(half) * (2.0 / std::min(scene.view.width, scene.view.height));
-      center_x_ = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1));
-      center_y_ = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
-    }
-    if (!conoscopic_) {
+    if (cone_half_angle(scene)) cone_.emplace(scene, value);
+    if (!cone_) {
       S tx(0.0), ty(0.0);
       if (!scene.microscope.directions.empty()) {
         const Direction& d = scene.microscope.directions.front();
@@ -138,11 +133,12 @@ class PlanarModel final : public PixelModel<S> {
       }
       constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
     }
-    if (conoscopic_ && centred(scene, center_x_, center_y_) && axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) {
+    const bool straight = cone_ && cone_->from_front();
+    if (straight && centred(scene, cone_->center_x, cone_->center_y) && axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) {
           return stays_at(p.axis.z, 0.0) || (stays_at(p.axis.x, 0.0) && stays_at(p.axis.y, 0.0));
         }))
       symmetry_ = Symmetry::half_turn;
-    else if (conoscopic_ && on_middle_row(scene, center_y_) && along_axes(polarizers_) && !compensator_ &&
+    else if (straight && on_middle_row(scene, cone_->center_y) && along_axes(polarizers_) && !compensator_ &&
              axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) { return mirrored(p.axis.x, p.axis.y, p.axis.z); }))
       symmetry_ = Symmetry::mirror;
     if (symmetry_ != Symmetry::none && !tabulated_blocks_.empty())  // the lower half of a picture is copied
@@ -150,12 +146,13 @@ class PlanarModel final : public PixelModel<S> {
         if ((b / blocks_.columns) * blocks_.block_px > scene.view.height / 2 + 2) tabulated_blocks_[static_cast<std::size_t>(b)] = 0;
   }
   S intensity(const P& column, const P& row) const override {
-    if (!conoscopic_) return constant_;
-    const S tx = (S(column) - center_x_) * tan_per_px_, ty = (center_y_ - S(row)) * tan_per_px_;
-    return intensity_of(planar_jones(optics(), method_, mesh_, tx, ty));
+    if (!cone_) return constant_;
+    const auto t = cone_->at(column, row);
+    return intensity_of(planar_jones(optics(), method_, mesh_, t.x, t.y));
   }
   FringePoint<S> fringe(const P& column, const P& row) const override {
-    return planar_fringe(optics(), coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, (S(column) - center_x_) * tan_per_px_, (center_y_ - S(row)) * tan_per_px_);
+    const auto t = cone_->at(column, row);
+    return planar_fringe(optics(), coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, t.x, t.y);
   }
   int fringe_run(int column, double row, int count, FringeScratch& scratch, double* const* out) const override {
     return table_.run(column, row, count, !in_phase(), scratch, out);
@@ -167,8 +164,9 @@ class PlanarModel final : public PixelModel<S> {
   Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture || tabulated_blocks_.empty()) return;
-    // Where the cone's middle lies and how wide it is moves fringes and changes none.
-    const std::optional<ParameterRef> half_angle = cone_half_angle(scene_);
+    // Where the cone's middle lies and how wide it is moves fringes and changes none. Seen from the side a wider cone moves them by other
+    // ways than straight away from the middle: its derivative is left to rays.
+    const ParameterRef half_angle = scene_.view.camera ? ParameterRef{} : *cone_half_angle(scene_);
     std::vector<std::size_t> places;
     std::vector<int> changing;
     std::vector<FringeMove> moves;
@@ -176,9 +174,9 @@ class PlanarModel final : public PixelModel<S> {
       for (std::size_t j = 0; j < value_.active().size(); ++j) {
         const int index = value_.active()[j];
         bool moving = false;
-        for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle.value_or(ParameterRef{})}) moving = moving || (ref && ref.index == index);
+        for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle}) moving = moving || (ref && ref.index == index);
         if (moving) {
-          moves.push_back({j, lane(center_x_.d[j], 0), lane(center_y_.d[j], 0), lane(tan_per_px_.d[j], 0) / lane(plain(tan_per_px_), 0)});
+          moves.push_back({j, lane(cone_->center_x.d[j], 0), lane(cone_->center_y.d[j], 0), scene_.view.camera ? 0.0 : lane(cone_->tan_per_px.d[j], 0) / lane(plain(cone_->tan_per_px), 0)});
         } else {
           places.push_back(j);
           changing.push_back(index);
@@ -217,15 +215,18 @@ class PlanarModel final : public PixelModel<S> {
     }
     f(Type<Most>());
   }
-  /// Which of `changing` medium or host know; others, the wavelength where nothing is dispersive, the polarizers, turn what they have done.
+  /// Which of `changing` medium, host or the direction know; others, the wavelength where nothing is dispersive, the polarizers, turn what they have done.
   template <class R>
   std::vector<int> known_inside(const std::vector<int>& changing) const {
     std::vector<int> inside;
     if constexpr (ScalarTraits<R>::derivatives > 0) {
-      const PlanarOptics<R> optics = planar_optics(scene_, Values<R>(value_.theta(), changing));
+      const Values<R> value(value_.theta(), changing);
+      const PlanarOptics<R> optics = planar_optics(scene_, value);
+      const ConeView<R> cone(scene_, value);
+      const auto corner = cone.at(P(0.0), P(0.0)), side = cone.at(P(scene_.view.width - 1.0), P(0.3 * scene_.view.height));
       for (std::size_t j = 0; j < changing.size(); ++j) {
         const auto still = [j](const R& x) { return lane(x.d[j], 0) == 0; };
-        const bool outside = still(optics.n_host) && axes_all(*optics.column, mesh_, [&](const OpticalPoint<R>& p) {
+        const bool outside = still(optics.n_host) && still(corner.x) && still(corner.y) && still(side.x) && still(side.y) && axes_all(*optics.column, mesh_, [&](const OpticalPoint<R>& p) {
           return still(p.axis.x) && still(p.axis.y) && still(p.axis.z) && still(p.ordinary) && still(p.extraordinary) && still(p.ordinary_im) && still(p.extraordinary_im) &&
                  still(p.depth_slope_um);
         });
@@ -247,9 +248,11 @@ class PlanarModel final : public PixelModel<S> {
     const R k0 = wavenumber_per_um(scene_, value);
     planar_fringe(optics, coupling_, mesh_, k0, raise, pair, T(0.0), T(0.0));
     optics.column->freeze();
-    const FringeCentre centre{lane(plain(center_x_), 0), lane(plain(center_y_), 0)};
+    const ConeView<T> cone(scene_, value_inside);
+    const FringeCentre centre{lane(plain(cone.center_x), 0), lane(plain(cone.center_y), 0)};
     table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places, moves, centre, [&](const P& column, const P& row) {
-      return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, T((column - plain(center_x_)) * plain(tan_per_px_)), T((plain(center_y_) - row) * plain(tan_per_px_)));
+      const auto t = cone.at(column, row);
+      return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
     });
   }
   S intensity_of(const Mat2<S>& sample) const {
@@ -264,14 +267,15 @@ class PlanarModel final : public PixelModel<S> {
   Mesh mesh_;
   Polarizers<S> polarizers_;
   std::optional<Mat2<S>> compensator_;
-  bool coupling_, has_fringes_, conoscopic_ = false;
+  bool coupling_, has_fringes_;
+  std::optional<ConeView<S>> cone_;
   mutable std::once_flag first_ray_;
   Symmetry symmetry_ = Symmetry::none;
   FringeBlocks blocks_;
   std::vector<std::uint8_t> tabulated_blocks_;
   bool left_to_rays_;  ///< some of the picture
   FringeTable<S> table_;
-  S tan_per_px_, center_x_, center_y_, constant_;
+  S constant_;
 };
 
 }  // namespace

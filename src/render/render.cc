@@ -8,6 +8,7 @@
 
 #include "core/threads.h"
 #include "render/ball.h"
+#include "render/cone_view.h"
 #include "render/fringe_table.h"
 #include "render/pixel_model.h"
 #include "render/planar.h"
@@ -547,11 +548,10 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
     add(planar_jones(optics, method, mesh, 0.0, 0.0), 0, {});
     return rows;
   }
-  const double scale = std::tan(value.radians(*half_angle, 15)) * 2 / std::min(w, h);
+  const ConeView<double> cone(scene, value);
   for (int r = 0; r < h; ++r)
     for (int c = 0; c < w; ++c) {
-      const double tx = (c - value.get(scene.view.center_x_px, 0.5 * (w - 1))) * scale;
-      const double ty = (value.get(scene.view.center_y_px, 0.5 * (h - 1)) - r) * scale;
+      const auto [tx, ty] = cone.at(c, r);
       const double azimuth = std::atan2(ty, tx);
       add(planar_jones(optics, method, mesh, tx, ty), azimuth,
           {.theta_deg = std::atan(std::hypot(tx, ty)) * 180 / std::numbers::pi,

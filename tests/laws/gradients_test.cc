@@ -265,6 +265,13 @@ std::vector<Case> cases() {
     c.scene.sample = plate;
     c.scene.material = E44Steinberg2020{};
     all.push_back(c);
+    Case side = c;
+    side.name = "heated plate, its screen seen from the side";
+    side.scene.view.camera = SideCamera{side.t.fixed("tilt_x_deg", 30), side.t.fixed("tilt_y_deg", -15), side.t.fixed("half_field_deg", 25)};
+    all.push_back(side);
+    side.name = "heated plate, seen from in front by a camera that may move";
+    for (const char* tilt : {"tilt_x_deg", "tilt_y_deg"}) side.t.table[side.t.table.find(tilt)].value = 0;
+    all.push_back(side);
     c.name = "plate heated from both sides";
     heat.fourier_number = {};
     heat.time_s = c.t.fixed("time_s", 0.0025);

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "independent_camera.h"
 #include "medium/families/planar.h"
 #include "profiles.h"
+#include "render/cone_view.h"
 #include "scene_builder.h"
 #include "study/answer.h"
 #include "study/rays.h"
@@ -93,7 +95,7 @@ std::pair<ParameterRef, ParameterRef> put_tilted_plate(TableBuilder& table, Scen
 // A picture interpolated from a few rays is the picture of all rays: within a hundredth of the accuracy asked, derivatives
 // with it.
 TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
-  for (const bool absorbing_slab : {false, true}) {
+  for (const auto& [absorbing_slab, from_side] : {std::pair{false, false}, {true, false}, {false, true}}) {
     TableBuilder table;
     Scene scene;
     scene.view.width = 90, scene.view.height = 70;
@@ -122,6 +124,11 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
       const auto [birefringence, tilt] = put_tilted_plate(table, scene);
       active.push_back(birefringence.index);
       active.push_back(tilt.index);
+      active.push_back(std::get<Plate>(scene.sample).half_angle_deg.index);
+    }
+    if (from_side) {
+      scene.view.camera = SideCamera{table.fixed("tilt_x_deg", 25), table.fixed("tilt_y_deg", -12), table.fixed("half_field_deg", 20)};
+      for (const ParameterRef& ref : {scene.view.camera->tilt_x_deg, scene.view.camera->tilt_y_deg, scene.view.camera->half_field_deg}) active.push_back(ref.index);
     }
     active.push_back(scene.microscope.wavelength_nm.index);
     const Theta theta = table.table.values();
@@ -158,6 +165,43 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
       const Rendering part = render(scene, few, theta, list);
       for (std::size_t k = 0; k < some.size(); ++k) compare(part, k, some[k]);
     }
+  }
+}
+
+// Between the pixels of a picture and the directions of a cone stands a camera in space, and one in front is none.
+TEST(ConeView, IsAPinholeInSpace) {
+  TableBuilder table;
+  Scene scene;
+  scene.view.width = 90, scene.view.height = 70;
+  scene.view.center_x_px = table.fixed("center_x", 41.3);
+  scene.view.center_y_px = table.fixed("center_y", 36.2);
+  put_tilted_plate(table, scene);
+  const double half = table.table[std::get<Plate>(scene.sample).half_angle_deg].value * std::numbers::pi / 180;
+  const Theta plain_theta = table.table.values();
+  const ConeView<double> plain_view(scene, Values<double>(plain_theta, {}));
+  const SideCamera refs{table.fixed("tilt_x_deg", 0), table.fixed("tilt_y_deg", 0), table.fixed("half_field_deg", 0)};
+  scene.view.camera = refs;
+  for (const auto& [tilt_x, tilt_y, half_field] : {std::array{0.0, 0.0, 35.0}, {40.0, 0.0, 0.0}, {25.0, -12.0, 20.0}, {-50.0, 30.0, 8.0}}) {
+    table.table[refs.tilt_x_deg].value = tilt_x;
+    table.table[refs.tilt_y_deg].value = tilt_y;
+    table.table[refs.half_field_deg].value = half_field;
+    const Theta theta = table.table.values();
+    const ConeView<double> view(scene, Values<double>(theta, {}));
+    const IndependentCamera camera{tilt_x, tilt_y, half_field};
+    for (const double column : {-0.5, 17.2, 41.3, 89.5})
+      for (const double row : {-0.5, 30.9, 69.5}) {
+        const auto t = view.at(column, row);
+        const auto [x, y] = camera.on_screen((column - 41.3) / 35, (36.2 - row) / 35);
+        EXPECT_NEAR(t.x, std::tan(half) * x, 1e-14);
+        EXPECT_NEAR(t.y, std::tan(half) * y, 1e-14);
+        const auto [back_column, back_row] = view.pixel_of(t);
+        EXPECT_NEAR(back_column, column, 1e-11);
+        EXPECT_NEAR(back_row, row, 1e-11);
+        if (tilt_x == 0 && tilt_y == 0) {
+          EXPECT_EQ(t.x, plain_view.at(column, row).x);
+          EXPECT_EQ(t.y, plain_view.at(column, row).y);
+        }
+      }
   }
 }
 

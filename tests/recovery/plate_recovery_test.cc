@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "birefit/fit.h"
+#include "independent_camera.h"
 #include "independent_droplet.h"  // camera()
 #include "independent_plate.h"
 #include "scene_builder.h"
@@ -120,6 +121,51 @@ TEST(PlateFit, FourierNumberWithHotSideIsNamedAsDegenerate) {
   std::printf("  fourier %.6g +- %.2g, hot %.6g +- %.2g, correlation %.8f\n  verdict: %s\n", fo->value, fo->stderr_, hot->value,
               hot->stderr_, r.correlation.size() ? r.correlation(0, 1) : 0.0, r.verdict.c_str());
   for (const FisherDirection& d : r.directions) std::printf("  direction identifiable %d: %s\n", d.identifiable, d.words.c_str());
+}
+
+// The picture of a screen that a camera looked at from the side, by lines of sight in space and plane waves in the plate: where the camera
+// stood, how near and what it saw.
+TEST(PlateFit, ACameraAtTheSideIsFound) {
+  const IndependentCamera from{28, -15, 22};
+  constexpr double kHalfAngle = 15, kCenterX = 30.4, kCenterY = 33.1;
+  IndependentPlate plate;
+  plate.thickness_um = 100;
+  plate.prepare();
+  std::vector<double> counts;
+  const double gauss[3] = {-0.5 * std::sqrt(0.6), 0, 0.5 * std::sqrt(0.6)}, weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  for (int row = 0; row < kSize; ++row)
+    for (int column = 0; column < kSize; ++column) {
+      double sum = 0;
+      for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 3; ++i) {
+          const auto [x, y] = from.on_screen((column + gauss[i] - kCenterX) * 2 / kSize, (kCenterY - row - gauss[j]) * 2 / kSize);
+          const double edge = std::tan(kHalfAngle * M_PI / 180);
+          sum += weight[i] * weight[j] * plate.intensity(edge * x, edge * y);
+        }
+      counts.push_back(kOffset + kGain * sum);
+    }
+  FitJob job = plate_job(1, 3, 1, false);
+  TableBuilder b{job.parameters};
+  Micrograph& picture = job.micrographs[0];
+  picture.values = image_of(camera(counts, 1, 3, 2, false), kSize, kSize);
+  Plate& sample = std::get<Plate>(picture.scene.sample);
+  std::get<HeatStep>(sample.heat).fourier_number = b.fixed("fourier", kFourier);
+  b.table[b.table.find("fourier_number")].free = false;
+  sample.thickness_um = b.fixed("thin_um", 100);
+  const std::vector<std::pair<std::string, double>> truth = {{"half_angle", kHalfAngle}, {"tilt_x_deg", from.tilt_x_deg}, {"tilt_y_deg", from.tilt_y_deg}, {"half_field_deg", from.half_field_deg}, {"column", kCenterX}, {"row", kCenterY}};
+  sample.half_angle_deg = b.fitted("half_angle", 14, 12, 18);
+  picture.scene.view.camera = SideCamera{b.fitted("tilt_x_deg", 20, 5, 50), b.fitted("tilt_y_deg", -5, -40, 10), b.fitted("half_field_deg", 10, 0, 45)};
+  picture.scene.view.center_x_px = b.fitted("column", 31.5, 27, 36);
+  picture.scene.view.center_y_px = b.fitted("row", 31.5, 27, 36);
+  job.parameters = b.table;
+  const FitResult r = fit(job);
+  EXPECT_TRUE(r.has_answer()) << r.verdict;
+  EXPECT_NEAR(r.reduced_chi_square, 1, 5 * std::sqrt(2.0 / r.degrees_of_freedom));
+  for (const auto& [name, value] : truth) {
+    const ParameterEstimate* p = find_estimate(r, name);
+    std::printf("  %s %.4f +- %.2g (%.4g)\n", name.c_str(), p->value, p->stderr_, value);
+    EXPECT_LT(std::abs(p->value - value), 5 * p->stderr_) << name;
+  }
 }
 
 class LongPlateRecovery : public ::testing::TestWithParam<std::pair<double, double>> {};
