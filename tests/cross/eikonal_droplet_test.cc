@@ -396,7 +396,8 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
     const Job truth = job_of(Rays::eikonal, false);
     const Theta theta = truth.b.table.values();
     std::vector<double> counts;
-    for (const double i : render(truth.scene, plan(truth.scene, theta), theta, {}, 1).intensity.values()) counts.push_back(100 + 3000 * i);
+    const Image picture = render(truth.scene, plan(truth.scene, theta), theta, {}, 1).intensity;
+    for (const double i : picture.values()) counts.push_back(100 + 3000 * i);
     Job job = job_of(Rays::straight, true);
     Micrograph m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000), job.b.linear("offset", 100), {4, 0.5});
     for (int r = 0; r < 96; ++r)
