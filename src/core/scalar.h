@@ -180,6 +180,14 @@ BIREFIT_INLINE Pack root(const Pack& x) { return xsimd::sqrt(x); }
 BIREFIT_INLINE Pack inverse_root(const Pack& x) { return Pack(1.0) / xsimd::sqrt(x); }
 #endif
 
+template <class B, int N>
+struct Dual;
+/// Whether T is B, or what B has derivatives over.
+template <class T, class B>
+inline constexpr bool is_under = std::is_same_v<T, B>;
+template <class T, class B, int N>
+inline constexpr bool is_under<T, Dual<B, N>> = std::is_same_v<T, Dual<B, N>> || is_under<T, B>;
+
 /// Forward-mode derivative number: value and N partial derivatives, over any base scalar (nests).
 template <class B, int N>
 struct Dual {
@@ -255,6 +263,46 @@ struct Dual {
     const B one = inverse(b.value);
     const B f = B(a) * one;
     return b.chain(f, -f * one);
+  }
+  // Of the base, or of its base, the same: kernels keep what does not depend on the variable there.
+  template <class T>
+  static constexpr bool kIsBase = !std::is_same_v<T, double> && is_under<T, B>;
+  template <class T>
+    requires(kIsBase<T>)
+  BIREFIT_INLINE friend Dual operator+(const Dual& a, const T& b) {
+    Dual r = a;
+    r.value = a.value + b;
+    return r;
+  }
+  template <class T>
+    requires(kIsBase<T>)
+  BIREFIT_INLINE friend Dual operator+(const T& a, const Dual& b) {
+    return b + a;
+  }
+  template <class T>
+    requires(kIsBase<T>)
+  BIREFIT_INLINE friend Dual operator-(const Dual& a, const T& b) {
+    Dual r = a;
+    r.value = a.value - b;
+    return r;
+  }
+  template <class T>
+    requires(kIsBase<T>)
+  BIREFIT_INLINE friend Dual operator-(const T& a, const Dual& b) {
+    return -b + a;
+  }
+  template <class T>
+    requires(kIsBase<T>)
+  BIREFIT_INLINE friend Dual operator*(const Dual& a, const T& b) {
+    Dual r;
+    r.value = a.value * b;
+    for (int i = 0; i < N; ++i) r.d[i] = a.d[i] * b;
+    return r;
+  }
+  template <class T>
+    requires(kIsBase<T>)
+  BIREFIT_INLINE friend Dual operator*(const T& a, const Dual& b) {
+    return b * a;
   }
 };
 
@@ -454,7 +502,7 @@ BIREFIT_INLINE S dot(const Vec3<S>& a, const Vec3<S>& b) {
 }
 template <class S>
 BIREFIT_INLINE Vec3<S> normalized(const Vec3<S>& a) {
-  return (S(1.0) / sqrt(dot(a, a))) * a;
+  return inverse_root(dot(a, a)) * a;
 }
 
 /// std::complex is unspecified for anything but float and double.

@@ -6,6 +6,7 @@
 
 #include "medium/build.h"
 #include "render/pilots.h"
+#include "transport/magnus.h"
 
 namespace birefit {
 
@@ -45,47 +46,250 @@ S amplitude_through(const S& y1, const S& y2) {
   return 2.0 * root(y1 * y2) * inverse(y1 + y2);
 }
 
-}  // namespace
+/// How derivatives by what a ray knows make derivatives by parameters: R's derivative j is the sum over i of by[j][i] times S's derivative i.
+template <class S, class R>
+struct Directions {
+  using P = PlainOf<R>;
+  static constexpr std::size_t kFrom = static_cast<std::size_t>(ScalarTraits<S>::derivatives), kTo = static_cast<std::size_t>(ScalarTraits<R>::derivatives);
+  std::array<std::array<P, kFrom>, kTo> by;
+  Directions() {
+    for (auto& row : by)
+      for (P& x : row) x = P(0.0);
+  }
+  R operator()(const S& x) const {
+    R r(plain(x));
+    if constexpr (kFrom > 0 && kTo > 0)
+      for (std::size_t j = 0; j < kTo; ++j)
+        for (std::size_t i = 0; i < kFrom; ++i) r.d[j] = r.d[j] + by[j][i] * x.d[i];
+    return r;
+  }
+};
 
-template <class S>
-Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, const S& sa, const TransportMethod<S>& method, const Mesh& mesh,
-                   const S& p_scale) {
-  const DropletOptics<S>& d = o.sphere;
-  const Ray<S> light{d.k0, S(0.0), S(0.0), d.continuity};
-  S t_p[2] = {S(1.0), S(1.0)}, t_s[2] = {S(1.0), S(1.0)};
-  const Su2<S> retarder = with_ball_column(o, r, ca, sa, [&](const auto& column) {
-    if (d.continuity == Continuity::e_and_h) {
-      const S p_host = d.n_host * inverse(r.cos_out), s_host = d.n_host * r.cos_out;
+/// What a picture's parameters change beside the way of a ray and the director: all a ray needs to know of them is said by UniformMedium.
+template <class R>
+struct BallMedium {
+  UniformMedium<R> inside;
+  R n_o, n_e, n_host;
+  /// `unit_um`: the unit of length of the rays' columns.
+  BallMedium(const DropletOptics<R>& o, const R& unit_um) : inside{o.k0 * unit_um, o.n_o * o.n_o, o.n_e * o.n_e}, n_o(o.n_o), n_e(o.n_e), n_host(o.n_host) {}
+};
+
+/// The retarder in R of a ray in S.
+template <class S, class R>
+Su2<R> retarder_of(const Column<S>& column, Continuity continuity, const BallMedium<R>& medium, const Directions<S, R>& up, const TransportMethod<S>& method, const Mesh& mesh) {
+  const bool magnus = method.info().magnus;
+  if constexpr (ScalarTraits<R>::derivatives == 0) {
+    return magnus ? magnus_retarder<S>(method.info().order, column, continuity, medium.inside, mesh)
+                  : method.retarder(column, Ray<S>{medium.inside.k0, S(0.0), S(0.0), continuity}, mesh);
+  } else {
+    using P = PlainOf<S>;
+    using V = WithMedium<S>;
+    if constexpr (std::is_same_v<S, R>)
+      if (!magnus) return method.retarder(column, Ray<S>{medium.inside.k0, S(0.0), S(0.0), continuity}, mesh);
+    const Su2<V> u = magnus_retarder<V>(method.info().order, column, continuity, {plain(medium.inside.k0), plain(medium.inside.ordinary), plain(medium.inside.extraordinary)}, mesh);
+    Directions<V, R> all;
+    const P over = inverse(plain(medium.inside.k0));
+    constexpr std::size_t n = Directions<S, R>::kFrom;
+    for (std::size_t j = 0; j < all.by.size(); ++j) {
+      for (std::size_t i = 0; i < n; ++i) all.by[j][i] = up.by[j][i];
+      all.by[j][n] = medium.inside.k0.d[j] * over;
+      all.by[j][n + 1] = medium.inside.ordinary.d[j];
+      all.by[j][n + 2] = medium.inside.extraordinary.d[j];
+    }
+    return {all(u.w), all(u.x), all(u.y), all(u.z)};
+  }
+}
+
+/// ball_jones() of a ray in S, the derivatives of R in the medium. `p_scale`: of the field in the plane of incidence behind the sphere.
+template <class S, class R>
+Mat2<R> jones_of(const BallOptics<S>& o, const BallMedium<R>& medium, const Directions<S, R>& up, const DropletRay<S>& r, const S& ca, const S& sa, const TransportMethod<S>& method,
+                 const Mesh& mesh, const S& p_scale) {
+  R t_p[2] = {R(1.0), R(1.0)}, t_s[2] = {R(1.0), R(1.0)};
+  const Continuity continuity = o.sphere.continuity;
+  const Su2<R> retarder = with_ball_column(o, r, ca, sa, [&](const auto& column) {
+    if (continuity == Continuity::e_and_h) {
+      const R cos_out = up(r.cos_out), cos_in = up(r.cos_in), p_host = medium.n_host * inverse(cos_out), s_host = medium.n_host * cos_out;
       if (o.normal_anchoring) {  // as in droplet_jones
-        const S kappa = d.n_host * r.sin_out, inside = max_of(d.n_e * d.n_e - kappa * kappa, S(1e-14));
-        t_p[0] = t_p[1] = amplitude_through<S>(p_host, d.n_o * d.n_e * inverse_root(inside));
-        t_s[0] = t_s[1] = amplitude_through<S>(s_host, d.n_o * r.cos_in);
+        const R kappa = medium.n_host * up(r.sin_out), inside = max_of(medium.n_e * medium.n_e - kappa * kappa, R(1e-14));
+        t_p[0] = t_p[1] = amplitude_through<R>(p_host, medium.n_o * medium.n_e * inverse_root(inside));
+        t_s[0] = t_s[1] = amplitude_through<R>(s_host, medium.n_o * cos_in);
       } else {
         // The index each polarization has along the ray; what the surface couples between them is left out: of second order
         // in birefringence and in the angle of incidence.
         const double ends[2] = {0.0, 1.0};
         OpticalPoint<S> face[2];
         column.sample(ends, face);
+        const R eo = medium.inside.ordinary, de = medium.inside.extraordinary - eo;
         for (int i = 0; i < 2; ++i) {
-          const S eo = face[i].ordinary, de = face[i].extraordinary - eo;
-          const Vec3<S>& a = face[i].axis;
-          const S over = inverse(eo + de * a.z * a.z);
-          const S e_p = eo + de * a.x * a.x - de * de * a.x * a.x * a.z * a.z * over, e_s = eo + de * a.y * a.y - de * de * a.y * a.y * a.z * a.z * over;
-          t_p[i] = amplitude_through<S>(p_host, root(e_p) * inverse(r.cos_in));
-          t_s[i] = amplitude_through<S>(s_host, root(e_s) * r.cos_in);
+          const R x2 = up(S(face[i].axis.x * face[i].axis.x)), y2 = up(S(face[i].axis.y * face[i].axis.y)), z2 = up(S(face[i].axis.z * face[i].axis.z));
+          const R slant = de * z2, over = inverse(eo + slant), across = de * (1.0 - slant * over);
+          t_p[i] = amplitude_through<R>(p_host, root(eo + across * x2) * inverse(cos_in));
+          t_s[i] = amplitude_through<R>(s_host, root(eo + across * y2) * cos_in);
         }
       }
     }
-    return method.retarder(column, light, mesh);
+    return retarder_of(column, continuity, medium, up, method, mesh);
   });
-  Mat2<S> j = matrix(retarder);
-  j = {(p_scale * t_p[1] * t_p[0]) * j.a, (p_scale * t_p[1] * t_s[0]) * j.b, (t_s[1] * t_p[0]) * j.c, (t_s[1] * t_s[0]) * j.d};
+  const R p_behind = up(p_scale), c = up(ca), s = up(sa);
+  Mat2<R> j = matrix(retarder);
+  j = {(p_behind * t_p[1] * t_p[0]) * j.a, (p_behind * t_p[1] * t_s[0]) * j.b, (t_s[1] * t_p[0]) * j.c, (t_s[1] * t_s[0]) * j.d};
   // From (p, s) = (radial, azimuthal) to x, y.
-  const Mat2<S> right{ca * j.a - sa * j.b, sa * j.a + ca * j.b, ca * j.c - sa * j.d, sa * j.c + ca * j.d};
-  return {ca * right.a - sa * right.c, ca * right.b - sa * right.d, sa * right.a + ca * right.c, sa * right.b + ca * right.d};
+  const Mat2<R> right{c * j.a - s * j.b, s * j.a + c * j.b, c * j.c - s * j.d, s * j.c + c * j.d};
+  return {c * right.a - s * right.c, c * right.b - s * right.d, s * right.a + c * right.c, s * right.b + c * right.d};
+}
+
+template <class S>
+Directions<S, S> identity() {
+  Directions<S, S> r;
+  for (std::size_t j = 0; j < r.by.size(); ++j) r.by[j][j] = PlainOf<S>(1.0);
+  return r;
+}
+
+}  // namespace
+
+template <class S>
+Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, const S& sa, const TransportMethod<S>& method, const Mesh& mesh) {
+  return jones_of(o, BallMedium<S>(o.sphere, S(1.0)), identity<S>(), r, ca, sa, method, mesh, S(1.0));
 }
 
 namespace {
+
+/// Rays of one picture, with its derivatives R.
+template <class R>
+class BallRays {
+ public:
+  using P = PlainOf<R>;
+  virtual ~BallRays() = default;
+  /// Light through the sphere as it is seen at a fraction 1 - v^2 of the way to the disc's edge.
+  virtual R at_fraction(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh&) const = 0;
+  /// The same at a distance from its middle, in radii of the sphere; angle: value as in cos, sin, and how it moves.
+  virtual R at_place(const R& rho, const P& cos_azimuth, const P& sin_azimuth, const R& angle, const Mesh&) const = 0;
+};
+
+/// S: derivatives by what moves a ray or turns the director, fewer than R asks for: `up` joins the two. With `places`, its last two are by
+/// the place a ray is seen at. S = R: everything by parameters.
+template <class S, class R>
+class BallRaysIn final : public BallRays<R> {
+ public:
+  using P = PlainOf<R>;
+  BallRaysIn(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const Values<R>& all, const Directions<S, R>& up, bool places)
+      : optics_(ball_optics(scene, value)),
+        in_um_(droplet_optics(scene, all)),
+        medium_(in_um_, in_um_.radius_um),
+        light_(polarizers(scene, all)),
+        rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0), scene.microscope.objective_na),
+        method_(transport_method<S>(plan.method)),
+        aplanatic_(scene.microscope.aplanatic),
+        edge_(rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
+        up_(up),
+        places_(places) {
+    optics_.sphere.radius_um = S(1.0);  // the medium's k0 knows how long that is
+  }
+  R at_fraction(const P& v, const P& c, const P& s, const Mesh& mesh) const override { return light(edge_ * S(P(1.0) - v * v), S(c), S(s), mesh, up_); }
+  R at_place(const R& rho, const P& c, const P& s, const R& angle, const Mesh& mesh) const override {
+    if constexpr (ScalarTraits<S>::derivatives == 0) {
+      return light(S(plain(rho)), S(c), S(s), mesh, up_);
+    } else if constexpr (std::is_same_v<S, R>) {
+      return light(rho, angle.chain(c, -s), angle.chain(s, c), mesh, up_);
+    } else {
+      S place(plain(rho)), cs(c), sn(s);
+      if (!places_) return light(place, cs, sn, mesh, up_);
+      constexpr std::size_t n = Directions<S, R>::kFrom;
+      Directions<S, R> up = up_;
+      if constexpr (n >= 2) {
+        place.d[n - 2] = P(1.0), cs.d[n - 1] = -s, sn.d[n - 1] = c;
+        for (std::size_t j = 0; j < up.by.size(); ++j) up.by[j][n - 2] = rho.d[j], up.by[j][n - 1] = angle.d[j];
+      }
+      return light(place, cs, sn, mesh, up);
+    }
+  }
+
+ private:
+  R light(const S& rho, const S& c, const S& s, const Mesh& mesh, const Directions<S, R>& up) const {
+    const DropletRay<S> ray = trace(optics_.sphere, rim_, rho);
+    S tube = ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
+    if (!aplanatic_) tube = tube * inverse(ray.cos_twice);
+    const Mat2<R> j = jones_of(optics_, medium_, up, ray, c, s, method_, mesh, aplanatic_ ? S(1.0) : ray.cos_twice);
+    const Complex<R> out = light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
+    return up(tube) * norm(out);
+  }
+  BallOptics<S> optics_;
+  DropletOptics<R> in_um_;
+  BallMedium<R> medium_;
+  Polarizers<R> light_;
+  RimTable rim_;
+  const TransportMethod<S>& method_;
+  bool aplanatic_;
+  S edge_;  ///< of the disc, in radii
+  Directions<S, R> up_;
+  bool places_;
+};
+
+/// Everything that decides how a ray goes and what director it meets, in radii of the sphere.
+template <class R>
+std::vector<R> ways(const BallOptics<R>& o, const RimTable& rim) {
+  std::vector<R> list{o.sphere.ratio, rim_edge(rim, o.sphere.ratio, o.sphere.n_host)};
+  std::visit(
+      [&](const auto& field) {
+        if constexpr (requires { field.axis; }) list.insert(list.end(), {field.axis.x, field.axis.y, field.axis.z});
+        if constexpr (requires { field.pole_distance; }) list.push_back(field.pole_distance);
+        if constexpr (requires { field.field->e(); }) list.insert(list.end(), {field.field->e(), field.field->ring()});
+        if constexpr (requires { field.core; }) list.insert(list.end(), {field.offset.x, field.offset.y, field.offset.z, field.core});
+      },
+      o.field);
+  return list;
+}
+
+/// Rays with no more derivatives than they need: parameters that move none (the wavelength, the size) have no direction, those that move
+/// all alike (both indices through their ratio) share one. With `places`, rays that know how the disc moves.
+template <class R>
+std::unique_ptr<BallRays<R>> ball_rays(const Scene& scene, const RenderPlan& plan, const Values<R>& value, const BallOptics<R>& optics, const RimTable& rim, [[maybe_unused]] bool places) {
+  const auto in = [&]<class S>(const std::vector<int>& active, const Directions<S, R>& up) -> std::unique_ptr<BallRays<R>> {
+    return std::make_unique<BallRaysIn<S, R>>(scene, plan, Values<S>(value.theta(), active), value, up, places);
+  };
+  constexpr std::size_t n = static_cast<std::size_t>(ScalarTraits<R>::derivatives);
+  if constexpr (n > 0) {
+    const std::vector<R> all = ways(optics, rim);
+    const auto product = [&all](std::size_t i, std::size_t j) {
+      double sum = 0;
+      for (const R& x : all) sum += lane(x.d[i], 0) * lane(x.d[j], 0);
+      return sum;
+    };
+    std::vector<int> active;             // one parameter a direction
+    std::vector<std::size_t> of_active;  // which derivative of R it is
+    std::array<std::size_t, n> direction{};
+    std::array<double, n> by{};
+    for (std::size_t j = 0; j < value.active().size(); ++j) {
+      const double length = product(j, j);
+      if (length == 0) continue;
+      direction[j] = active.size(), by[j] = 1;
+      for (std::size_t i = 0; i < active.size(); ++i) {
+        const double along = product(j, of_active[i]) / product(of_active[i], of_active[i]);
+        double beside = 0;
+        for (const R& x : all) beside += square(lane(x.d[j], 0) - along * lane(x.d[of_active[i]], 0));
+        if (beside < 1e-24 * length) direction[j] = i, by[j] = along;
+      }
+      if (direction[j] < active.size()) continue;
+      active.push_back(value.active()[j]);
+      of_active.push_back(j);
+    }
+    const std::size_t needed = active.size() + (places ? 2 : 0);
+    const auto fewer = [&]<class S>() {
+      Directions<S, R> up;
+      for (std::size_t j = 0; j < n; ++j)
+        if (by[j] != 0) up.by[j][direction[j]] = PlainOf<R>(by[j]);
+      return in.template operator()<S>(active, up);
+    };
+    if (transport_method<R>(plan.method).info().magnus && needed < n) {
+      if (needed == 0) return in.template operator()<Pack>({}, {});
+      if constexpr (n > 1)
+        if (needed == 1) return fewer.template operator()<Dual1>();
+      if constexpr (n > 2)
+        if (needed == 2) return fewer.template operator()<Dual2>();
+    }
+  }
+  return in.template operator()<R>(value.active(), identity<R>());
+}
 
 template <class S>
 class BallImage final : public PixelModel<S> {
@@ -94,17 +298,15 @@ class BallImage final : public PixelModel<S> {
   BallImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
       : scene_(scene),
         plan_(plan),
-        value_(value),
         optics_(ball_optics(scene, value)),
         rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0), scene.microscope.objective_na),
-        method_(transport_method<S>(plan.method)),
-        aplanatic_(scene.microscope.aplanatic),
         light_(polarizers(scene, value)),
         pixel_um_(scene.view.pixel_size_um),
         center_x_(value(scene.view.center_x_px)),
         center_y_(value(scene.view.center_y_px)),
         edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
         inverse_edge_(inverse(edge_um_)),
+        inverse_radius_(inverse(optics_.sphere.radius_um)),
         map_(plan.disc) {
     std::vector<int> steps;
     for (const DiscSquare& q : plan.disc) steps.push_back(q.steps);
@@ -115,6 +317,12 @@ class BallImage final : public PixelModel<S> {
     if (meshes_.empty()) meshes_.push_back(ball_mesh(optics_, plan.steps));
     const S between = light_.px * light_.ax + light_.py * light_.ay;
     open_ = between * between;
+    bool moves = false;
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (const S* x : {&center_x_, &center_y_, &optics_.sphere.radius_um})
+        for (const P& d : x->d) moves = moves || lane(d, 0) != 0;
+    rays_of_table_ = ball_rays(scene, plan, value, optics_, rim_, false);
+    rays_ = ball_rays(scene, plan, value, optics_, rim_, moves);
     // A field along an axis in the image plane is turned into itself.
     const auto turned = [](const auto& field) {
       if constexpr (requires { field.axis; })
@@ -144,49 +352,28 @@ class BallImage final : public PixelModel<S> {
     const S within = select(inside, rho, 0.5 * edge_um_);
     return beside + select(inside, through(x, y, within, over, inside), S(0.0));
   }
-  /// What light brings that is seen at rho_um and at the azimuth, through the sphere.
-  S light(const S& rho_um, const S& cos_azimuth, const S& sin_azimuth, const Mesh& mesh) const {
-    const DropletRay<S> ray = trace(optics_.sphere, rim_, rho_um);
-    S tube = optics_.sphere.radius_um * ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
-    if (!aplanatic_) tube = tube * inverse(ray.cos_twice);
-    const Mat2<S> j = ball_jones<S>(optics_, ray, cos_azimuth, sin_azimuth, method_, mesh, aplanatic_ ? S(1.0) : ray.cos_twice);
-    const Complex<S> out = light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
-    return tube * norm(out);
-  }
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
-  /// The same at a place of a PolarTable.
-  S light_at(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh& mesh) const {
-    return light(edge_um_ * S(P(1.0) - v * v), S(cos_azimuth), S(sin_azimuth), mesh);
-  }
+  /// Light at a place of a PolarTable.
+  S light_at(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh& mesh) const { return rays_of_table_->at_fraction(v, cos_azimuth, sin_azimuth, mesh); }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture) return;
-    if constexpr (ScalarTraits<S>::derivatives > 0) {
-      // What only moves the disc does not change its light.
-      std::vector<int> shape, place;
-      for (std::size_t j = 0; j < value_.active().size(); ++j)
-        if (const int index = value_.active()[j]; index != scene_.view.center_x_px.index && index != scene_.view.center_y_px.index) {
-          shape.push_back(index);
-          place.push_back(static_cast<int>(j));
-        }
-      const auto narrow = [&]<class T>() { table_ = PolarTable<S>(BallImage<T>(scene_, plan_, Values<T>(value_.theta(), shape)).table(threads), place); };
-      constexpr int kAll = ScalarTraits<S>::derivatives;
-      if (shape.empty()) return narrow.template operator()<Pack>();
-      if constexpr (kAll > 1)
-        if (shape.size() == 1) return narrow.template operator()<Dual1>();
-      if constexpr (kAll > 2)
-        if (shape.size() == 2) return narrow.template operator()<Dual2>();
-    }
-    table_ = table(threads);
-  }
-  PolarTable<S> table(int threads) const {
-    return PolarTable<S>(plan_.disc, kGivenUp * scene_.intensity_accuracy, threads, [this](int square, const P& v, const P& c, const P& s) { return light_at(v, c, s, meshes_[mesh_of_[static_cast<std::size_t>(square)]]); });
+    table_ = PolarTable<S>(plan_.disc, kGivenUp * scene_.intensity_accuracy, threads,
+                           [this](int square, const P& v, const P& c, const P& s) { return light_at(v, c, s, meshes_[mesh_of_[static_cast<std::size_t>(square)]]); });
   }
 
  private:
   template <class Mask>
   S through(const S& x, const S& y, const S& rho_um, const S& over, const Mask& inside) const {
-    if (plan_.disc.empty()) return light(rho_um, x * over, y * over, meshes_[0]);
+    // How the angle moves; its value is not asked for.
+    const auto by_ray = [&](const Mesh& mesh) {
+      const P c = plain(x) * plain(over), s = plain(y) * plain(over);
+      S angle(P(0.0));
+      if constexpr (ScalarTraits<S>::derivatives > 0)
+        for (std::size_t j = 0; j < angle.d.size(); ++j) angle.d[j] = (c * y.d[j] - s * x.d[j]) * plain(over);
+      return rays_->at_place(rho_um * inverse_radius_, c, s, angle, mesh);
+    };
+    if (plan_.disc.empty()) return by_ray(meshes_[0]);
     P inverse_major;
     const P angle = disc::turn_of(plain(x), plain(y), inverse_major);
     const S fraction = rho_um * inverse_edge_;
@@ -209,7 +396,7 @@ class BallImage final : public PixelModel<S> {
       mesh = Pack::load_unaligned(which);
     }
     for_each_value(mesh, inside, [&](double m, const auto& here) {
-      result = select(here, light(rho_um, x * over, y * over, meshes_[static_cast<std::size_t>(m)]), result);
+      result = select(here, by_ray(meshes_[static_cast<std::size_t>(m)]), result);
       return true;
     });
     return result;
@@ -217,17 +404,15 @@ class BallImage final : public PixelModel<S> {
 
   const Scene& scene_;
   const RenderPlan& plan_;
-  Values<S> value_;
   BallOptics<S> optics_;
   RimTable rim_;
-  const TransportMethod<S>& method_;
   std::vector<Mesh> meshes_;         ///< from the fewest steps on
   std::vector<std::size_t> mesh_of_; ///< which of them, by square of the disc; none: the first
-  bool aplanatic_;
   Symmetry symmetry_ = Symmetry::none;
   Polarizers<S> light_;
   double pixel_um_;
-  S center_x_, center_y_, edge_um_, inverse_edge_, open_;
+  S center_x_, center_y_, edge_um_, inverse_edge_, inverse_radius_, open_;
+  std::unique_ptr<BallRays<S>> rays_of_table_, rays_;
   DiscMap map_;
   PolarTable<S> table_;
 };
@@ -297,7 +482,7 @@ class StepsOfSquare {
       }
       const Pack v = Pack::load_aligned(vs);
       const Pack rho = optics_.sphere.radius_um * Pack(rim_.rho_max()) * (Pack(1.0) - v * v);
-      const Mat2<Pack> j = ball_jones<Pack>(optics_, trace<Pack>(optics_.sphere, rim_, rho), Pack::load_aligned(cs), Pack::load_aligned(ss), method_, mesh, Pack(1.0));
+      const Mat2<Pack> j = ball_jones<Pack>(optics_, trace<Pack>(optics_.sphere, rim_, rho), Pack::load_aligned(cs), Pack::load_aligned(ss), method_, mesh);
       for (int k = 0; k < kLanes; ++k) {
         const auto z = [&](const Complex<Pack>& x) { return Complex<double>(lane(x.re, k), lane(x.im, k)); };
         result.push_back({z(j.a), z(j.b), z(j.c), z(j.d)});
@@ -435,7 +620,7 @@ std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderP
 #define BIREFIT_INSTANTIATE(S)                                                                                        \
   template BallOptics<S> ball_optics<S>(const Scene&, const Values<S>&);                                              \
   template Mat2<S> ball_jones<S>(const BallOptics<S>&, const DropletRay<S>&, const S&, const S&, const TransportMethod<S>&, \
-                                 const Mesh&, const S&);                                                              \
+                                 const Mesh&);                                                                        \
   template std::unique_ptr<PixelModel<S>> make_ball_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 

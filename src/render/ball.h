@@ -36,8 +36,7 @@ auto with_ball_column(const BallOptics<S>& o, const DropletRay<S>& r, const S& c
 }
 /// Jones matrix in the image's x, y with the surface's transmissions at both ends, common phase left out.
 template <class S>
-Mat2<S> ball_jones(const BallOptics<S>&, const DropletRay<S>&, const S& cos_azimuth, const S& sin_azimuth, const TransportMethod<S>&, const Mesh&,
-                   const S& p_scale);
+Mat2<S> ball_jones(const BallOptics<S>&, const DropletRay<S>&, const S& cos_azimuth, const S& sin_azimuth, const TransportMethod<S>&, const Mesh&);
 
 /// Divides the disc into squares with their own steps, and finds those that are smooth: interpolated to `target` of the incident
 /// intensity. To be called with method and samples planned; sets the error, too.

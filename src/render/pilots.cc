@@ -121,7 +121,7 @@ void Pilots::add_ball(const Scene& scene, const Values<double>& value) {
   breaks_ = std::visit([](const auto& field) { return ball_breaks(field); }, o->field);
   const auto jones = [=](double fraction, double azimuth, const TransportMethod<double>& method, const Mesh& mesh) {
     const DropletRay<double> ray = trace(o->sphere, rim, fraction * rim.rho_max() * o->sphere.radius_um);
-    return ball_jones<double>(*o, ray, std::cos(azimuth), std::sin(azimuth), method, mesh, 1.0);
+    return ball_jones<double>(*o, ray, std::cos(azimuth), std::sin(azimuth), method, mesh);
   };
   // A ray that grazes a defect takes more steps than all others, of any method: it is for the steps by place (ball.cc), no measure of a
   // method.

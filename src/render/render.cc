@@ -520,7 +520,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
         }
         if (ball) {
           const double edge = optics.radius_um * rim.rho_max();
-          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, ball_mesh(*ball, steps.at(rho / edge, x, y)), 1.0), 0, row);
+          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, ball_mesh(*ball, steps.at(rho / edge, x, y))), 0, row);
           continue;
         }
         // droplet_jones is in (p, s) = (radial, azimuthal): turn it into x, y.

@@ -32,6 +32,7 @@ struct MethodInfo {
   const char* summary;    ///< what it is, one line
   const char* source;
   bool slow_axes = false; ///< only where the axis turns slowly against the phase; more steps do not mend it
+  bool magnus = false;    ///< magnus_retarder() of the same order is its retarder()
 };
 
 template <class S>

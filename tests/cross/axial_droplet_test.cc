@@ -210,6 +210,13 @@ TEST(AxialDroplet, NeighboursLeadToTheSameEquilibrium) {
     }
 }
 
+template <class S, class T>
+T angle_from_field(const AxialField<S>& field, const T& rho, const T& z) {
+  T s, c;
+  field.director(rho, z, s, c);
+  return angle_of(s, c);
+}
+
 // d theta / d e by the implicit function theorem, on nodes that move, against the table's own.
 TEST(AxialDroplet, DerivativeByFieldAgreesWithFiniteElements) {
   const ReferenceTable table(data_path("physics/droplet_hedgehog_theta.csv"));
@@ -224,7 +231,7 @@ TEST(AxialDroplet, DerivativeByFieldAgreesWithFiniteElements) {
       field = std::make_unique<AxialField<D>>(variable, D(0.0), false);
     }
     const double r = table.number(row, "r_over_R"), polar = table.number(row, "polar_angle_deg") * kDegree;
-    const double ours = field->theta(D(r * std::sin(polar)), D(r * std::cos(polar))).d[0], theirs = table.number(row, "dtheta_de_rad");
+    const double ours = angle_from_field(*field, D(r * std::sin(polar)), D(r * std::cos(polar))).d[0], theirs = table.number(row, "dtheta_de_rad");
     worst = std::max(worst, std::abs(ours - theirs));
     largest_slope = std::max(largest_slope, std::abs(theirs));
   }
@@ -251,7 +258,7 @@ TEST(AxialDroplet, SlopesOfTheDirectorAreThoseOfDualNumbers) {
       x1.d[0] = z1.d[1] = Field(1.0);
       Second x(x1), y(z1);
       x.d[0] = y.d[1] = First(Field(1.0));
-      const Second theta = field.theta(x, y);
+      const Second theta = angle_from_field(field, x, y);
       const auto bend = field.bend(rho, z);
       const double allowed = 1e-10 / (r * r);
       EXPECT_NEAR(bend.theta, plain(theta), 1e-13);

@@ -46,25 +46,30 @@ class AxialField {
   bool has_ring() const { return has_ring_; }
   const S& ring() const { return ring_; }
 
-  /// Angle of the director from the field at (rho, z), rho >= 0, z >= 0, inside the unit sphere.
+  /// Sine and cosine of the director's angle from the field at (rho, z), rho >= 0, z > 0, inside the unit sphere; T = S or Slope<S>.
   template <class T>
-  T theta(const T& rho, const T& z) const {
-    const T boundary = axial_boundary_angle(rho, z, T(ring_));
+  void director(const T& rho, const T& z, T& n_rho, T& n_z) const {
     T rb[kPoints], vb[kPoints];
-    const P row = basis(sqrt(rho * rho + z * z), r_edges_, false, rb), column = basis(angle_of(rho, z), polar_edges_, true, vb);
+    const T polar = angle_of(rho, z);
+    const P row = basis(T(root(T(rho * rho + z * z))), r_edges_, false, rb), column = basis(polar, polar_edges_, true, vb);
     const int nodes = equilibrium_->grid.nodes();
     alignas(64) double from[kLanes];
     store(row * P(nodes) + column, from);
-    T sum(boundary);
+    T change(0.0);
     for (int i = 0; i < kPoints; ++i) {
-      T inner = vb[0] * T(gather(from, i * nodes));
-      for (int j = 1; j < kPoints; ++j) inner = inner + vb[j] * T(gather(from, i * nodes + j));
-      sum = sum + rb[i] * inner;
+      T inner = vb[0] * gather(from, i * nodes);
+      for (int j = 1; j < kPoints; ++j) inner = inner + vb[j] * gather(from, i * nodes + j);
+      change = change + rb[i] * inner;
     }
-    return sum;
+    if (!has_ring_) return sin_cos(T(polar + change), n_rho, n_z);
+    T sine, cosine, s, c;
+    axial_boundary_direction(rho, z, ring_, sine, cosine);
+    sin_cos(change, s, c);
+    n_rho = sine * c + cosine * s;
+    n_z = cosine * c - sine * s;
   }
 
-  /// The same with first and second slopes at once, term by term: a tenth of the work of duals of duals. S = double or Dual<double, N>; r > 0.
+  /// The angle itself with first and second slopes at once, term by term: a tenth of the work of duals of duals. S = double or Dual<double, N>; r > 0.
   AxialBend<ScalarTraits<S>::derivatives> bend(double rho, double z) const {
     constexpr std::size_t n = kPlanes - 1;
     const double r = std::sqrt(rho * rho + z * z), inverse_r = 1 / r, polar = std::atan2(rho, z), s = rho * inverse_r, c = z * inverse_r;
@@ -156,15 +161,15 @@ class AxialField {
   static P basis(const T& place, const std::vector<S>& edges, bool falling, T* out) {
     static const LobattoRule& rule = lobatto_rule(kPoints - 1);
     const P here = plain(place);
-    T from(edges[0]), to(edges[1]);
+    S from = edges[0], to = edges[1];
     P first(0.0);
     for (std::size_t k = 1; k + 1 < edges.size(); ++k) {
       const auto beyond = falling ? here < plain(edges[k]) : here > plain(edges[k]);
-      from = select(beyond, T(edges[k]), from);
-      to = select(beyond, T(edges[k + 1]), to);
+      from = select(beyond, edges[k], from);
+      to = select(beyond, edges[k + 1], to);
       first = select(beyond, P(static_cast<double>(k * (kPoints - 1))), first);
     }
-    const T x = 2.0 * (place - from) / (to - from) - 1.0;
+    const T x = (place - from) * S(2.0 * inverse(S(to - from))) - 1.0;
     // Products of (x - x_m) from both ends: no division by what may vanish.
     T below[kPoints], above[kPoints];
     below[0] = above[kPoints - 1] = T(1.0);
@@ -271,25 +276,26 @@ class AxialColumn final : public Column<S> {
   template <class T>
   OpticalPoint<T> at(const T& u, double where) const {
     const bool behind = where < 0.5;
-    const T x = behind ? 1.0 - 2.0 * u : 2.0 * u - 1.0, length = behind ? T(before_) : T(after_);
+    const T x = behind ? 1.0 - 2.0 * u : 2.0 * u - 1.0;
+    const S& length = behind ? before_ : after_;
     // x to [0, 1], slope `fine` at both ends; then w -> q w / (1 + q - w).
-    const T fine(fine_), q(q_);
-    const T x2 = x * x, w = fine * (x - 3.0 * x2 + 2.0 * x2 * x) + x2 * (3.0 - 2.0 * x);
-    const T slope = fine * (1.0 - 6.0 * x + 6.0 * x2) + 6.0 * (x - x2);
-    const T f = 1.0 / (q + 1.0 - w);
-    const T distance = length * q * w * f;
-    const T depth_slope = 2.0 * length * q * (q + 1.0) * f * f * slope;
-    const T s = behind ? T(equator_) - distance : T(equator_) + distance;
-    const T b(b_), sd(sd_), cd(cd_), over(inverse(radius_));
-    const T rho = (cd * b - sd * s) * over, z = (sd * b + cd * s) * over;
+    const T x2 = x * x, w = fine_ * (x - 3.0 * x2 + 2.0 * x2 * x) + x2 * (3.0 - 2.0 * x);
+    const T slope = fine_ * (1.0 - 6.0 * x + 6.0 * x2) + 6.0 * (x - x2);
+    const S end = q_ + 1.0, reach = length * q_;
+    const T f = inverse(T(end - w));
+    const T distance = reach * (w * f);
+    const T depth_slope = (2.0 * reach * end) * (f * f * slope);
+    const T s = behind ? T(equator_ - distance) : T(equator_ + distance);
+    const S over = inverse(radius_);
+    const T rho = over * (cd_ * b_ - sd_ * s), z = over * (sd_ * b_ + cd_ * s);
     // Half the droplet is known: theta is odd in rho, and the lower half mirrors the upper, n_z -> -n_z.
     const auto inward = plain(rho) < PlainOf<T>(0.0), below = plain(z) < PlainOf<T>(0.0);
     const T size = select(inward, -rho, rho) + 1e-12, height = select(below, -z, z) + 1e-12;
     T n_rho, n_z;
-    sin_cos(field_.theta(size, height), n_rho, n_z);
+    field_.director(size, height, n_rho, n_z);
     n_rho = select(inward, -n_rho, n_rho);
     n_z = select(below, -n_z, n_z);
-    return {{cd * n_rho + sd * n_z, T(0.0), cd * n_z - sd * n_rho}, T(eo_), T(ee_), T(0.0), T(0.0), depth_slope};
+    return {{cd_ * n_rho + sd_ * n_z, T(0.0), cd_ * n_z - sd_ * n_rho}, T(eo_), T(ee_), T(0.0), T(0.0), depth_slope};
   }
 
   const AxialField<S>& field_;

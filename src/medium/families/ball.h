@@ -35,11 +35,10 @@ struct BipolarField {
   S pole_distance;
   template <class T>
   Vec3<T> at(const Vec3<T>& r) const {
-    const Vec3<T> u{T(axis.x), T(axis.y), T(axis.z)};
-    const T w = r.x * u.x + r.y * u.y + r.z * u.z, a = T(pole_distance);
-    // (a^2 + rho^2 - w^2) u - 2 w rho; rho^2 = r^2 - w^2. The small number keeps the poles finite.
-    const T along = a * a + r.x * r.x + r.y * r.y + r.z * r.z - 2.0 * w * w + 1e-12;
-    return normalized(Vec3<T>{along * u.x - 2.0 * w * (r.x - w * u.x), along * u.y - 2.0 * w * (r.y - w * u.y), along * u.z - 2.0 * w * (r.z - w * u.z)});
+    // (a^2 + rho^2 - w^2) u - 2 w rho with rho = r - w u: (a^2 + r^2) u - 2 w r. The small number keeps the poles finite.
+    const T twice_w = 2.0 * (r.x * axis.x + r.y * axis.y + r.z * axis.z);
+    const T along = dot(r, r) + S(pole_distance * pole_distance + 1e-12);
+    return normalized(Vec3<T>{along * axis.x - twice_w * r.x, along * axis.y - twice_w * r.y, along * axis.z - twice_w * r.z});
   }
 };
 
@@ -50,16 +49,15 @@ struct TiltedAxialField {
   std::shared_ptr<const AxialField<S>> field;
   template <class T>
   Vec3<T> at(const Vec3<T>& r) const {
-    const Vec3<T> u{T(axis.x), T(axis.y), T(axis.z)};
-    const T z = r.x * u.x + r.y * u.y + r.z * u.z;
-    const Vec3<T> out{r.x - z * u.x, r.y - z * u.y, r.z - z * u.z};
-    const T square = out.x * out.x + out.y * out.y + out.z * out.z + 1e-18, inverse_rho = inverse_root(square);
+    const T z = r.x * axis.x + r.y * axis.y + r.z * axis.z;
+    const Vec3<T> out{r.x - z * axis.x, r.y - z * axis.y, r.z - z * axis.z};
+    const T square = dot(out, out) + 1e-18, inverse_rho = inverse_root(square);
     const auto below = plain(z) < PlainOf<T>(0.0);
     T n_rho, n_z;
-    sin_cos(field->theta(square * inverse_rho, T(select(below, -z, z) + 1e-12)), n_rho, n_z);
+    field->director(square * inverse_rho, T(select(below, -z, z) + 1e-12), n_rho, n_z);
     n_z = select(below, -n_z, n_z);
     const T f = n_rho * inverse_rho;
-    return {f * out.x + n_z * u.x, f * out.y + n_z * u.y, f * out.z + n_z * u.z};
+    return {f * out.x + n_z * axis.x, f * out.y + n_z * axis.y, f * out.z + n_z * axis.z};
   }
 };
 
@@ -71,15 +69,13 @@ struct NestedField {
   S core;
   template <class T>
   Vec3<T> at(const Vec3<T>& r) const {
-    const Vec3<T> d{T(offset.x), T(offset.y), T(offset.z)};
-    const T wall = 1.0 - T(core);
-    const T a = d.x * d.x + d.y * d.y + d.z * d.z - wall * wall;
-    const T b = 2.0 * (wall - (r.x * d.x + r.y * d.y + r.z * d.z));
+    const S wall = 1.0 - core, a = dot(offset, offset) - wall * wall;
+    const T b = wall - (r.x * offset.x + r.y * offset.y + r.z * offset.z);
     // On the surface rounding may leave c a little above zero.
-    const T c = r.x * r.x + r.y * r.y + r.z * r.z - 1.0;
-    const T root_of = b * b - 4.0 * (a * c);
-    const T s = -2.0 * c / (b + root_of * inverse_root(max_of(root_of, T(1e-30))));
-    return normalized(Vec3<T>{r.x - s * d.x, r.y - s * d.y, r.z - s * d.z});
+    const T c = dot(r, r) - 1.0;
+    const T root_of = b * b - a * c;
+    const T s = -c * inverse(T(b + root_of * inverse_root(max_of(root_of, T(1e-30)))));
+    return normalized(Vec3<T>{r.x - s * offset.x, r.y - s * offset.y, r.z - s * offset.z});
   }
 };
 
@@ -114,6 +110,8 @@ class BallColumn final : public Column<S> {
     this->breaks = ball_breaks(field);
     before_ = after_ = S(0.0);
     q_ = S(30.0);  // all but linear
+    rho_ = ray.cos_deflection * ray.impact;
+    z_ = ray.sin_deflection * ray.impact;
     if constexpr (std::is_same_v<Field, NestedField<S>>) {
       // |impact t + s k - offset| = core.
       const Vec3<S> t = rho_z(ray_.cos_deflection, ray_.sin_deflection), k = rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection);
@@ -167,22 +165,23 @@ class BallColumn final : public Column<S> {
       const T x = where < 0.25 ? 1.0 - 4.0 * u : where < 0.5 ? 4.0 * u - 1.0 : where < 0.75 ? 3.0 - 4.0 * u : 4.0 * u - 3.0;
       // The director turns on the length of the distance: steps as long as they are far, distance = passes sinh(a x).
       const RingSide& r = sides_[first ? 0 : 1];
-      const T a = outer ? T(r.outer) : T(r.inner), passes(r.passes), grown = exp(a * x), shrunk = inverse(grown);
-      const T distance = 0.5 * passes * (grown - shrunk), away = outer ? T(r.at) + distance : T(r.at) - distance;
-      return seen_at<T>(first ? -away : away, 2.0 * passes * a * (grown + shrunk) * T(ray_.radius_um));
+      const S& a = outer ? r.outer : r.inner;
+      const T grown = exp(T(a * x)), shrunk = inverse(grown);
+      const T distance = (0.5 * r.passes) * (grown - shrunk), away = outer ? T(r.at + distance) : T(r.at - distance);
+      return seen_at<T>(first ? T(-away) : away, T((2.0 * r.passes * a * ray_.radius_um) * (grown + shrunk)));
     }
-    const T x = first ? 1.0 - 2.0 * u : 2.0 * u - 1.0, from = first ? T(before_) : T(after_);
-    const T length = first ? T(ray_.half + before_) : T(ray_.half - after_), q(q_);
-    const T f = inverse(T(q + 1.0 - x));
-    const T distance = length * q * x * f;
-    const T slope = 2.0 * length * q * (q + 1.0) * f * f * T(ray_.radius_um);
-    return seen_at<T>(first ? from - distance : from + distance, slope);
+    const T x = first ? 1.0 - 2.0 * u : 2.0 * u - 1.0;
+    const S& from = first ? before_ : after_;
+    const S reach = (first ? S(ray_.half + before_) : S(ray_.half - after_)) * q_, end = q_ + 1.0;
+    const T f = inverse(T(end - x));
+    const T distance = reach * (x * f);
+    return seen_at<T>(first ? T(from - distance) : T(from + distance), T((2.0 * reach * end * ray_.radius_um) * (f * f)));
   }
   template <class T>
   OpticalPoint<T> seen_at(const T& s, const T& slope) const {
-    const T b(ray_.impact), sd(ray_.sin_deflection), cd(ray_.cos_deflection), ca(ray_.cos_azimuth), sa(ray_.sin_azimuth);
-    const T rho = cd * b - sd * s;
-    const Vec3<T> n = field_.template at<T>(Vec3<T>{rho * ca, rho * sa, sd * b + cd * s});
+    const S &sd = ray_.sin_deflection, &cd = ray_.cos_deflection, &ca = ray_.cos_azimuth, &sa = ray_.sin_azimuth;
+    const T rho = rho_ - sd * s;
+    const Vec3<T> n = field_.template at<T>(Vec3<T>{rho * ca, rho * sa, z_ + cd * s});
     const T n_rho = n.x * ca + n.y * sa;
     return {{cd * n_rho + sd * n.z, n.y * ca - n.x * sa, cd * n.z - sd * n_rho}, T(eo_), T(ee_), T(0.0), T(0.0), slope};
   }
@@ -190,6 +189,7 @@ class BallColumn final : public Column<S> {
   const Field& field_;
   BallRay<S> ray_;
   S eo_, ee_, before_, after_, q_;
+  S rho_, z_;  ///< of the ray's point nearest to the middle
   struct RingSide {
     S at = S(0.0), passes = S(0.0);     ///< distances (radii): of the closest place from the middle, of the ring from there
     S outer = S(0.0), inner = S(0.0);   ///< asinh of how many of the latter there are to the surface and to the middle
