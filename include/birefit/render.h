@@ -103,6 +103,8 @@ struct PixelRendering {
 PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
                              const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active = {},
                              int threads = 0);
+/// Whether the whole picture takes less time than these of its pixels: it has tables, symmetries, and rows in which pixels share rays.
+bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::vector<std::array<int, 2>>& pixels);
 
 /// One row of the `jones` table: complex transmission in the s, p basis of docs/conventions.md.
 struct JonesRow {

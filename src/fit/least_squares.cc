@@ -195,8 +195,7 @@ void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, in
   Frame& frame = frames_[g];
   const Scene& scene = job_.micrographs[g].scene;
   const std::vector<std::array<int, 2>>& pixels = frame.set.pixels;
-  // A whole image is cheaper by its symmetries and rows; a small part of it pixel by pixel.
-  if (2 * pixels.size() > static_cast<std::size_t>(scene.view.width) * scene.view.height) {
+  if (picture_is_cheaper(scene, plans_[g], pixels)) {
     render(scene, plans_[g], theta_, active, threads, frame.rendering);
     const Rendering& rendering = frame.rendering;
     for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {

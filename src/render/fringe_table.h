@@ -104,7 +104,7 @@ class FringeTable {
   }
 
   /// The fringes of up to `count` columns of a row of the picture from `column` on: out[field * (1 + derivatives of S) + plane][i] becomes
-  /// those of column + i, fields in the order of FringePoint. Returns of how many: up to the end of a square, 0 in one that was not asked for. Places up
+  /// those of column + i, fields in the order of FringePoint, those that fields() names. Returns of how many: up to the end of a square, 0 in one that was not asked for. Places up
   /// to the next whole number of lanes are overwritten. `scratch` belongs to this table and one thread.
   int run(int column, double row, int count, bool quadrature, FringeScratch& scratch, double* const* out) const {
     const double* line = line_at(column, row, scratch);
@@ -142,8 +142,10 @@ class FringeTable {
     return end - column;
   }
 
-  /// Fields that change with derivative plane - 1 of S, those left out to which no square owes more than rounding of it.
+  /// Fields that change with derivative plane - 1 of S, those left out to which no square owes more than rounding of it: run() does not write them.
   FringeFields fields(std::size_t plane) const { return fields_[plane]; }
+  /// None is left out, for a picture of which a part is traced.
+  void keep_all_fields() { fields_.fill(kAllFringeFields); }
   /// All squares that were asked for are there.
   bool complete() const { return std::none_of(start_.begin(), start_.end(), [](int s) { return s == kGone; }); }
 

@@ -158,7 +158,7 @@ class PlanarModel final : public PixelModel<S> {
     return table_.run(column, row, count, !in_phase(), scratch, out);
   }
   FringeFields fringe_fields(int plane) const override {
-    return left_to_rays_ || tabulated_blocks_.empty() || !table_.complete() ? kAllFringeFields : table_.fields(static_cast<std::size_t>(plane));
+    return tabulated_blocks_.empty() ? kAllFringeFields : table_.fields(static_cast<std::size_t>(plane));
   }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
   Symmetry symmetry() const override { return symmetry_; }
@@ -254,6 +254,7 @@ class PlanarModel final : public PixelModel<S> {
       const auto t = cone.at(column, row);
       return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
     });
+    if (left_to_rays_ || !table_.complete()) table_.keep_all_fields();
   }
   S intensity_of(const Mat2<S>& sample) const {
     const Mat2<S> j = compensator_ ? *compensator_ * sample : sample;

@@ -432,6 +432,35 @@ Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& the
   return image;
 }
 
+bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::vector<std::array<int, 2>>& pixels) {
+  const double all = static_cast<double>(scene.view.width) * scene.view.height, count = static_cast<double>(pixels.size());
+  if (2 * count > all) return true;
+  const bool blocks = !plan.fringe_blocks.empty(), squares = !plan.disc.empty();
+  if (pixels.empty() || plan.wave || !(blocks || squares)) return false;
+  // Rays of a pixel by itself, in the mean.
+  double rays = 0, looked_at = 0;
+  for (std::size_t i = 0; i < pixels.size(); i += 1 + pixels.size() / 256) {
+    const int n = samples_at(plan, pixels[i][0], pixels[i][1]);
+    rays += plan.fringe_means && n == 1 ? 9 : square(std::max(n, 2));
+    ++looked_at;
+  }
+  rays /= looked_at;
+  double tables = 0, left = 0;  // rays of the tables, share of the picture that has none
+  if (blocks) {
+    const double smooth = static_cast<double>(std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1));
+    tables = smooth * FringeTable<Pack>::kRays;
+    left = 1 - smooth / static_cast<double>(plan.fringe_blocks.size());
+  } else {
+    for (const DiscSquare& q : plan.disc) {
+      const auto within = [](double v) { return square(1 - v * v); };
+      if (q.smooth) tables += PolarTable<Pack>::kRays;
+      else left += (within(disc::v_in(q, 0)) - within(disc::v_in(q, 1))) / disc::sectors(q.level);
+    }
+  }
+  constexpr double kReading = 0.05;  // of a ray's time, a pixel
+  return count * rays > tables + all * (left * (plan.fringe_means ? 1 : rays) + kReading);
+}
+
 PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
                              const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
                              int threads) {

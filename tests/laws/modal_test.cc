@@ -6,6 +6,7 @@
 #include "medium/families/planar.h"
 #include "profiles.h"
 #include "render/cone_view.h"
+#include "render/fringe_table.h"
 #include "scene_builder.h"
 #include "study/answer.h"
 #include "study/rays.h"
@@ -131,6 +132,7 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
       for (const ParameterRef& ref : {scene.view.camera->tilt_x_deg, scene.view.camera->tilt_y_deg, scene.view.camera->half_field_deg}) active.push_back(ref.index);
     }
     active.push_back(scene.microscope.wavelength_nm.index);
+    const int unused = table.fixed("unused", 1).index;
     const Theta theta = table.table.values();
     const RenderPlan few = plan(scene, theta);
     EXPECT_EQ(few.method, absorbing_slab ? "modal" : "diagonal");
@@ -157,13 +159,26 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
     };
     for (std::size_t j = 0; j < active.size(); ++j) compare(a, j, j);
     // Some at a time, in any order: what the medium knows, what comes after it (polarizers, wavelength) and what moves the picture take different ways.
+    // Once from the table alone, once with every other square traced: what is left out of a table's derivatives is not what rays leave out.
+    RenderPlan mixed = few;
+    mixed.fringe_block_px = 24;
+    const FringeBlocks blocks(scene.view.width, scene.view.height, mixed.fringe_block_px);
+    mixed.fringe_blocks.clear();
+    for (int square = 0; square < blocks.count(); ++square) mixed.fringe_blocks.push_back(static_cast<std::uint8_t>((square + square / blocks.columns) % 2));
     const std::size_t wave = active.size() - 1;
     for (const std::vector<std::size_t>& some : std::vector<std::vector<std::size_t>>{
              {wave}, {3}, {wave, 0}, {2, wave}, {3, 2}, {wave, 1, 0}, {wave, 2, 0}, {4, 0, 5, 2}, {0, wave, 2, 1, 3}, {wave, 0, 1, 2, 5}}) {
       std::vector<int> list;
       for (const std::size_t j : some) list.push_back(active[j]);
-      const Rendering part = render(scene, few, theta, list);
-      for (std::size_t k = 0; k < some.size(); ++k) compare(part, k, some[k]);
+      for (const RenderPlan& p : {few, mixed}) {
+        const Rendering part = render(scene, p, theta, list);
+        for (std::size_t k = 0; k < some.size(); ++k) compare(part, k, some[k]);
+      }
+    }
+    for (const RenderPlan& p : {few, mixed}) {
+      const Rendering part = render(scene, p, theta, {unused, active[wave]});
+      const auto& none = part.derivatives[0].values();
+      EXPECT_TRUE(std::all_of(none.begin(), none.end(), [](double x) { return x == 0; }));
     }
   }
 }
