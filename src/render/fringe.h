@@ -130,21 +130,30 @@ BIREFIT_INLINE void fringe_means(int planes, const Load& load, const Fields& fie
   if (planes <= 1) return;
 
   // Backwards: by_* is the mean's derivative by *.
-  P by_zero(0.0), by_one_x(0.0), by_one_y(0.0), by_xx(0.0), by_yy(0.0), by_xy(0.0), by_bend(0.0);
-  const auto back = [&](const NinePoints<P>& f, const P& even, const P& odd) BIREFIT_INLINE_LAMBDA {
-    by_zero = by_zero + even * f.f, by_one_x = by_one_x - odd * f.x, by_one_y = by_one_y - odd * f.y;
-    by_xx = by_xx - P(0.5) * even * f.xx, by_yy = by_yy - P(0.5) * even * f.yy, by_xy = by_xy - even * f.xy;
-    by_bend = by_bend - odd * f.f;
-    return NineWeights<P>({even * zero - odd * bend, P(0.0) - odd * one_x, P(0.0) - odd * one_y, P(-0.5) * even * xx, P(0.0) - even * xy, P(-0.5) * even * yy});
+  const P half_xx = P(0.5) * xx, half_yy = P(0.5) * yy;
+  struct By {
+    P zero, one_x, one_y, xx, yy, xy, bend;
   };
-  const NineWeights<P> by_amplitude = back(amplitude, c, -s);
+  const auto back = [](const NinePoints<P>& f, const P& even, const P& odd) BIREFIT_INLINE_LAMBDA {
+    const P half = P(-0.5) * even;
+    return By{even * f.f, -odd * f.x, -odd * f.y, half * f.xx, half * f.yy, -even * f.xy, -odd * f.f};
+  };
+  const auto weights = [&](const P& even, const P& odd) BIREFIT_INLINE_LAMBDA {
+    return NineWeights<P>({even * zero - odd * bend, -odd * one_x, -odd * one_y, -even * half_xx, -even * xy, -even * half_yy});
+  };
+  By by = back(amplitude, c, -s);
+  const NineWeights<P> by_amplitude = weights(c, -s);
   [[maybe_unused]] NineWeights<P> by_quadrature;
-  if constexpr (kQuadrature) by_quadrature = back(quadrature, -s, -c);
-  by_xx = by_xx + P(0.5) * phase.xx * by_bend, by_yy = by_yy + P(0.5) * phase.yy * by_bend, by_xy = by_xy + phase.xy * by_bend;
+  if constexpr (kQuadrature) {
+    const By more = back(quadrature, -s, -c);
+    by = {by.zero + more.zero, by.one_x + more.one_x, by.one_y + more.one_y, by.xx + more.xx, by.yy + more.yy, by.xy + more.xy, by.bend + more.bend};
+    by_quadrature = weights(-s, -c);
+  }
+  const P half_bend = P(0.5) * by.bend;
+  by.xx = by.xx + phase.xx * half_bend, by.yy = by.yy + phase.yy * half_bend, by.xy = by.xy + phase.xy * by.bend;
   const P xxx = mx.third * my.m0, yyy = mx.m0 * my.third, xxy = mx.curvature * my.slope, xyy = mx.slope * my.curvature;
-  const NineWeights<P> by_phase({P(0.0) - re * s - im * c, by_zero * one_x + by_one_x * xx + by_one_y * xy + by_xx * xxx + by_yy * xyy + by_xy * xxy,
-                                 by_zero * one_y + by_one_x * xy + by_one_y * yy + by_xx * xxy + by_yy * yyy + by_xy * xyy, P(0.5) * xx * by_bend, xy * by_bend,
-                                 P(0.5) * yy * by_bend});
+  const NineWeights<P> by_phase({-(re * s + im * c), by.zero * one_x + by.one_x * xx + by.one_y * xy + by.xx * xxx + by.yy * xyy + by.xy * xxy,
+                                 by.zero * one_y + by.one_x * xy + by.one_y * yy + by.xx * xxy + by.yy * yyy + by.xy * xyy, xx * half_bend, xy * by.bend, yy * half_bend});
   for (int plane = 1; plane < planes; ++plane) {
     const FringeFields moved = fields(plane);
     P d(0.0);

@@ -63,6 +63,20 @@ P load_lanes(const double* x) {
     return *x;
 }
 
+/// load_lanes(x + shift), shift = 0, 1 or 2 and x at a register's boundary: two loads for all three, none across a cache line's end.
+template <class P>
+BIREFIT_INLINE P load_shifted(const double* x, int shift) {
+#ifdef __AVX512F__
+  if constexpr (std::is_same_v<P, Pack>) {
+    const __m512i here = _mm512_load_si512(x);
+    if (shift == 0) return _mm512_castsi512_pd(here);
+    const __m512i next = _mm512_load_si512(x + kLanes);
+    return _mm512_castsi512_pd(shift == 1 ? _mm512_alignr_epi64(next, here, 1) : _mm512_alignr_epi64(next, here, 2));
+  }
+#endif
+  return load_lanes<P>(x + shift);
+}
+
 constexpr std::array<double, kLanes> kCount = [] {
   std::array<double, kLanes> a{};
   for (int k = 0; k < kLanes; ++k) a[static_cast<std::size_t>(k)] = k;
@@ -197,7 +211,7 @@ class Band {
   void resize(int width, int planes) {
     wide_ = (static_cast<std::size_t>(width) + 2 + kLanes - 1) / kLanes * kLanes;
     plane_ = wide_ * 3;
-    points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes) + kLanes));
+    points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes) + 2 * kLanes));
     samples_.resize(wide_ * (kRows + 4));
   }
   double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(r % 3) * wide_; }
@@ -206,7 +220,7 @@ class Band {
 
  private:
   std::size_t wide_ = 0, plane_ = 0;
-  std::vector<double> points_;
+  std::vector<double, xsimd::aligned_allocator<double, 64>> points_;
   std::vector<std::uint8_t> samples_;
 };
 
@@ -275,7 +289,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       if (plan.fringe_means) {
         for (int c0 = 0; c0 < w; c0 += kStep) {
           using P = PlainOf<S>;
-          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_lanes<P>(band.row(field * kPlanes + plane, r + j) + c0 + i); };
+          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_shifted<P>(band.row(field * kPlanes + plane, r + j) + c0, i); };
           const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, images[static_cast<std::size_t>(plane)]->row(top + r) + c0, 0, std::min(kStep, w - c0)); };
           const auto fields = [&](int plane) BIREFIT_INLINE_LAMBDA { return fields_of[static_cast<std::size_t>(plane)]; };
           if (in_phase)
