@@ -15,8 +15,14 @@ struct SignalTable {
   std::string name;          ///< file name
   std::size_t first = 0;     ///< micrograph of its first row
   std::string path;          ///< parameter that its first column sets
-  std::vector<double> x;     ///< that column
+  std::vector<double> x;     ///< that column, growing
+  std::vector<int> line;     ///< of each row in the file
 };
+
+struct Config;
+/// What the rows of a config's tables say about themselves, in sentences: which stand out of their neighbours, whether what is measured depends on the
+/// way the table went.
+std::vector<std::string> describe_rows(const Config& config);
 
 /// What a config describes, read and checked completely; every mistake in it was reported at once (UserError).
 struct Config {

@@ -305,6 +305,15 @@ enum class Ceiling {
 /// render.h). What follows from the choice: docs/methods.md.
 enum class Rays { straight, eikonal };
 
+/// What the value of a pixel, or of a row of a table, is. All but the intensity: of a cell at normal incidence whose axis does not turn about the
+/// light, without polarizers and with the sign of n_e - n_o.
+enum class Quantity {
+  intensity,         ///< behind the analyser, over the incident
+  retardance_um,     ///< optical path difference
+  retardance_waves,  ///< the same over the wavelength
+  birefringence,     ///< the same over the thickness
+};
+
 struct Scene {
   Sample sample;
   Material material;
@@ -314,6 +323,7 @@ struct Scene {
   View view;
   Ceiling ceiling = Ceiling::one_way;
   Rays rays = Rays::straight;
+  Quantity quantity = Quantity::intensity;
   double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold
   std::string method = "auto";       ///< or a transport method's name
 };

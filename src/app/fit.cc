@@ -51,6 +51,7 @@ int run_fit(const Arguments& arguments) {
   if (terminal)
     job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
   FitResult result = fit(job);
+  for (std::string& words : describe_rows(config)) result.warnings.push_back(std::move(words));
   if (arguments.coverage > 0 && result.has_answer() && config.signals.empty()) {
     write_results(out, config, result);  // the audit may take hours
     folder->keep();

@@ -1398,6 +1398,37 @@ FitResult with_chosen_rays(const FitJob& job, const Fit& done, FitResult by_stra
   return better;
 }
 
+/// A prior that the data contradict may hold the fit where they are not described at all: says what they would have without it.
+void doubt_priors(const FitJob& job, FitResult& result) {
+  const auto misfit = [](const FitResult& r) {
+    double chi_square = 0, values = 0;
+    for (const MicrographResult& m : r.micrographs) chi_square += m.chi_square, values += m.used;
+    return chi_square / std::max(1.0, values - static_cast<double>(r.parameters.size()));
+  };
+  FitJob without = job;
+  int priors = 0;
+  for (int i = 0; i < without.parameters.size(); ++i)
+    if (without.parameters[i].free && without.parameters[i].prior_sd) without.parameters[i].prior_sd.reset(), ++priors;
+  constexpr double kBad = 4, kBetter = 0.1;
+  if (priors == 0 || result.interrupted || misfit(result) < kBad) return;
+  without.options.choose_rays = false;
+  FitResult free = fit(without);
+  result.seconds += free.seconds;
+  result.evaluations += free.evaluations;
+  if (free.interrupted || !free.converged || misfit(free) > kBetter * misfit(result)) return;
+  std::string words;
+  for (const ParameterEstimate& p : result.parameters) {
+    if (!p.prior_sd || !p.prior_value) continue;
+    for (const ParameterEstimate& q : free.parameters)
+      if (q.name == p.name && std::abs(q.value - *p.prior_value) > 4 * std::hypot(*p.prior_sd, q.stderr_))
+        words += fmt::format("{}{} = {:.4g} +- {:.2g} instead of {:.4g} +- {:.2g}{}", words.empty() ? "" : ", ", q.name, q.value, q.stderr_, *p.prior_value, *p.prior_sd, q.unit.empty() ? "" : " " + q.unit);
+  }
+  if (words.empty()) return;
+  result.verdict = fmt::format("Data and prior contradict each other: without the prior the data's reduced chi-square falls from {:.3g} to {:.3g}, with {}. One of the two is wrong. ", misfit(result), misfit(free), words) +
+                   result.verdict;
+  result.identifiable = false;
+}
+
 }  // namespace
 
 FitResult fit(const FitJob& job) {
@@ -1446,7 +1477,9 @@ FitResult fit(const FitJob& job) {
   if (job.branches.size() < 2) {
     Fit only(job);
     only.search(kNever);
-    return with_chosen_rays(job, only, only.finish(false));
+    FitResult result = with_chosen_rays(job, only, only.finish(false));
+    doubt_priors(job, result);
+    return result;
   }
   // A branch whose misfit on the same pixels, by the same noise, is this many times the best one's has lost.
   constexpr double kBeaten = 10;

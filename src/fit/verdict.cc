@@ -181,6 +181,7 @@ std::string verdict(const FitResult& result, bool signal) {
                                       estimate.limit_value, unit, estimate.lower, unit));
   }
   std::vector<std::string> values;
+  bool contradicted = false;
   if (signal)
     for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
       const ParameterEstimate& estimate = result.parameters[j];
@@ -188,6 +189,16 @@ std::string verdict(const FitResult& result, bool signal) {
       values.push_back(fmt::format("{} = {}{}", name_of(result, j), with_error(estimate.value, estimate.stderr_),
                                    unit_suffix(estimate)));
     }
+  for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
+    const ParameterEstimate& p = result.parameters[j];
+    if (!p.prior_value || !p.prior_sd || !std::isfinite(p.stderr_)) continue;
+    // Of the estimate less the prior's mean, the variance that both expect; where the data add little, not less than a tenth of the prior's.
+    const double expected = std::sqrt(std::max(*p.prior_sd * *p.prior_sd - p.stderr_ * p.stderr_, 0.1 * *p.prior_sd * *p.prior_sd)), away = std::abs(p.value - *p.prior_value) / expected;
+    if (!(away > 4)) continue;
+    contradicted = true;
+    sentences.push_back(fmt::format("{} contradicts what was known of it: {} instead of {}{}, {:.0f} standard deviations away. One of the two is wrong.", name_of(result, j),
+                                      with_error(p.value, p.stderr_), with_error(*p.prior_value, *p.prior_sd), unit_suffix(p), away));
+  }
   if (!values.empty()) sentences.push_back(joined(values) + " (standard errors: " + result.covariance_kind + ").");
   for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
     const ParameterEstimate& p = result.parameters[j];
@@ -197,7 +208,8 @@ std::string verdict(const FitResult& result, bool signal) {
   if (result.has_answer())
     sentences.push_back(
         fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
-                    result.reduced_chi_square > 2 ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise" : ""));
+                    result.reduced_chi_square > 2 && contradicted ? ", that contradiction included"
+                    : result.reduced_chi_square > 2 ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise" : ""));
   // The inputs whose error would be the estimates'.
   std::vector<std::string> inputs;
   for (const InputEffect& input : result.inputs) {

@@ -186,8 +186,9 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
       settings.transfer.kind = Transfer::Kind::srgb;
     }
   }
-  settings.gain = read_linear(reader, block, "gain", 1, !has_ring_table(scene));  // radii come in cm
-  settings.offset = read_linear(reader, block, "offset", 0, !has_ring_table(scene));
+  const bool scaled = !has_ring_table(scene) && scene.quantity == Quantity::intensity;  // radii come in cm, retardances as what they are
+  settings.gain = read_linear(reader, block, "gain", 1, scaled);
+  settings.offset = read_linear(reader, block, "offset", 0, scaled);
   settings.offset_automatic = reader.table[settings.offset].automatic;
   using Shape = UnevenLight::Shape;
   for (const auto& [key, of_intensity] : {std::pair("illumination", true), std::pair("background", false)}) {
@@ -749,17 +750,22 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   if (!signals.empty()) {
     const auto everywhere = [&](const std::string& path) {
       return std::all_of(signals.begin(), signals.end(), [&](const SignalItem& item) {
-        const auto names = [&](const auto& entry) { return entry.first == path; };
-        return std::any_of(item.columns.begin(), item.columns.end(), names) || std::any_of(item.set.begin(), item.set.end(), names);
+        return std::any_of(item.columns.begin(), item.columns.end(), [&](const SignalItem::Column& c) { return c.path == path; }) ||
+               std::any_of(item.set.begin(), item.set.end(), [&](const auto& entry) { return entry.first == path; });
       });
     };
-    for (const auto& [path, unused] : signals[0].columns)
-      if (everywhere(path)) reader.set_everywhere.push_back(path);
+    for (const SignalItem::Column& column : signals[0].columns)
+      if (everywhere(column.path)) reader.set_everywhere.push_back(column.path);
     for (const auto& [path, unused] : signals[0].set)
       if (everywhere(path)) reader.set_everywhere.push_back(path);
   }
   Micrograph shared;
+  const Quantity quantity = signals.empty() ? Quantity::intensity : signals[0].quantity;
+  for (const SignalItem& item : signals)
+    if (item.quantity != quantity) reader.problems.add(item.where, "every table of a config must have the same quantity");
+  reader.polarizers = quantity == Quantity::intensity;
   shared.scene = read_scene(reader, root);
+  shared.scene.quantity = quantity;
   MicrographSettings settings = read_micrograph(reader, root, shared.scene);
   if (list && settings.image)
     reader.problems.add(settings.image_where, "micrograph.image is given beside micrographs", "give one of the two");
@@ -800,6 +806,11 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     if (image) reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `signal:`");
     if (!std::holds_alternative<Cell>(shared.scene.sample) && reader.problems.empty())
       reader.problems.add(signals[0].where, "signal is for cells: every row sees the same light");
+    if (const auto* cell = std::get_if<Cell>(&shared.scene.sample); cell && quantity != Quantity::intensity) {
+      const auto* field = std::get_if<FreederickszDirector>(&cell->director);
+      if (!std::holds_alternative<UniformDirector>(cell->director) && (!field || field->twist_deg || field->pitch_um))
+        reader.problems.add(signals[0].where, "the axis of this cell turns about the light: its retardance is not one number", "quantity: intensity");
+    }
     set_view(reader, settings, 1, 1, 0, "the signal", shared.scene);
     if (reader.problems.empty()) resolve_automatic(reader, shared.scene, nullptr, nullptr, "the signal");
     for (std::size_t i = 0; i < signals.size(); ++i) {

@@ -68,6 +68,8 @@ class ConfigReader {
   std::set<std::string> misspelt;
   /// Paths that every micrograph sets for itself: the shared blocks need not give them.
   std::vector<std::string> set_everywhere;
+  /// A scene without polarizers: what it shows is the retardance itself.
+  bool polarizers = true;
   /// `physics: {rays: auto}`: the fit chooses.
   bool choose_rays = true;
   /// `physics: {ceiling: auto}` on a sphere: waves where they pay, within the time given for a fit (s).

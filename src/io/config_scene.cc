@@ -652,8 +652,8 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
 
   const Slab* slab_sample = std::get_if<Slab>(&scene.sample);
   const bool slab = slab_sample && !slab_sample->half_angle_deg;
-  microscope.polarizer_deg = polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab);
-  microscope.analyzer_deg = polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab);
+  microscope.polarizer_deg = polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab && reader.polarizers);
+  microscope.analyzer_deg = polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab && reader.polarizers);
   microscope.objective_na = reader.plain(block, "objective_na", aperture()).value_or(0);
   microscope.condenser_na = reader.plain(block, "condenser_na", aperture()).value_or(0);
   if (block.find("focus_um")) {

@@ -5,6 +5,9 @@
 #include <limits>
 #include <numeric>
 
+#include <fmt/format.h>
+
+#include "fit/rows.h"
 #include "io/table.h"
 
 namespace birefit {
@@ -35,7 +38,7 @@ double noise_of(std::vector<std::pair<double, double>> rows) {
 
 SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::string& path) {
   SignalItem item;
-  const Block block = reader.block_of(node, path, {"file", "value", "columns", "set", "every", "noise"});
+  const Block block = reader.block_of(node, path, {"file", "value", "quantity", "columns", "where", "set", "every", "noise"});
   item.where = item.file_where = block.where;
   if (!block.find("file")) reader.missing(block, "file");
   if (const auto file = reader.text(block, "file")) {
@@ -43,6 +46,9 @@ SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::stri
     item.file_where = block.find("file")->where;
   }
   item.value_column = reader.text(block, "value").value_or("signal");
+  const std::vector<std::string> quantities{"intensity", "retardance_um", "retardance_waves", "birefringence"};
+  if (const auto quantity = reader.choice(block, "quantity", quantities))
+    item.quantity = static_cast<Quantity>(std::find(quantities.begin(), quantities.end(), *quantity) - quantities.begin());
   item.every = reader.integer(block, "every", 1, 1000000).value_or(1);
   NumberSpec positive;
   positive.lower = 0;
@@ -59,12 +65,31 @@ SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::stri
   };
   if (!block.find("columns")) reader.missing(block, "columns", "parameter path: name of the column that sets it");
   pairs("columns", "parameter paths and column names", [&](const YamlEntry& entry) {
-    if (!entry.value.is_scalar()) {
-      reader.problems.add(entry.value.where, entry.key + " must be the name of a column, found " + entry.value.describe());
+    SignalItem::Column column{entry.key, entry.value.text, 1, 0, entry.where};
+    if (entry.value.is_map()) {
+      const Block map = reader.block_of(entry.value, path + ".columns." + entry.key, {"column", "scale", "plus"});
+      if (!map.find("column")) reader.missing(map, "column");
+      column.name = reader.text(map, "column").value_or("");
+      NumberSpec any;
+      column.scale = reader.plain(map, "scale", any).value_or(1);
+      column.plus = reader.plain(map, "plus", any).value_or(0);
+    } else if (!entry.value.is_scalar()) {
+      reader.problems.add(entry.value.where, entry.key + " must be the name of a column, or {column, scale, plus}, found " + entry.value.describe());
       return;
     }
-    item.columns.emplace_back(entry.key, entry.value.text);
-    item.column_where.push_back(entry.where);
+    item.columns.push_back(column);
+  });
+  pairs("where", "column names and what they must hold", [&](const YamlEntry& entry) {
+    SignalItem::Only only{entry.key, entry.value.text, {}, entry.where};
+    if (entry.value.is_sequence()) {
+      const auto number = [&](std::size_t i) { return entry.value.items[i].is_scalar() ? parse_number(entry.value.items[i].text) : std::nullopt; };
+      if (entry.value.items.size() == 2 && number(0) && number(1) && *number(0) <= *number(1)) only.range = {*number(0), *number(1)};
+    }
+    if (!only.range && !entry.value.is_scalar()) {
+      reader.problems.add(entry.value.where, entry.key + " must be a text or a range [low, high], found " + entry.value.describe());
+      return;
+    }
+    item.only.push_back(only);
   });
   pairs("set", "parameter paths", [&](const YamlEntry& entry) {
     item.set.emplace_back(entry.key, &entry.value);
@@ -103,15 +128,18 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
                    const std::function<void(Micrograph&, ParameterRef, ParameterRef)>& replace, Config& config,
                    std::vector<Micrograph>& micrographs) {
   if (item.file.empty()) return;
-  PlacedTable placed;
+  TextTable text;
   try {
-    placed = load_placed_table(reader.resolve(item.file), item.file_where, true);
+    Problems problems;
+    text = load_text_table(reader.resolve(item.file), item.file_where, problems, true);
+    problems.throw_if_any();
   } catch (const UserError& error) {
     reader.problems.add(error);
     return;
   }
   const std::string file = reader.resolve(item.file).string();
-  const auto& names = placed.table.columns;
+  std::vector<std::string> names;
+  for (const TableCell& cell : text.header) names.push_back(cell.text);
   const auto column_of = [&](const std::string& name, const Where& where) {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found != names.end()) return static_cast<int>(found - names.begin());
@@ -127,58 +155,122 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   };
   std::vector<Column> columns;
   for (std::size_t i = 0; i < item.columns.size(); ++i) {
-    const auto& [path, name] = item.columns[i];
+    const std::string& path = item.columns[i].path;
     const auto spec = reader.specs.find(path);
     if (spec == reader.specs.end()) {
       std::vector<std::string> known;
       for (const auto& [each, unused] : reader.specs) known.push_back(each);
       const std::string near = nearest_word(path, known);
-      reader.problems.add(item.column_where[i], path + " is no parameter of this config", near.empty() ? "" : "did you mean " + near + "?");
+      reader.problems.add(item.columns[i].where, path + " is no parameter of this config", near.empty() ? "" : "did you mean " + near + "?");
       continue;
     }
     if (std::any_of(item.set.begin(), item.set.end(), [&](const auto& entry) { return entry.first == path; }))
-      reader.problems.add(item.column_where[i], path + " is in columns and in set", "give one of the two");
-    columns.push_back({column_of(name, item.column_where[i]), reader.refs.at(path), &spec->second});
+      reader.problems.add(item.columns[i].where, path + " is in columns and in set", "give one of the two");
+    columns.push_back({column_of(item.columns[i].name, item.columns[i].where), reader.refs.at(path), &spec->second});
   }
-  if (value_column < 0 || columns.size() != item.columns.size() || columns.empty() ||
-      std::any_of(columns.begin(), columns.end(), [](const Column& c) { return c.at < 0; }))
+  std::vector<int> only;
+  for (const SignalItem::Only& each : item.only) only.push_back(column_of(each.column, each.where));
+  if (value_column < 0 || columns.size() != item.columns.size() || columns.empty() || std::any_of(columns.begin(), columns.end(), [](const Column& c) { return c.at < 0; }) ||
+      std::any_of(only.begin(), only.end(), [](int at) { return at < 0; }))
     return;
 
-  const auto& rows = placed.table.rows;
+  // The rows that are wanted, as numbers: the value, then what the columns set.
+  struct Row {
+    std::size_t number;  // in the file
+    double value;
+    std::vector<double> set;
+  };
+  std::vector<Row> rows;
   std::vector<std::pair<double, double>> curve;
-  for (const auto& row : rows) curve.emplace_back(row[static_cast<std::size_t>(columns[0].at)], row[static_cast<std::size_t>(value_column)]);
+  const std::size_t before = reader.problems.all().size();
+  for (std::size_t r = 0; r < text.rows.size() && reader.problems.all().size() <= before + 100; ++r) {
+    const auto cell = [&](int at) -> const TableCell& { return text.rows[r][static_cast<std::size_t>(at)]; };
+    const auto number = [&](int at) {
+      const std::optional<double> x = parse_number(cell(at).text);
+      if (x && std::isfinite(*x)) return *x;
+      reader.problems.add({file, text.lines[r], cell(at).column},
+                          names[static_cast<std::size_t>(at)] + " = " + (cell(at).text.empty() ? "nothing" : cell(at).text.substr(0, 40)) + " is not a finite number");
+      return 0.0;
+    };
+    bool wanted = true;
+    for (std::size_t i = 0; wanted && i < only.size(); ++i) {
+      if (item.only[i].range) {
+        const double x = number(only[i]);
+        wanted = x >= (*item.only[i].range)[0] && x <= (*item.only[i].range)[1];
+      } else {
+        wanted = cell(only[i]).text == item.only[i].text;
+      }
+    }
+    if (!wanted) continue;
+    Row row{r, number(value_column), {}};
+    for (std::size_t c = 0; c < columns.size(); ++c) row.set.push_back(item.columns[c].scale * number(columns[c].at) + item.columns[c].plus);
+    curve.emplace_back(row.set[0], row.value);
+    rows.push_back(std::move(row));
+  }
+  if (reader.problems.all().size() > before) return;
+  if (rows.size() < 3) {
+    reader.problems.add(item.file_where, item.file + (rows.size() < text.rows.size() ? " has fewer than three rows that `where` lets through" : " has fewer than three rows"));
+    return;
+  }
   double largest = 0;
   for (const auto& point : curve) largest = std::max(largest, std::abs(point.second));
   NoiseModel noise;  // of the whole table; one pixel cannot tell its own
   noise.read_counts = item.noise ? *item.noise : std::max(noise_of(curve), 1e-6 * largest);
-  SignalTable table{std::filesystem::path(file).filename().string(), micrographs.size(), item.columns[0].first, {}};
+  SignalTable table{std::filesystem::path(file).filename().string(), micrographs.size(), item.columns[0].path, {}, {}};
   // In the order of the first column: what neighbouring rows share is told from their order.
   std::vector<std::size_t> order(rows.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return curve[a].first < curve[b].first; });
   for (std::size_t k = 0; k < order.size(); k += static_cast<std::size_t>(item.every)) {
-    const std::size_t r = order[k];
+    const Row& row = rows[order[k]];
+    const int line = text.lines[row.number];
     Micrograph micrograph = base;
-    micrograph.name = table.name + ":" + std::to_string(placed.lines[r]);
-    micrograph.values = Image(1, 1, rows[r][static_cast<std::size_t>(value_column)]);
+    micrograph.name = table.name + ":" + std::to_string(line);
+    micrograph.values = Image(1, 1, row.value);
     micrograph.mask = Mask(1, 1, 1);
     micrograph.noise = noise;
     for (std::size_t c = 0; c < columns.size(); ++c) {
-      const std::size_t at = static_cast<std::size_t>(columns[c].at);
-      const double value = rows[r][at];
+      const double value = row.set[c];
       if (!columns[c].spec->contains(value))
-        reader.problems.add({file, placed.lines[r], placed.cell_columns[r][at]},
-                            item.columns[c].second + " = " + show(value) + " is outside " + columns[c].spec->range() + ", the range of " +
-                                item.columns[c].first);
-      const std::string name = "signal[" + std::to_string(number) + "].row[" + std::to_string(r) + "]." + item.columns[c].first;
+        reader.problems.add({file, line, text.rows[row.number][static_cast<std::size_t>(columns[c].at)].column},
+                            item.columns[c].name + " = " + show(value) + " is outside " + columns[c].spec->range() + ", the range of " + item.columns[c].path);
+      const std::string name = "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;
       replace(micrograph, columns[c].shared, reader.table.add_constant(name, value, columns[c].spec->unit));
     }
-    table.x.push_back(rows[r][static_cast<std::size_t>(columns[0].at)]);
+    table.x.push_back(row.set[0]);
+    table.line.push_back(line);
     micrographs.push_back(std::move(micrograph));
     if (reader.problems.all().size() > 100) return;  // a wrong column, said often enough
   }
   if (table.x.size() < 3) reader.problems.add(item.file_where, item.file + " has fewer than three rows");
   config.signals.push_back(std::move(table));
+}
+
+std::vector<std::string> describe_rows(const Config& config) {
+  std::vector<std::string> sentences;
+  for (const SignalTable& table : config.signals) {
+    std::vector<std::size_t> order(table.line.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.line[a] < table.line[b]; });
+    std::vector<double> x, y;
+    for (const std::size_t i : order) {
+      x.push_back(table.x[i]);
+      y.push_back(config.job.micrographs[table.first + i].values(0, 0));
+    }
+    const RowFindings found = look_at_rows(x, y);
+    if (!found.outliers.empty()) {
+      std::string lines;
+      for (std::size_t k = 0; k < std::min<std::size_t>(found.outliers.size(), 10); ++k)
+        lines += (k ? ", " : "") + std::to_string(table.line[order[found.outliers[k]]]);
+      sentences.push_back(fmt::format("{}: {} of {} rows stand out of their neighbours by eight times the scatter and more (line {}{}): take them out if they are slips.", table.name,
+                                      found.outliers.size(), y.size(), lines, found.outliers.size() > 10 ? ", .." : ""));
+    }
+    if (found.hysteretic())
+      sentences.push_back(fmt::format("{}: rows at the same {} that were taken at different times differ by {:.2g} in the median, {:.0f} times what neighbouring rows scatter: what is measured depends on "
+                                      "the way there (hysteresis, drift), and no single curve describes it.",
+                                      table.name, table.path, found.hysteresis, found.hysteresis / found.scatter));
+  }
+  return sentences;
 }
 
 }  // namespace birefit

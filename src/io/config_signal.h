@@ -16,8 +16,21 @@ struct SignalItem {
   std::string file;
   Where where, file_where;
   std::string value_column;
-  std::vector<std::pair<std::string, std::string>> columns;  ///< parameter path, column
-  std::vector<Where> column_where;
+  Quantity quantity = Quantity::intensity;
+  /// What sets a parameter: scale times a column, plus a constant (273.15 for degrees Celsius).
+  struct Column {
+    std::string path, name;
+    double scale = 1, plus = 0;
+    Where where;
+  };
+  std::vector<Column> columns;
+  /// Rows are taken where a column has this text, or a number from low to high.
+  struct Only {
+    std::string column, text;
+    std::optional<std::array<double, 2>> range;
+    Where where;
+  };
+  std::vector<Only> only;
   std::vector<std::pair<std::string, const YamlNode*>> set;
   std::vector<Where> set_where;
   int every = 1;

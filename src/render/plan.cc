@@ -18,6 +18,7 @@
 #include "render/fringe_table.h"
 #include "render/pilots.h"
 #include "render/planar.h"
+#include "render/retardance.h"
 #include "render/sampling.h"
 #include "render/series.h"
 #include "render/volume.h"
@@ -865,6 +866,8 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
       throw UserError(Where{}, "a plate with screen_distance_um needs a table of ring radii", "micrograph: {image: rings.csv}");
     result.method = "closed_form";
     result.reasons.push_back("the rings of a plate cut normal to its axis lie where the retardance is a whole number of waves: radii in closed form");
+  } else if (scene.quantity != Quantity::intensity) {
+    result = plan_retardance(scene, value);
   } else {
     result = plan_planar(scene, value);
   }
@@ -905,6 +908,7 @@ double ripple_period(const Scene& scene, const Theta& theta, int index) {
 }
 
 double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index) {
+  if (scene.quantity != Quantity::intensity) return 0;
   const std::size_t i = static_cast<std::size_t>(index);
   const double h = std::max(1e-6, 1e-5 * std::abs(theta[i]));
   Theta up = theta, down = theta;

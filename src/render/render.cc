@@ -12,6 +12,7 @@
 #include "render/fringe_table.h"
 #include "render/pixel_model.h"
 #include "render/planar.h"
+#include "render/retardance.h"
 #include "render/sampling.h"
 #include "render/series.h"
 #include "render/volume.h"
@@ -31,6 +32,7 @@ std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const Render
     if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
     if (std::holds_alternative<SampledVolume>(scene.sample)) return make_volume_model(scene, plan, value);
     if (is_ring_table(scene)) return make_ring_model(scene, value);
+    if (scene.quantity != Quantity::intensity) return make_retardance_model(scene, plan, value);
     return make_planar_model(scene, plan, value);
   }
 }

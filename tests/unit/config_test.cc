@@ -460,5 +460,40 @@ TEST_F(Config, SaysWhereASignalIsWrong) {
             std::string::npos);
 }
 
+const std::string kBirefringence = R"(signal:
+  file: a.csv
+  value: dn
+  quantity: birefringence
+  columns: {sample.material.temperature_k: {column: celsius, scale: 1, plus: 273.15}}
+  where: {kind: nematic, celsius: [0, 50]}
+sample:
+  cell: {thickness_um: 10, director: {uniform: {azimuth_deg: 0}}}
+  material: {ordinary: 1.5, birefringence: {value: 0.1, fit: [0, 0.3]}, haller: {reference_k: 298, clearing_k: 330, exponent: 0.2}, temperature_k: 300}
+microscope: {light: {wavelength_nm: 550}}
+)";
+
+// No polarizer, no gain: the table has the birefringence itself. Rows of other kinds, texts and all, are left alone.
+TEST_F(Config, TakesTheRowsAndUnitsThatASignalAsksFor) {
+  write("a.csv", "kind,celsius,dn,remark\nnematic,20,0.1,ok\nisotropic,58,0,clear\nnematic,30,0.09,\nnematic,40.5,0.08,\nnematic,52,0.01,late\nother,none,x,\n");
+  const auto config = load(kBirefringence, ConfigUse::fit);
+  ASSERT_EQ(config.job.micrographs.size(), 3u);
+  EXPECT_EQ(config.signals[0].line, (std::vector<int>{2, 4, 5}));
+  const Theta theta = config.job.parameters.values();
+  const Micrograph& last = config.job.micrographs[2];
+  EXPECT_EQ(theta[static_cast<std::size_t>(std::get<LawIndices>(last.scene.material).temperature_k.index)], 313.65);
+  EXPECT_EQ(last.scene.quantity, Quantity::birefringence);
+  EXPECT_FALSE(config.job.parameters[last.gain].free);
+  EXPECT_EQ(config.job.parameters[last.gain].value, 1);
+  EXPECT_EQ(config.job.parameters[last.offset].value, 0);
+
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "sort: nematic"), ConfigUse::fit).find("a.csv has no column sort"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "kind: smectic"), ConfigUse::fit).find("fewer than three rows that `where` lets through"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "[0, 50]", "[50, 0]"), ConfigUse::fit).find("range [low, high]"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic, ", ""), ConfigUse::fit).find("a.csv:7:7: celsius = none is not a finite number"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "quantity: birefringence", "quantity: retardance"), ConfigUse::fit).find("retardance_um"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "uniform: {azimuth_deg: 0}", "twisted: {twist_deg: 90, azimuth_deg: 0, pretilt_deg: 0}"), ConfigUse::fit).find("turns about the light"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "  quantity: birefringence\n", ""), ConfigUse::fit).find("polarizer_deg"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace birefit

@@ -1,0 +1,133 @@
+// Tables of what a cell's retardance is, and what they say about themselves.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "birefit/error.h"
+#include "birefit/render.h"
+#include "fit/rows.h"
+#include "scene_builder.h"
+
+namespace birefit {
+namespace {
+using namespace testing;
+
+struct TiltedCell {
+  TableBuilder b;
+  Scene scene;
+  ParameterRef thickness, birefringence, tilt, wavelength;
+  TiltedCell(double n_o, double dn, double tilt_deg, Quantity quantity) {
+    Cell cell;
+    cell.thickness_um = thickness = b.fixed("thickness_um", 12);
+    UniformDirector director;
+    director.azimuth_deg = b.fixed("azimuth_deg", 33);
+    director.tilt_deg = tilt = b.fixed("tilt_deg", tilt_deg);
+    cell.director = director;
+    scene.sample = cell;
+    scene.material = ConstantIndices{b.fixed("ordinary", n_o), birefringence = b.fixed("birefringence", dn)};
+    scene.surround_index = b.fixed("surround", 1);
+    scene.microscope.wavelength_nm = wavelength = b.fixed("wavelength_nm", 600);
+    scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+    scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 0);
+    scene.view.width = scene.view.height = 1;
+    scene.quantity = quantity;
+  }
+  double value() const { return value(b.table.values()); }
+  double value(const Theta& theta) const { return render(scene, plan(scene, theta), theta, {}, 1).intensity(0, 0); }
+};
+
+/// (n_eff - n_o) d of an axis at `tilt` to the layer: 1/n_eff^2 = cos^2 / n_e^2 + sin^2 / n_o^2.
+double path(double n_o, double dn, double tilt_deg, double d) {
+  const double n_e = n_o + dn, c = std::cos(tilt_deg * M_PI / 180), s = std::sin(tilt_deg * M_PI / 180);
+  return d * (1 / std::sqrt(c * c / (n_e * n_e) + s * s / (n_o * n_o)) - n_o);
+}
+
+TEST(Retardance, IsThatOfTheIndexEllipsoid) {
+  for (const double dn : {0.2, 1e-6, 0.0, -0.15})
+    for (const double tilt : {0.0, 35.0, 90.0}) {
+      const double expected = path(1.52, dn, tilt, 12), allowed = 1e-13;  // rounding of 18 um of path
+      EXPECT_NEAR(TiltedCell(1.52, dn, tilt, Quantity::retardance_um).value(), expected, allowed) << dn << " " << tilt;
+      EXPECT_NEAR(TiltedCell(1.52, dn, tilt, Quantity::retardance_waves).value(), expected / 0.6, allowed);
+      EXPECT_NEAR(TiltedCell(1.52, dn, tilt, Quantity::birefringence).value(), expected / 12, allowed);
+    }
+}
+
+TEST(Retardance, HasItsDerivatives) {
+  const TiltedCell cell(1.52, 0.2, 35, Quantity::retardance_waves);
+  const Theta theta = cell.b.table.values();
+  const std::vector<int> active{cell.thickness.index, cell.birefringence.index, cell.tilt.index, cell.wavelength.index};
+  const Rendering r = render(cell.scene, plan(cell.scene, theta), theta, active, 1);
+  for (std::size_t j = 0; j < active.size(); ++j) {
+    Theta up = theta, down = theta;
+    const std::size_t i = static_cast<std::size_t>(active[j]);
+    const double h = 1e-4 * theta[i];
+    up[i] += h, down[i] -= h;
+    const double difference = (cell.value(up) - cell.value(down)) / (2 * h);
+    EXPECT_NEAR(r.derivatives[j](0, 0), difference, 1e-6 * std::abs(difference)) << j;  // h^2 of the curvature
+  }
+}
+
+TEST(Retardance, IsNotOneNumberWhereTheAxisTurns) {
+  TiltedCell cell(1.52, 0.2, 0, Quantity::retardance_um);
+  std::get<Cell>(cell.scene.sample).director = TwistedDirector{cell.b.fixed("twist_deg", 90), cell.b.fixed("azimuth", 0), cell.b.fixed("pretilt_deg", 0)};
+  EXPECT_THROW(plan(cell.scene, cell.b.table.values()), UserError);
+}
+
+/// A table of retardances with noise, its thickness known beforehand as `prior` +- 4 um; true: 40 um.
+FitResult fitted_with_prior(double prior, double noise) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal(0, noise);
+  TiltedCell cell(1.5, 0.01, 0, Quantity::retardance_waves);
+  Parameter& thickness = cell.b.table[cell.thickness];
+  thickness.free = true, thickness.value = prior, thickness.lower = 1, thickness.upper = 5000, thickness.prior_sd = 4;
+  FitJob job;
+  const ParameterRef gain = cell.b.fixed("gain", 1), offset = cell.b.fixed("offset", 0);
+  for (int i = 0; i < 12; ++i) {
+    Scene scene = cell.scene;
+    const double nm = 450 + 20 * i;
+    scene.microscope.wavelength_nm = cell.b.fixed("wavelength" + std::to_string(i), nm);
+    job.micrographs.push_back(micrograph_of("table:" + std::to_string(i + 2), scene, {0.01 * 40 / (1e-3 * nm) + normal(random)}, gain, offset, {noise, 0}));
+  }
+  job.parameters = cell.b.table;
+  return fit(job);
+}
+
+// What is known beforehand and what the data say: in accord, at odds with the data the stronger, at odds with the prior the stronger.
+TEST(Retardance, APriorThatTheDataContradictIsNamed) {
+  const FitResult right = fitted_with_prior(43, 0.01);
+  EXPECT_TRUE(right.has_answer());
+  EXPECT_EQ(right.verdict.find("contradict"), std::string::npos) << right.verdict;
+  EXPECT_NEAR(right.parameters[0].value, 40, 4 * right.parameters[0].stderr_);
+  const FitResult by_data = fitted_with_prior(90, 0.01);
+  EXPECT_NE(by_data.verdict.find("thickness_um contradicts what was known of it"), std::string::npos) << by_data.verdict;
+  EXPECT_NEAR(by_data.parameters[0].value, 40, 2);
+  const FitResult by_prior = fitted_with_prior(700, 0.03);
+  EXPECT_NE(by_prior.verdict.find("contradict"), std::string::npos) << by_prior.verdict;
+}
+
+TEST(Rows, SlipsAndTheWayThereShow) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal(0, 0.01);
+  std::vector<double> x, same, loop;
+  for (int i = 0; i < 120; ++i) {
+    const double way = i < 60 ? i : 119 - i;
+    x.push_back(way);
+    const double curve = std::sin(0.05 * way), noise = normal(random);
+    same.push_back(curve + noise);
+    loop.push_back(curve + (i < 60 ? 0 : 0.15 * std::sin(M_PI * way / 60)) + noise);
+  }
+  EXPECT_TRUE(look_at_rows(x, same).outliers.empty());
+  EXPECT_FALSE(look_at_rows(x, same).hysteretic());
+  EXPECT_GT(look_at_rows(x, same).compared, 80);
+  EXPECT_TRUE(look_at_rows(x, loop).hysteretic());
+  same[17] += 0.3, same[90] -= 0.3;
+  EXPECT_EQ(look_at_rows(x, same).outliers, (std::vector<std::size_t>{17, 90}));
+  // One way only: nothing to compare.
+  x.resize(60), loop.resize(60);
+  EXPECT_EQ(look_at_rows(x, loop).compared, 0);
+}
+
+}  // namespace
+}  // namespace birefit
