@@ -533,10 +533,17 @@ void Fit::settle_plans() {
   for (int round = 0; round < 2 && !stopped_; ++round) {
     bool grown = false;
     for (int g = 0; g < frames_; ++g) {
-      RenderPlan now = plan(job_.micrographs[g].scene, theta_);
-      if (!asks_for_more(now, plans_[g])) continue;
-      plans_[g] = std::move(now);
-      grown = true;
+      try {
+        RenderPlan now = plan(job_.micrographs[g].scene, theta_);
+        if (!asks_for_more(now, plans_[g])) continue;
+        plans_[g] = std::move(now);
+        grown = true;
+      } catch (const UserError& error) {
+        // Bounds that each are possible need not be so together.
+        result_.identifiable = false;
+        result_.warnings.push_back("The search ended where the scene cannot be: " + error.problems().front().what + ". Narrower bounds keep it away from there.");
+        return;
+      }
     }
     if (!grown) return;
     say("the model needs finer steps here: solving once more");

@@ -385,6 +385,11 @@ auto EikonalFan<S>::Panel::place(double x) const -> Place {
 template <class S>
 void EikonalFan<S>::add(const Piece& piece, double from, double to, const Accuracy& accuracy) {
   if (std::optional<Panel> panel = panel_of(piece, from, to, accuracy)) {
+    // Where one panel goes on from another, their polynomials leave no gap between them.
+    if (!panels_.empty()) {
+      const Panel& before = panels_.back();
+      if (std::abs(plain(before.piece.psi(before.middle + before.half)) - plain(piece.psi(from))) < 1e-12) panel->outer = before.inner;
+    }
     panels_.push_back(*std::move(panel));
   } else if (accuracy.splits > 0) {
     const double middle = 0.5 * (from + to);

@@ -196,7 +196,8 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
     if (centre > target) plan.centre_panels += std::max(1, plan.centre_panels / 4);
   }
   plan.radial_panels = 0;
-  plan.reasons.push_back("the picture has too few pixels for a table over the radius: one ray a point");
+  plan.reasons.push_back(scene.rays == Rays::eikonal ? "no table over the radius: curved rays of either mode end where the other's do not, and at the aperture; one ray a point"
+                                                     : "the picture has too few pixels for a table over the radius: one ray a point");
 }
 
 /// Retardance phase (rad) of the ball's ray that is seen at (rho, azimuth), as if its modes did not couple.
@@ -677,9 +678,10 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
     std::vector<double> gradient(25);
     for (int i = 0; i <= 24; ++i)
       for (int k = 0; k < 12; ++k) {
-        const double r = bins * i / 24.0, a = k * kPi / 6, x = cx + r * std::cos(a), y = cy - r * std::sin(a);
-        // Seen from the side there may be no screen outside the picture.
-        if (scene.view.camera && (x < -1 || y < -1 || x > scene.view.width || y > scene.view.height)) continue;
+        const double r = bins * i / 24.0, a = k * kPi / 6;
+        double x = cx + r * std::cos(a), y = cy - r * std::sin(a);
+        // Seen from the side there may be no screen outside the picture: there its edge, which ends in its corners, stands for what lies beyond.
+        if (scene.view.camera) x = std::clamp(x, 0.0, scene.view.width - 1.0), y = std::clamp(y, 0.0, scene.view.height - 1.0);
         const auto phase = [&](double column, double row) {
           const auto t = view.at(column, row);
           return planar_phase(o, t.x, t.y, 24);

@@ -265,13 +265,12 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
             continue;
           }
         }
-        const int count = std::min(kStep, wide - c0);
-        if (!needed.any(c0, count)) continue;
+        if (!needed.any(c0, std::min(kStep, wide - c0))) continue;
         const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), row(top + r - 1.0);
         const auto put = [&](const S& v, int field) {
           Targets out;
           for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
-          store(v, out, kPlanes, 0, count);
+          store(v, out, kPlanes, 0, kStep);  // rows have room: what is left over from another picture would steer whole registers
         };
         if (plan.fringe_means) {
           const FringePoint<S> v = model->fringe(column, row);

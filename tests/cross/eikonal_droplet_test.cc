@@ -499,5 +499,16 @@ TEST(EikonalDroplet, PicturesHaveTheirDerivatives) {
   expect_picture_gradients(job.scene, job.b.table, {job.birefringence.index, axial.reduced_field.index, d.diameter_um.index, job.scene.view.center_x_px.index}, 4.5, 2e-3, 2e-3);
 }
 
+// Panels of a fan meet: near image radii at which neighbours once left a gap of a millionth, where it was dark.
+TEST(EikonalDroplet, PanelsOfAFanLeaveNoGap) {
+  struct Seam {
+    double e, ring, rho;
+  };
+  for (const Seam& c : {Seam{6, 0.5, 0.4894114}, {20, 0, 0.8729129}, {2, 0.2, 0.2036611}, {2, 0.2, 0.5227348}, {8, 0.9, 0.9243815}}) {
+    const EikonalFan<double> fan(in_field<double>(1.52, 1.74, 1.52, c.e, c.ring, c.ring > 0), true, 0);
+    for (int k = -300; k <= 300; ++k) EXPECT_GT(fan.at(c.rho + 1e-8 * k).amplitude, 0.1) << c.e << " " << c.ring << " " << c.rho + 1e-8 * k;
+  }
+}
+
 }  // namespace
 }  // namespace birefit

@@ -244,5 +244,49 @@ TEST(FringeTable, SquaresThatAreNoLongerSmoothAreLeftToRays) {
   }
 }
 
+// A pixel's samples follow the phase's slope where the pixel is, in the corners, too, where a camera at the side looks at the screen most aslant.
+TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
+  TableBuilder table;
+  Scene scene;
+  scene.view.width = scene.view.height = 120;
+  scene.microscope.polarizer_deg = table.fixed("polarizer_deg", 0);
+  scene.microscope.analyzer_deg = table.fixed("analyzer_deg", 90);
+  put_tilted_plate(table, scene);
+  table.table[std::get<Plate>(scene.sample).thickness_um].value = 600;
+  table.table[std::get<Plate>(scene.sample).half_angle_deg].value = 30;
+  scene.view.camera = SideCamera{table.fixed("tilt_x_deg", 20), table.fixed("tilt_y_deg", 0), table.fixed("half_field_deg", 10)};
+  scene.method = "magnus4";
+  const Theta theta = table.table.values();
+  const RenderPlan planned = plan(scene, theta);
+  RenderPlan fine = planned;
+  fine.samples = {8};
+  const Image picture = render(scene, planned, theta).intensity, truth = render(scene, fine, theta).intensity;
+  double worst = 0;
+  for (std::size_t i = 0; i < picture.size(); ++i) worst = std::max(worst, std::abs(picture.values()[i] - truth.values()[i]));
+  EXPECT_LT(worst, scene.intensity_accuracy);
+}
+
+// The same bits whatever was rendered before, at widths that are no multiple of the lanes, by the same thread.
+TEST(FringeTable, PicturesDoNotDependOnTheOnesBefore) {
+  TableBuilder table;
+  Scene scene;
+  scene.view.width = 101, scene.view.height = 40;
+  scene.microscope.polarizer_deg = table.fixed("polarizer_deg", 10);
+  scene.microscope.analyzer_deg = table.fixed("analyzer_deg", 95);
+  const auto [birefringence, tilt] = put_tilted_plate(table, scene);
+  Theta theta = table.table.values();
+  RenderPlan rays = plan(scene, theta);
+  ASSERT_TRUE(rays.fringe_means);
+  rays.fringe_block_px = 0;
+  rays.fringe_blocks.clear();
+  const Image before = render(scene, rays, theta, {}, 1).intensity;
+  Scene other = scene;
+  other.view.width = 109;
+  Theta steep = theta;
+  steep[static_cast<std::size_t>(std::get<Plate>(scene.sample).half_angle_deg.index)] = 30;
+  render(other, rays, steep, {}, 1);
+  EXPECT_EQ(render(scene, rays, theta, {}, 1).intensity.values(), before.values());
+}
+
 }  // namespace
 }  // namespace birefit
