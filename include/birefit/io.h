@@ -17,6 +17,7 @@ struct SignalTable {
   std::string path;          ///< parameter that its first column sets
   std::vector<double> x;     ///< that column, growing
   std::vector<int> line;     ///< of each row in the file
+  std::string quantity = "signal";  ///< what was measured, for its axis
 };
 
 struct Config;

@@ -217,6 +217,12 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   NoiseModel noise;  // of the whole table; one pixel cannot tell its own
   noise.read_counts = item.noise ? *item.noise : std::max(noise_of(curve), 1e-6 * largest);
   SignalTable table{std::filesystem::path(file).filename().string(), micrographs.size(), item.columns[0].path, {}, {}};
+  switch (item.quantity) {
+    case Quantity::intensity: break;
+    case Quantity::retardance_um: table.quantity = "retardance (\u00b5m)"; break;
+    case Quantity::retardance_waves: table.quantity = "retardance (waves)"; break;
+    case Quantity::birefringence: table.quantity = "birefringence"; break;
+  }
   // In the order of the first column: what neighbouring rows share is told from their order.
   std::vector<std::size_t> order(rows.size());
   std::iota(order.begin(), order.end(), std::size_t{0});

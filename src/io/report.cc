@@ -422,12 +422,13 @@ std::string signal_section(const SignalTable& table, const FitResult& result, in
   const auto [low, high] = std::minmax_element(measured.begin(), measured.end());
   const double rms = std::sqrt(squares / static_cast<double>(order.size()));
   Chart chart;
-  chart.title = "signal";
+  chart.title = table.quantity;
   chart.x_label = table.path;
-  if (x.back() > x.front()) chart.x_range = {x.front(), x.back()};
-  const double dot = x.size() > 150 ? 2.8 : 3.6;
+  const double beside = 0.02 * (x.back() - x.front());  // a dot at the end is seen whole
+  if (beside > 0) chart.x_range = {x.front() - beside, x.back() + beside};
+  const double dot = x.size() > 150 ? 2.8 : x.size() > 30 ? 3.6 : 6;
   Panel values;
-  values.y_label = "signal";
+  values.y_label = table.quantity;
   values.height = 230;
   values.series.push_back({Series::Kind::points, "measured", x, measured, kMeasured, dot});
   values.series.push_back({Series::Kind::line, "fitted", x, fitted, kFitted, 1.5});
@@ -441,9 +442,9 @@ std::string signal_section(const SignalTable& table, const FitResult& result, in
   residuals.series.push_back({Series::Kind::points, "", x, whitened, kMeasured, dot});
   chart.panels = {values, residuals};
   return "<h3>" + escape_html(table.name) + "</h3>\n<figure>\n" + wide_and_narrow(chart) +
-         fmt::format("<figcaption><b>Figure {}.</b> Measured and fitted signal of {} rows; residual rms {} ({} of the signal\u2019s spread). Below, the "
+         fmt::format("<figcaption><b>Figure {}.</b> Measured and fitted {} of {} rows; residual rms {} ({} of the signal\u2019s spread). Below, the "
                      "residual in units of its noise \u03c3.</figcaption>\n</figure>\n",
-                     figure++, order.size(), plain(rms), *high > *low ? format_percent(rms / (*high - *low)) : "\u2013");
+                     figure++, escape_html(table.quantity), order.size(), plain(rms), *high > *low ? format_percent(rms / (*high - *low)) : "\u2013");
 }
 
 /// The table that this micrograph is a row of, but not its first: what was said of the first holds.

@@ -180,5 +180,52 @@ void check_propagation(int draws, double largest_um, int size, double least_shar
 TEST(WaveRecovery, TruthIsInsideTheInterval) { check_propagation(2, 4, 48, 0.5); }
 TEST(LongWaveRecovery, TruthIsInsideTheInterval) { check_propagation(60, 12, 64, 0.9); }
 
+// Where the choice is free, the exact series, which costs no more than rays: it finds the truth.
+TEST(ChoosingWaves, TheSeriesIsTakenWhereTheChoiceIsFree) {
+  const WaveDraw d = draw(3, 4, 48);
+  FitJob job = d.job(Ceiling::one_way, "auto");
+  job.options.choose_waves = true;
+  const FitResult r = fit(job);
+  EXPECT_TRUE(r.has_answer()) << r.verdict;
+  EXPECT_EQ(r.micrographs[0].plan.physics, "wave");
+  for (const auto& [name, truth] : {std::pair{"birefringence", d.birefringence}, {"diameter_um", d.diameter}}) {
+    const ParameterEstimate* p = find_estimate(r, name);
+    EXPECT_LT(std::abs(p->value - truth), 4 * p->stderr_) << name;
+  }
+}
+
+// What a fit may take is the user's to say; rays in place of waves are named.
+TEST(ChoosingWaves, NotWhereItWouldTakeTooLong) {
+  FitJob job = draw(3, 4, 48).job(Ceiling::one_way, "auto");
+  job.options.choose_waves = true;
+  job.options.max_seconds = 1e-6;
+  const FitResult r = fit(job);
+  EXPECT_EQ(r.micrographs[0].plan.physics, "one_way");
+  EXPECT_TRUE(std::any_of(r.warnings.begin(), r.warnings.end(), [](const std::string& w) { return w.find("rays are taken instead") != std::string::npos; }));
+}
+
+// By how much rays are off is foretold from the picture alone: a fit by rays to the waves of what it found returns what it lost, with the right sign.
+// It is first order in that loss: where rays are off by percents, it may fall far short of it.
+TEST(ChoosingWaves, RaysForetellTheirBias) {
+  int told = 0;
+  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+    const WaveDraw d = draw(seed, 5, 48);
+    const FitResult r = fit(d.job(Ceiling::one_way, "auto"));
+    for (const std::string& w : r.warnings) {
+      const std::size_t at = w.find("rays return "), off = w.find(" off by ");
+      if (w.find("Rays are not the image") == std::string::npos || at == std::string::npos || off == std::string::npos) continue;
+      const std::string name = w.substr(at + 12, off - at - 12);
+      const double foretold = std::stod(w.substr(off + 8)), truth = name == "birefringence" ? d.birefringence : d.diameter;
+      const ParameterEstimate* p = find_estimate(r, name);
+      const double bias = p->value - truth;
+      std::printf("  %u %s: off by %+.4g, foretold %+.4g, standard error %.2g\n", seed, name.c_str(), bias, foretold, p->stderr_);
+      EXPECT_GT(foretold * bias, 0) << name;
+      EXPECT_LT(std::abs(foretold), 1.5 * std::abs(bias)) << name;
+      ++told;
+    }
+  }
+  EXPECT_GE(told, 3);
+}
+
 }  // namespace
 }  // namespace birefit
