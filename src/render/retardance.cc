@@ -47,12 +47,13 @@ RenderPlan plan_retardance(const Scene& scene, const Values<double>& value) {
   plan.method = "diagonal";
   // The two indices' difference is what is asked for: relative to itself, of whatever sign and size.
   constexpr int kMost = 4096;
-  double before = path_um(*optics.column, plan.steps = 1);
-  for (double change = 1; plan.steps < kMost && change > 1e-12;) {
-    const double now = path_um(*optics.column, plan.steps *= 2);
-    change = std::abs(now - before) / std::max(std::abs(now), 1e-300);
-    plan.numerical_error = change;
-    before = now;
+  plan.steps = 1;
+  for (double now = path_um(*optics.column, 1);;) {
+    const double finer = path_um(*optics.column, 2 * plan.steps);
+    plan.numerical_error = std::abs(finer - now) / std::max(std::abs(finer), 1e-300);
+    if (plan.numerical_error <= 1e-12 || plan.steps == kMost) break;
+    plan.steps *= 2;
+    now = finer;
   }
   plan.reasons.push_back(fmt::format("the retardance itself is asked for: the integral of the difference of the indices, {} nodes", 8 * plan.steps));
   return plan;

@@ -2,11 +2,18 @@
 // What the exponential integrators of order 4 and 6 share: their nodes, their exponents, and products of retarders with derivatives.
 
 #include <array>
+#include <stdexcept>
 #include <vector>
 
 #include "transport/method.h"
 
 namespace birefit {
+
+/// transfer() is not compiled for scalars that serve tables alone (method.h): those read retarder() or the transfers of the modes, and its eight derivatives
+/// would take minutes to compile.
+template <class S>
+inline constexpr bool kHasTransfer = ScalarTraits<S>::derivatives <= 4;
+[[noreturn]] inline void refuse_transfer_of_tables() { throw std::logic_error("a picture of more than four derivatives is read from tables, which need no transfer"); }
 
 /// The Gauss nodes of every step of the mesh used last by this thread: every ray of an image asks for the same. Nodes = 2 or 3.
 template <int Nodes>

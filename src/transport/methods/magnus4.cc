@@ -16,29 +16,33 @@ const MethodInfo& Magnus4<S>::info() const {
 
 template <class S>
 Mat2<S> Magnus4<S>::transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const {
-  const std::vector<double>& u = magnus_nodes<2>(mesh);
-  thread_local std::vector<Mat2<S>> generator;
-  generator.resize(u.size());
-  if (ray.continuity == Continuity::e_and_h) {
-    thread_local std::vector<OpticalPoint<Slope<S>>> points;
-    points.resize(u.size());
-    column.sample_with_slope(u, points.data());
-    for (std::size_t i = 0; i < u.size(); ++i)
-      generator[i] = generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky, !column.absorbing);
+  if constexpr (!kHasTransfer<S>) {
+    refuse_transfer_of_tables();
   } else {
-    thread_local std::vector<OpticalPoint<S>> points;
-    points.resize(u.size());
-    column.sample(u, points.data());
-    for (std::size_t i = 0; i < u.size(); ++i)
-      generator[i] = generator_e_only(points[i], ray.k0_per_um, ray.kx, ray.ky, !column.absorbing);
+    const std::vector<double>& u = magnus_nodes<2>(mesh);
+    thread_local std::vector<Mat2<S>> generator;
+    generator.resize(u.size());
+    if (ray.continuity == Continuity::e_and_h) {
+      thread_local std::vector<OpticalPoint<Slope<S>>> points;
+      points.resize(u.size());
+      column.sample_with_slope(u, points.data());
+      for (std::size_t i = 0; i < u.size(); ++i)
+        generator[i] = generator_e_and_h(points[i], ray.k0_per_um, ray.kx, ray.ky, !column.absorbing);
+    } else {
+      thread_local std::vector<OpticalPoint<S>> points;
+      points.resize(u.size());
+      column.sample(u, points.data());
+      for (std::size_t i = 0; i < u.size(); ++i)
+        generator[i] = generator_e_only(points[i], ray.k0_per_um, ray.kx, ray.ky, !column.absorbing);
+    }
+    Mat2<S> total = Mat2<S>::identity();
+    for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
+      const Mat2<S> a[2] = {generator[2 * i], generator[2 * i + 1]};
+      total = exp(magnus_exponent(mesh[i + 1] - mesh[i], a)) * total;
+      if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
+    }
+    return checked_transfer(kInfo, total);
   }
-  Mat2<S> total = Mat2<S>::identity();
-  for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
-    const Mat2<S> a[2] = {generator[2 * i], generator[2 * i + 1]};
-    total = exp(magnus_exponent(mesh[i + 1] - mesh[i], a)) * total;
-    if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
-  }
-  return checked_transfer(kInfo, total);
 }
 
 template <class S>
