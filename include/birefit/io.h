@@ -21,8 +21,8 @@ struct SignalTable {
 };
 
 struct Config;
-/// What the rows of a config's tables say about themselves, in sentences: which stand out of their neighbours, whether what is measured depends on the
-/// way the table went.
+/// What the rows of a config's tables say about themselves, in sentences: which stand out of their neighbours, whether what is measured depends on when
+/// it was measured.
 std::vector<std::string> describe_rows(const Config& config);
 
 /// What a config describes, read and checked completely; every mistake in it was reported at once (UserError).

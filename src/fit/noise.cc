@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/robust.h"
+
 namespace birefit::estimation {
 namespace {
 
@@ -14,12 +16,6 @@ constexpr double kQuantisation = 1.0 / 12;
 /// Value per count: 1, or 1 / (parallel - dark) where calibration frames turned counts into transmission.
 double value_per_count(const Micrograph& micrograph, int x, int y) {
   return micrograph.variance_scale.empty() ? 1.0 : std::sqrt(micrograph.variance_scale(x, y));
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 struct Sample {
@@ -106,7 +102,6 @@ NoiseModel estimate_noise(const Micrograph& micrograph, const Image* fitted) {
     absolute[bin].push_back(std::abs(sample.difference));
     signal_sum[bin] += sample.signal;
   }
-  constexpr double kNormalSdPerMad = 1.482602218505602;
   for (std::size_t i = 0; i < number; ++i) {
     if (absolute[i].size() < std::min<std::size_t>(30, samples.size())) continue;
     const double count = static_cast<double>(absolute[i].size());

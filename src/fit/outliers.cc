@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/robust.h"
+
 namespace birefit::estimation {
 namespace {
 
@@ -43,12 +45,7 @@ Image local_scale(const Image& z, const Mask& used) {
       for (int y = std::max(0, top - kTile / 2); y < std::min(h, top + kTile + kTile / 2); ++y)
         for (int x = std::max(0, left - kTile / 2); x < std::min(w, left + kTile + kTile / 2); ++x)
           if (used(x, y)) values.push_back(std::abs(z(x, y)));
-      double deviation = 1;
-      if (!values.empty()) {
-        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
-        deviation = std::max(1.0, 1.4826 * *middle);
-      }
+      const double deviation = std::max(1.0, kNormalSdPerMad * median(values));
       for (int y = top; y < std::min(h, top + kTile); ++y)
         for (int x = left; x < std::min(w, left + kTile); ++x) scale(x, y) = deviation;
     }

@@ -4,18 +4,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/robust.h"
+
 namespace birefit {
-namespace {
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
-
 RowFindings look_at_rows(const std::vector<double>& x, const std::vector<double>& y) {
   RowFindings found;
   const std::size_t n = y.size();
@@ -35,7 +26,7 @@ RowFindings look_at_rows(const std::vector<double>& x, const std::vector<double>
     off[i] = y[i] - median(heights);
     size[i] = std::abs(off[i]);
   }
-  found.scatter = 1.4826 * median(size);
+  found.scatter = kNormalSdPerMad * median(size);
   // A table without noise has no outliers: what its curve does between nine rows is not known. Where a curve bends, its neighbours are off as well.
   for (std::size_t i = 0; i < n; ++i) {
     std::vector<double> beside;

@@ -6,15 +6,17 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/robust.h"
+
 namespace birefit {
 namespace {
 
-constexpr double kMadToSd = 1.4826;       // of a normal distribution
 constexpr double kOutlierSd = 8;          // one normal pixel in 1e15 lies beyond
 constexpr double kPileUpFraction = 0.002;
 constexpr int kPileUpPixels = 20;
@@ -23,14 +25,6 @@ constexpr int kPileUpPixels = 20;
 constexpr double kPileUpRatio = 4;
 /// More than half of the pixels at the top is a bright flat image rather than a clipped one.
 constexpr double kPileUpMostly = 0.5;
-
-double median_of(std::vector<double>& values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 }  // namespace
 
@@ -129,7 +123,7 @@ int exclude_outliers(const Image& values, const PixelRect& area, double smallest
     const std::size_t begin = pixels.size() * g / groups, end = pixels.size() * (g + 1) / groups;
     distances.clear();
     for (std::size_t i = begin; i < end; ++i) distances.push_back(std::abs(pixels[i].difference));
-    const double sd = std::max(kMadToSd * median_of(distances), smallest_step);
+    const double sd = std::max(kNormalSdPerMad * median(distances), smallest_step);
     for (std::size_t i = begin; i < end; ++i) {
       const Pixel& pixel = pixels[i];
       if (!(std::abs(pixel.difference) > kOutlierSd * sd)) continue;
@@ -169,9 +163,13 @@ RobustSpread robust_spread(const Image& values, const Mask& mask, const PixelRec
       if (mask(x, y) && std::isfinite(values(x, y))) used.push_back(values(x, y));
   RobustSpread spread;
   spread.count = static_cast<int>(used.size());
-  spread.median = median_of(used);
+  if (used.empty()) {
+    spread.median = spread.sd = std::numeric_limits<double>::quiet_NaN();
+    return spread;
+  }
+  spread.median = median(used);
   for (double& value : used) value = std::abs(value - spread.median);
-  spread.sd = kMadToSd * median_of(used);
+  spread.sd = kNormalSdPerMad * median(std::move(used));
   return spread;
 }
 

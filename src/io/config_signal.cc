@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "core/robust.h"
 #include "fit/rows.h"
 #include "io/table.h"
 
@@ -29,9 +31,7 @@ double noise_of(std::vector<std::pair<double, double>> rows) {
     if (order % 2 || (order > 2 && difference.size() < 8 * order)) continue;
     std::vector<double> size;
     for (const double d : difference) size.push_back(std::abs(d));
-    const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-    std::nth_element(size.begin(), middle, size.end());
-    least = std::min(least, 1.482602218505602 * *middle / std::sqrt(variance));
+    least = std::min(least, kNormalSdPerMad * median(std::move(size)) / std::sqrt(variance));
   }
   return std::isfinite(least) ? least : 0;
 }

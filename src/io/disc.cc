@@ -8,19 +8,12 @@
 #include <opencv2/imgproc.hpp>
 
 #include "birefit/io.h"
+#include "core/robust.h"
 
 namespace birefit {
 namespace {
 
 constexpr int kWorkingSide = 512;    // larger images are box-averaged: a centre to 1/10 of a working pixel is plenty
-constexpr double kMadToSd = 1.4826;  // of a normal distribution
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct Field {
   cv::Mat1d value;
@@ -55,7 +48,7 @@ double noise_sd(const Field& field) {
     for (int x = 1; x + 1 < field.value.cols; ++x)
       if (field.used(y, x - 1) && field.used(y, x) && field.used(y, x + 1))
         differences.push_back(std::abs(field.value(y, x) - 0.5 * (field.value(y, x - 1) + field.value(y, x + 1))));
-  return kMadToSd * median(std::move(differences)) / std::sqrt(1.5);
+  return kNormalSdPerMad * median(std::move(differences)) / std::sqrt(1.5);
 }
 
 /// A plane through the background, refitted a few times to the pixels near it; it starts from the image's border, where
@@ -71,7 +64,7 @@ std::array<double, 3> background_plane(const Field& field, double noise) {
   std::array<double, 3> plane = {median(rim), 0, 0};  // value, slope per half width, slope per half height
   std::vector<double> deviations;
   for (const double value : rim) deviations.push_back(std::abs(value - plane[0]));
-  double tolerance = std::max(3 * kMadToSd * median(std::move(deviations)), 3 * noise);
+  double tolerance = std::max(3 * kNormalSdPerMad * median(std::move(deviations)), 3 * noise);
   const auto at = [&](double x, double y) {
     return plane[0] + plane[1] * (2 * x / width - 1) + plane[2] * (2 * y / height - 1);
   };
@@ -97,7 +90,7 @@ std::array<double, 3> background_plane(const Field& field, double noise) {
     for (int i = 0; i < 3; ++i) normal(i, i) += ridge;
     const cv::Vec3d solution = normal.solve(right, cv::DECOMP_CHOLESKY);
     plane = {solution[0], solution[1], solution[2]};
-    tolerance = std::max(3 * kMadToSd * median(std::move(residuals)), 3 * noise);
+    tolerance = std::max(3 * kNormalSdPerMad * median(std::move(residuals)), 3 * noise);
   }
   return plane;
 }
@@ -125,7 +118,7 @@ Circle fit_circle(std::vector<cv::Point2d> points, Circle start) {
     std::vector<double> distances;
     for (const cv::Point2d& p : points)
       distances.push_back(std::abs(std::hypot(p.x - circle.x, p.y - circle.y) - circle.radius));
-    const double limit = std::max(1.0, 2.5 * kMadToSd * median(distances));
+    const double limit = std::max(1.0, 2.5 * kNormalSdPerMad * median(distances));
     std::vector<cv::Point2d> kept;
     for (std::size_t i = 0; i < points.size(); ++i)
       if (distances[i] <= limit) kept.push_back(points[i]);

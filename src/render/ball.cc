@@ -174,8 +174,7 @@ class BallRaysIn final : public BallRays<R> {
   using P = PlainOf<R>;
   BallRaysIn(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const Values<R>& all, const Directions<S, R>& up, bool places)
       : optics_(ball_optics(scene, value)),
-        in_um_(droplet_optics(scene, all)),
-        medium_(in_um_, in_um_.radius_um),
+        medium_(in_radii(droplet_optics(scene, all))),
         light_(polarizers(scene, all)),
         rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0), scene.microscope.objective_na),
         method_(transport_method<S>(plan.method)),
@@ -214,7 +213,7 @@ class BallRaysIn final : public BallRays<R> {
     return up(tube) * norm(out);
   }
   BallOptics<S> optics_;
-  DropletOptics<R> in_um_;
+  static BallMedium<R> in_radii(const DropletOptics<R>& o) { return {o, o.radius_um}; }
   BallMedium<R> medium_;
   Polarizers<R> light_;
   RimTable rim_;

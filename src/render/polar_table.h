@@ -148,19 +148,6 @@ class PolarTable {
     }
   }
 
-  /// A table with fewer derivatives as one with more: plane j + 1 of it is plane to[j] + 1 of this.
-  template <class T>
-  PolarTable(const PolarTable<T>& narrow, const std::vector<int>& to) : squares_(narrow.squares_), start_(narrow.start_) {
-    constexpr std::size_t rays = static_cast<std::size_t>(kRays), from_planes = static_cast<std::size_t>(PolarTable<T>::kPlanes);
-    const std::size_t blocks = narrow.coefficients_.size() / (from_planes * rays);
-    coefficients_.resize(blocks * kPlanes * rays);
-    for (std::size_t b = 0; b < blocks; ++b)
-      for (std::size_t plane = 0; plane <= to.size(); ++plane)
-        std::copy_n(narrow.coefficients_.data() + (b * from_planes + plane) * rays, rays,
-                    coefficients_.data() + (b * kPlanes + (plane == 0 ? 0 : static_cast<std::size_t>(to[plane - 1]) + 1)) * rays);
-    for (int k = 0; k < narrow.count_; ++k) live_[static_cast<std::size_t>(count_++)] = to[static_cast<std::size_t>(narrow.live_[static_cast<std::size_t>(k)] - 1)] + 1;
-  }
-
   bool empty() const { return coefficients_.empty(); }
   /// The light at v, turn where `here`, square by DiscMap::find; false, where one of these lanes lies in a square that is not smooth.
   template <class Mask>
@@ -179,8 +166,6 @@ class PolarTable {
   }
 
  private:
-  template <class T>
-  friend class PolarTable;
   static constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
 
   /// x, y: the place in the square, each from -1 to 1; across, around: how fast they go with v and turn.

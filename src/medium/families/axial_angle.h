@@ -52,6 +52,7 @@ void axial_boundary_direction(const T& rho, const T& z, const R& ring, T& sine, 
   sine = 2.0 * (s * c) * over;
   cosine = (c * c - s * s) * over;
 }
+/// theta_s itself, rad.
 template <class T>
 T axial_boundary_angle(const T& rho, const T& z, const T& ring) {
   T s, c;
