@@ -40,6 +40,7 @@ struct RenderPlan {
   std::vector<double> mesh;         ///< adapted mesh in u, instead of `steps` where not empty
   int radial_panels = 0;            ///< droplets: panels of the table over the radius; 0 = one ray a point
   int centre_panels = 0;            ///< of its innermost part
+  std::vector<int> part_panels;     ///< curved rays: of each part between places where light begins or ends; radial_panels is the most
   /// Pixels with one sample: the mean of a fringe in closed form from one ray a pixel and its
   /// neighbours' (plates), instead of the point value's correction.
   bool fringe_means = false;

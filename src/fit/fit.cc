@@ -81,6 +81,7 @@ std::vector<std::array<int, 2>> subsample(const std::vector<std::array<int, 2>>&
 bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
   if (now.method != before.method || (now.disc.empty() && now.steps > before.steps) || now.mesh.size() > before.mesh.size() ||
       now.radial_panels > before.radial_panels || now.centre_panels > before.centre_panels ||
+      !std::equal(now.part_panels.begin(), now.part_panels.end(), before.part_panels.begin(), before.part_panels.end(), std::less_equal<>()) ||
       (before.fringe_means && !now.fringe_means))
     return true;
   if (outgrown(now, before)) return true;

@@ -9,7 +9,7 @@
 #include "medium/build.h"
 #include "render/ball.h"
 #include "render/droplet.h"
-#include "render/eikonal.h"
+#include "render/eikonal_image.h"
 #include "render/pixel_model.h"
 #include "transport/method.h"
 
@@ -240,10 +240,6 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       core_um_(0.0),
       centre_panels_(plan.centre_panels),
       rest_panels_(plan.radial_panels) {
-  if (scene.rays == Rays::eikonal) {
-    fan_p_ = std::make_shared<const EikonalFan<S>>(optics_, true, scene.microscope.objective_na);
-    fan_s_ = std::make_shared<const EikonalFan<S>>(optics_, false, scene.microscope.objective_na);
-  }
   sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
   symmetry_ = round_symmetry(scene, value, optics_.coupled());
   shell_ = optics_.director == DropletOptics<S>::Director::shell;
@@ -259,8 +255,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
     if (!can_tabulate()) rest_panels_ = 0;
   }
   by_inverse_edge_ = Sensitivity<S>(inverse_edge_);
-  open_ = cos_between_ * cos_between_;
-  dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
+  passing_ = PassingLight<S>(view_.pixel_um(), optics_.radius_um, cos_between_);
 }
 
 template <class S>
@@ -292,7 +287,6 @@ void DropletImage<S>::terms(Part part, const S& v, S* out) const {
 
 template <class S>
 void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
-  if (fan_p_) return eikonal_terms_at(rho_um, out);
   const DropletRay<S> ray = trace(optics_, rim_, rho_um);
   Mat2<S> jones = droplet_jones(optics_, ray, method_, mesh_);
   // Ray tube: flux through the mid plane is b db / (rho drho) of the incident, |E|^2 = flux / cos(2 delta).
@@ -303,18 +297,6 @@ void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
     tube = tube * inverse(ray.cos_twice);
   }
   intensity_terms(jones, tube, cos_between_, sin_between_, !optics_.coupled(), out);
-}
-
-template <class S>
-void DropletImage<S>::eikonal_terms_at(const S& rho_um, S* out) const {
-  const EikonalRay<S> p = fan_p_->at(rho_um), s = fan_s_->at(rho_um);
-  // |E|^2 is flux over the cosine; not aplanatic, only the transverse part of the p field counts.
-  const S p_field = aplanatic_ ? p.amplitude : p.amplitude * root(p.cos_turn);
-  const S s_field = aplanatic_ ? s.amplitude : s.amplitude * inverse_root(s.cos_turn);
-  S sn, cs;
-  sin_cos(p.phase_rad - s.phase_rad, sn, cs);
-  const Complex<S> zero(S(0.0), S(0.0));
-  intensity_terms(Mat2<S>{Complex<S>(p_field * cs, p_field * sn), zero, zero, Complex<S>(s_field, S(0.0))}, S(1.0), cos_between_, sin_between_, true, out);
 }
 
 // The light at rho_um < edge by a ray of its own.
@@ -404,12 +386,7 @@ template <class S>
 S DropletImage<S>::intensity(const P& column, const P& row) const {
   const auto place = view_.at(column, row);
   const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
-  S result(P(0.0));
-  if (!dark_ && !birefit::all(place.rho_um < plain(optics_.radius_um) - P(view_.pixel_um()))) {  // light that passes by; averaged over a pixel
-    S rho(place.rho_um);
-    view_.add_moves(place, P(1.0), P(0.0), rho);
-    result = open_ * min_of(max_of((rho - optics_.radius_um) * (1 / view_.pixel_um()) + 0.5, S(0.0)), S(1.0));
-  }
+  const S result = passing_.at(view_, place);
   if (birefit::none(inside)) return result;
   const P rho_um = select(inside, place.rho_um, plain(edge_um_) * P(0.5));
   const S light = rest_panels_ == 0 ? traced(rho_um, place) : read(rho_um, place);
@@ -424,6 +401,7 @@ std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const Rend
     else
       return make_ball_model(scene, plan, value);
   }
+  if (scene.rays == Rays::eikonal) return std::make_unique<EikonalImage<S>>(scene, plan, value);
   return std::make_unique<DropletImage<S>>(scene, plan, value);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                       \

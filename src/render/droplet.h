@@ -22,9 +22,6 @@ struct IncidenceTable {
   P at(const P& rho_over_radius) const;   ///< P = double or Pack; within 5e-5 rad
 };
 
-template <class S>
-class EikonalFan;
-
 /// Of straight rays, for one ratio m = n_host / n_o (values only; a start for Newton).
 class RimTable {
  public:
@@ -148,9 +145,8 @@ class DropletImage final : public PixelModel<S> {
   enum class Part { centre, rest };
   static constexpr int kMostTerms = RoundView<S>::kMostTerms;
   int number_of_terms() const { return optics_.coupled() ? 5 : 3; }
-  /// False where one ray a point is needed whatever the plan says: a shell whose core's edge no ray of the image meets, or where each mode
-  /// has edges of its own.
-  bool can_tabulate() const { return !shell_ || (!fan_p_ && lane(plain(core_um_), 0) > 0); }
+  /// False where one ray a point is needed whatever the plan says: a shell whose core's edge no ray of the image meets.
+  bool can_tabulate() const { return !shell_ || lane(plain(core_um_), 0) > 0; }
   /// Other ones than the plan's, for the next tabulate().
   void set_panels(int centre, int rest) { centre_panels_ = centre, rest_panels_ = can_tabulate() ? rest : 0; }
   /// f_k at v of the part; out has number_of_terms() places.
@@ -163,7 +159,6 @@ class DropletImage final : public PixelModel<S> {
 
  private:
   void terms_at(const S& rho_um, S* out) const;
-  void eikonal_terms_at(const S& rho_um, S* out) const;
   S traced(const P& rho_um, const typename RoundView<S>::Place&) const;
   S read(const P& rho_um, const typename RoundView<S>::Place&) const;
 
@@ -173,13 +168,12 @@ class DropletImage final : public PixelModel<S> {
   Mesh mesh_;
   bool aplanatic_, shell_;
   Symmetry symmetry_;
-  std::shared_ptr<const EikonalFan<S>> fan_p_, fan_s_;  ///< of curved rays; else none
   RoundView<S> view_;
   S cos_between_, sin_between_;  ///< of analyser - polarizer
-  S edge_um_, inverse_edge_, open_;
+  PassingLight<S> passing_;
+  S edge_um_, inverse_edge_;
   S core_um_, inverse_core_, core_root_, inverse_core_root_;  ///< image radius of a shell's core, sqrt(1 - that / edge)
   Sensitivity<S> by_inverse_edge_, by_inverse_core_, by_inverse_core_root_;
-  bool dark_ = false;  ///< no light beside the droplet
   int centre_panels_, rest_panels_;
   RadialTable<S> centre_, rest_;
 };

@@ -240,6 +240,14 @@ auto field_of(double e, double ring, bool has_ring) {
   }
 }
 
+template <class S, class One>
+S in_all_lanes(const One& x) {
+  S result(plain(x));
+  if constexpr (ScalarTraits<S>::derivatives > 0)
+    for (std::size_t j = 0; j < x.d.size(); ++j) result.d[j] = PlainOf<S>(x.d[j]);
+  return result;
+}
+
 /// x with the value of `at`, moving as the root of f(., parameters) does; slope = df/dx.
 template <class T>
 T moving_root(double at, const T& f, double slope) {
@@ -250,7 +258,7 @@ T moving_root(double at, const T& f, double slope) {
 
 template <class S>
 EikonalFan<S>::EikonalFan(const DropletOptics<S>& o, bool extraordinary, double objective_na)
-    : extraordinary_(extraordinary), objective_na_(objective_na), host_(lane(plain(o.n_host), 0)), radius_um_(o.radius_um), path_phase_(o.k0 * o.radius_um * o.n_o) {
+    : extraordinary_(extraordinary), objective_na_(objective_na), host_(lane_of(o.n_host, 0)), radius_um_(o.radius_um), path_phase_(o.k0 * o.radius_um * o.n_o) {
   using Director = typename DropletOptics<S>::Director;
   const One over = inverse(lane_of(o.n_o, 0));
   shape_[0] = lane_of(o.n_host, 0) * over;
@@ -280,37 +288,40 @@ EikonalFan<S>::EikonalFan(const DropletOptics<S>& o, bool extraordinary, double 
     const bool has_core = plain(core) > 0, beside = !has_core || plain(core) * plain(index) < plain(droplet_.host) * std::sin(plain(rim)) * (1 - 1e-9);
     if (beside) add({has_core ? incidence(core * index) : T(0.0), rim}, 0, 1, kExact);
     if (has_core) {
-      const std::size_t outside = panels_.size();
       const T last = incidence(core * into_core);
       add({T(0.0), plain(last) < plain(rim) ? last : rim}, 0, 1, kExact);
-      if (outside > 0) edges_.push_back(panels_[outside - 1].inner);
-      if (outside < panels_.size()) edges_.push_back(panels_[outside].outer);
     }
   } else {
-    add_rays_in_field(rim);
+    add_rays_in_field(rim, shape[3]);
   }
+  find_ends();
   // What is nearer to the axis than the innermost ray is read from it.
   if (!panels_.empty() && panels_.back().inner < 2e-3) panels_.back().inner = -1;
 }
 
 template <class S>
-void EikonalFan<S>::add_rays_in_field(const T& rim) {
+void EikonalFan<S>::add_rays_in_field(const T& rim, const T& ring) {
   constexpr Accuracy kIntegrated{1e-6, 4};
   const double most = plain(rim);
   if (droplet_.field->has_ring()) {
     // Rays on both sides of the ring's go different ways: none is followed closer to it than this.
     constexpr double kBeside = 2e-3, kAxis = 1e-3;
-    const double ring = plain(droplet_.field->ring());
-    double inside = kAxis, outside = most;
-    for (int i = 0; i < 16; ++i) {
-      const double middle = 0.5 * (inside + outside);
-      T equator(2.0);
-      ray_in_field(droplet_, T(middle), &equator);
+    const auto equator = [&](double psi) {
+      T place(2.0);
+      ray_in_field(droplet_, T(psi), &place);
       ++rays_;
-      (plain(equator) < ring ? inside : outside) = middle;
+      return place;
+    };
+    double inside = kAxis, outside = most;
+    for (int i = 0; i < 24; ++i) {
+      const double middle = 0.5 * (inside + outside);
+      (plain(equator(middle)) < plain(ring) ? inside : outside) = middle;
     }
-    if (inside + 2 * kBeside < most) add({T(inside + kBeside), rim}, 0, 1, kIntegrated);
-    add({T(kAxis), T(inside - kBeside)}, 0, 1, kIntegrated);
+    // The shadow moves with the ring. Beside it: what comes closest is turned most.
+    const double h = 0.5 * kBeside;
+    const T meets = moving_root(inside, T(0.5 * (equator(inside - h) + equator(inside + h)) - ring), (plain(equator(inside + h)) - plain(equator(inside - h))) / (2 * h));
+    if (inside + 2 * kBeside < most) add({meets + kBeside, rim}, 0, 1, kIntegrated);
+    add({T(kAxis), meets - kBeside}, 0, 1, kIntegrated);
     return;
   }
   // The defect in the middle turns rays off the axis that come in on it, and the field bends them on: where they are seen is past the axis.
@@ -420,6 +431,7 @@ auto EikonalFan<S>::panel_of(const Piece& piece, double from, double to, const A
         for (std::size_t p = 1; p < kPlanes; ++p) values[p * kFunctions + f][k] = out[f].d[p - 1];
     }
   }
+  double path_error = 0;
   const double allowed = accuracy.tail * (accuracy.splits == 0 ? kLast : 1);
   for (std::size_t f = 0; f < values.size(); ++f) {
     double tail[2] = {0, 0}, size = 1;
@@ -429,7 +441,9 @@ auto EikonalFan<S>::panel_of(const Piece& piece, double from, double to, const A
       size = std::max(size, std::abs(values[f][k]));
     }
     // By values alone: the picture is the same with derivatives and without.
-    if (f < kFunctions && !(std::abs(tail[0]) + std::abs(tail[1]) <= allowed * size)) return {};
+    const double both = std::abs(tail[0]) + std::abs(tail[1]);
+    if (f < kFunctions && !(both <= allowed * size)) return {};
+    if (f == kPath) path_error = both;
     for (std::size_t c = 0; c < kPoints; ++c) {
       double sum = 0;
       for (std::size_t k = 0; k < kPoints; ++k) sum += rule.to_powers[c][k] * values[f][k];
@@ -442,6 +456,7 @@ auto EikonalFan<S>::panel_of(const Piece& piece, double from, double to, const A
     if (panel.middle + panel.half * x > 1e-9 && !(panel.place(x).by_x < 0)) return {};
   }
   panel.outer = panel.place(-1).rho, panel.inner = panel.place(1).rho;
+  path_error_ = std::max(path_error_, path_error);
   return panel;
 }
 
@@ -459,6 +474,45 @@ auto EikonalFan<S>::lifted(const T& x) const -> One {
     return x;
   else
     return lifted(x.value, x.d.data(), 1);
+}
+
+template <class S>
+auto EikonalFan<S>::function_at(const Panel& panel, Function k, double x) const -> Slope {
+  double values[kPlanes], slopes[kPlanes];
+  for (std::size_t p = 0; p < kPlanes; ++p) std::tie(values[p], slopes[p]) = horner<kPoints>(panel.coefficients.data() + (p * kFunctions + k) * kPoints, x);
+  return {lifted(values[0], values + 1, 1), lifted(slopes[0], slopes + 1, 1)};
+}
+
+template <class S>
+void EikonalFan<S>::find_ends() {
+  const auto add_end = [&](const Panel& panel, double x, const One& move) {
+    const double u = panel.middle + panel.half * x;
+    const auto [ratio, slope] = function_at(panel, kRatio, x);
+    const One sine = sin(lifted(panel.piece.psi(u)));
+    ends_um_.push_back(radius_um_ * in_all_lanes<S>(One(sine * ratio + move * panel.place(x).by_x)));
+  };
+  for (std::size_t i = 0; i < panels_.size(); ++i) {
+    const Panel& panel = panels_[i];
+    if (i == 0 || panels_[i - 1].inner != panel.outer) add_end(panel, -1, One(0.0));
+    if ((i + 1 == panels_.size() || panels_[i + 1].outer != panel.inner) && panel.inner > 0) add_end(panel, 1, One(0.0));
+    if (objective_na_ <= 0) continue;
+    // Where rays begin or cease to be turned too far for the aperture.
+    const double* turn = panel.coefficients.data() + kTurn * kPoints;
+    const auto beyond = [&](double x) { return std::abs(std::sin(horner<kPoints>(turn, x).first)) * plain(host_) > objective_na_; };
+    constexpr int kSteps = 24;
+    for (int k = 0; k < kSteps; ++k) {
+      double low = 2.0 * k / kSteps - 1, high = 2.0 * (k + 1) / kSteps - 1;
+      const bool before = beyond(low);
+      if (beyond(high) == before) continue;
+      for (int n = 0; n < 55; ++n) {
+        const double middle = 0.5 * (low + high);
+        (beyond(middle) == before ? low : high) = middle;
+      }
+      const auto [angle, slope] = function_at(panel, kTurn, low);
+      const double side = plain(angle) < 0 ? -1 : 1;
+      add_end(panel, low, One((side * objective_na_ - host_ * sin(angle)) / (plain(host_) * std::cos(plain(angle)) * plain(slope))));
+    }
+  }
 }
 
 template <class S>
@@ -481,16 +535,7 @@ auto EikonalFan<S>::read(const One& rho) const -> EikonalRay<One> {
     if (change < 1e-14 || (i > 2 && change < 1e-9)) break;
   }
   // Functions at x and their slopes by x, both with derivatives by the shape; x itself follows from the place.
-  struct Read {
-    One value, slope;
-  };
-  Read f[kFunctions];
-  for (std::size_t k = 0; k < kFunctions; ++k) {
-    double values[kPlanes], slopes[kPlanes];
-    for (std::size_t p = 0; p < kPlanes; ++p)
-      std::tie(values[p], slopes[p]) = horner<kPoints>(panel.coefficients.data() + (p * kFunctions + k) * kPoints, x);
-    f[k] = {lifted(values[0], values + 1, 1), lifted(slopes[0], slopes + 1, 1)};
-  }
+  const std::array<Slope, kFunctions> f{function_at(panel, kRatio, x), function_at(panel, kPath, x), function_at(panel, kTurn, x), function_at(panel, kFlux, x)};
   const double u = panel.middle + panel.half * x;
   One psi = lifted(panel.piece.psi(u)), psi_slope = lifted(panel.piece.by_u(u)) * panel.half, s1, c1;
   sin_cos(psi, s1, c1);
@@ -512,7 +557,7 @@ auto EikonalFan<S>::read(const One& rho) const -> EikonalRay<One> {
   EikonalRay<One> ray;
   sin_cos(moved(kTurn), ray.sin_turn, ray.cos_turn);
   ray.phase_rad = moved(kPath);
-  if (objective_na_ > 0 && std::abs(plain(ray.sin_turn)) * host_ > objective_na_) return none;
+  if (objective_na_ > 0 && std::abs(plain(ray.sin_turn)) * plain(host_) > objective_na_) return none;
   // Flux through the mid plane: b db / (rho drho) of what came in, b = sin psi.
   const One ratio2 = square(moved(kRatio)), off2 = square(One(axis_ray_ / s1));
   const One tube = c1 * psi_slope * inverse(slope) * inverse_root(root(ratio2 * ratio2 + off2 * off2));

@@ -65,7 +65,10 @@ class EikonalFan {
   /// rho_um in the mid plane, where the ray's backward extension meets it.
   EikonalRay<S> at(const S& rho_um) const;
   int rays() const { return rays_; }  ///< that were traced
-  const std::vector<double>& edges() const { return edges_; }  ///< image radii, in radii, where rays begin or end to meet a shell's core
+  double path_error() const { return path_error_; }  ///< of the polynomials, by their two highest coefficients; in radii times n_o
+  /// Image radii where light of this mode begins or ends: rims, the core's edge, the objective's aperture, the shadow of a ring, folds. Same in all lanes; in
+  /// no order.
+  const std::vector<S>& ends_um() const { return ends_um_; }
 
  private:
   static constexpr int kShape = 4;  ///< numbers that shape rays: both indices, and core and its index or field and ring
@@ -94,6 +97,11 @@ class EikonalFan {
     };
     Place place(double x) const;
   };
+  void find_ends();
+  struct Slope {
+    One value, slope;
+  };
+  Slope function_at(const Panel&, Function, double x) const;  ///< and its slope by x, both with derivatives at fixed x
   MeridionalRay<T> traced(const T& psi);
   /// How large the two highest Chebyshev coefficients may be, relative where a function is above one, and how often a piece is halved for it. What
   /// then is left (rays that pass a defect closely, kinks between elements) may be kLast times as much.
@@ -105,20 +113,22 @@ class EikonalFan {
   void add(const Piece& piece, double from, double to, const Accuracy& accuracy);
   /// None where a ray does not arrive, polynomials do not follow, or image radii do not fall from ray to ray.
   std::optional<Panel> panel_of(const Piece& piece, double from, double to, const Accuracy& accuracy);
-  void add_rays_in_field(const T& rim);
+  void add_rays_in_field(const T& rim, const T& ring);
   /// With the derivatives of S from those by the shape.
   One lifted(double value, const double* by_shape, std::size_t stride) const;
   One lifted(const T& x) const;
   EikonalRay<One> read(const One& rho) const;
 
   bool extraordinary_;
-  double objective_na_, host_;
+  double objective_na_;
+  One host_;
   MeridionalDroplet<T> droplet_;
   One shape_[kShape];
   S radius_um_, path_phase_;  ///< the latter of one unit of path, rad
   One axis_ray_ = One(0.0);   ///< sine of the angle of incidence of the ray that is seen on the axis
   std::vector<Panel> panels_; ///< from the rim inwards
-  std::vector<double> edges_;
+  std::vector<S> ends_um_;
+  double path_error_ = 0;
   int rays_ = 0;
 };
 

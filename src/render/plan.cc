@@ -12,7 +12,7 @@
 #include "medium/build.h"
 #include "medium/validity.h"
 #include "render/disc.h"
-#include "render/eikonal.h"
+#include "render/eikonal_image.h"
 #include "render/ball.h"
 #include "render/cone_view.h"
 #include "render/fringe_table.h"
@@ -144,8 +144,7 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
   const bool shell = std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
   Image image(scene, plan, lanes);
   if (!image.can_tabulate()) {
-    plan.reasons.push_back(scene.rays == Rays::eikonal ? "each mode has its own edges where its rays meet the core: no table over the radius, rays are read at every point"
-                                                       : "retardance has a kink where rays touch the core, too close to the rim for a table over the radius: one ray a point");
+    plan.reasons.push_back("retardance has a kink where rays touch the core, too close to the rim for a table over the radius: one ray a point");
     return;
   }
   // The largest error of one part read at many places.
@@ -196,8 +195,7 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
     if (centre > target) plan.centre_panels += std::max(1, plan.centre_panels / 4);
   }
   plan.radial_panels = 0;
-  plan.reasons.push_back(scene.rays == Rays::eikonal ? "no table over the radius: curved rays of either mode end where the other's do not, and at the aperture; one ray a point"
-                                                     : "the picture has too few pixels for a table over the radius: one ray a point");
+  plan.reasons.push_back("the picture has too few pixels for a table over the radius: one ray a point");
 }
 
 /// Retardance phase (rad) of the ball's ray that is seen at (rho, azimuth), as if its modes did not couple.
@@ -227,7 +225,7 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
   if (size < 400 && scene.rays == Rays::eikonal)
     plan.warnings.push_back(fmt::format(
         "The droplet is {:.3g} wavelengths across: rays, curved as they are, leave out diffraction. An image of beam propagation (23 wavelengths, "
-        "birefringence 0.22) is met to 2 % of its range, its birefringence to 0.1 % and its diameter to 0.3 %; the error bars do not contain this.",
+        "birefringence 0.22) is met to 2 % of its range, its birefringence to 0.3 % and its diameter to 0.1 %; the error bars do not contain this.",
         size));
   else if (size < 400)
     plan.warnings.push_back(fmt::format(
@@ -315,6 +313,64 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
   return plan;
 }
 
+/// Points per pixel of a droplet that looks the same from all sides, from its axis to `edge`: more where light changes without bound, at `jumps` (all um).
+void sample_round(const Scene& scene, const Values<double>& value, const DropletOptics<double>& o, double edge, const std::vector<double>& jumps, RenderPlan& plan) {
+  const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
+  const double px = scene.view.pixel_size_um;
+  const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
+  if (bins > 100000) throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");
+  const auto phase_at = [&](double radius_um) {
+    const double psi = rim.psi_at(std::clamp(radius_um / o.radius_um, 0.0, rim.rho_max()));
+    return droplet_phase(o, psi);
+  };
+  double largest_phase = 0;
+  for (int i = 0; i <= 64; ++i) largest_phase = std::max(largest_phase, phase_at(edge * i / 64));
+  sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
+    const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
+    // The cross turns within the innermost pixels; at the rim intensity ends like a root.
+    if (r < 3) return r < 2 ? 9.0 : 5.0;
+    for (const double jump : jumps)
+      if (high > jump - px && low < jump + px) return 9.0;
+    if (high > edge - px && low < edge + px) return 3.0;
+    return std::abs(phase_at(high) - phase_at(low));
+  });
+  const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+  plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel", most));
+  // Outside the droplet one sample is enough.
+  plan.samples.push_back(1);
+  note_rays(scene, value, o, plan);
+  note_illumination(scene, value, largest_phase, plan);
+}
+
+/// Each mode on its own curved ray.
+RenderPlan plan_curved(const Scene& scene, const Values<double>& value) {
+  RenderPlan plan;
+  plan.method = "eikonal";
+  const DropletOptics<double> o = droplet_optics(scene, value);
+  EikonalImage<Pack> image(scene, plan, value.template as<Pack>());
+  plan.reasons.push_back(o.axial ? fmt::format("each mode on its own curved ray, {} of the extraordinary one integrated", image.integrated_rays()) : "each mode on its own curved ray, in closed form");
+  if (scene.method != "auto") plan.reasons.push_back(fmt::format("method {}, asked for by name, is for straight rays: not used", scene.method));
+  // Rays in a field have small kinks between the director's elements, which no polynomial follows to more than this.
+  const double target = std::max((o.axial ? 100 : 1) * kTableShare * scene.intensity_accuracy, 2e-11);
+  constexpr int kMost = 32;
+  double left = 0;
+  int radii = 0;
+  for (std::size_t part = 0; part < image.parts(); ++part) {
+    int panels = 1;
+    double error = image.tail(part, panels);
+    while (error > target && panels < kMost) error = image.tail(part, panels += (panels + 1) / 2);
+    plan.part_panels.push_back(panels);
+    left = std::max({left, error, image.table_error(part, panels)});
+    radii += panels * RadialTable<Pack>::kPoints;
+  }
+  plan.radial_panels = plan.part_panels.empty() ? 1 : *std::max_element(plan.part_panels.begin(), plan.part_panels.end());
+  plan.numerical_error = 2 * left + image.phase_error_rad();
+  const std::vector<double> ends = image.ends_um();
+  plan.reasons.push_back(fmt::format("light of either mode begins or ends at {} radii: {} rays between them, one a radius, serve all pixels (interpolated to {})", ends.size(), radii, sci(left)));
+  sample_round(scene, value, o, ends.empty() ? o.radius_um : ends.back(), ends, plan);
+  return plan;
+}
+
 RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   if (scene.ceiling == Ceiling::reflections)
@@ -323,6 +379,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
   if (scene.rays == Rays::eikonal && !has_curved_rays(scene))
     throw UserError(Where{}, "physics.rays: eikonal is for radial droplets without twist, shells whose core is in the middle and droplets in a field along the view", "use straight or auto");
   if (!looks_round(droplet)) return plan_ball(scene, value);
+  if (scene.rays == Rays::eikonal) return plan_curved(scene, value);
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
   const bool twisted = o.coupled(), axial = o.axial != nullptr;
@@ -347,44 +404,9 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
                                      pilots.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
-  std::vector<double> edges_um;
-  if (scene.rays == Rays::eikonal) {
-    const EikonalFan<double> p(o, true, scene.microscope.objective_na), s(o, false, scene.microscope.objective_na);
-    plan.reasons.push_back(axial ? fmt::format("each mode on its own curved ray, {} of the extraordinary one integrated: the method above is not used", p.rays())
-                                 : "each mode on its own curved ray, in closed form: the method above is not used");
-    for (const EikonalFan<double>* fan : {&p, &s})
-      for (const double edge : fan->edges()) edges_um.push_back(edge * o.radius_um);
-  } else if (o.director == DropletOptics<double>::Director::shell) {
-    edges_um.push_back(core_edge(o, rim));
-  }
   plan_radial_table(scene, value, plan);
-
-  const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.radius_um;
-  double largest_phase = 0;
-  const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
-  if (bins > 100000) throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");
-  const auto phase_at = [&](double radius_um) {
-    const double psi = rim.psi_at(std::clamp(radius_um / o.radius_um, 0.0, rim.rho_max()));
-    return droplet_phase(o, psi);
-  };
-  for (int i = 0; i <= 64; ++i) largest_phase = std::max(largest_phase, phase_at(edge * i / 64));
-  sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
-    const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
-    // The cross turns within the innermost pixels; at the rim intensity ends like a root.
-    if (r < 3) return r < 2 ? 9.0 : 5.0;
-    if (high > edge - px && low < edge + px) return 3.0;
-    // A shell's retardance turns back where rays touch the core, with a slope that has no bound.
-    for (const double core : edges_um)
-      if (high > core - px && low < core + px) return 9.0;
-    return std::abs(phase_at(high) - phase_at(low));
-  });
-  const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
-  plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel", most));
-  // Outside the droplet one sample is enough.
-  plan.samples.push_back(1);
-
-  note_rays(scene, value, o, plan);
-  note_illumination(scene, value, largest_phase, plan);
+  // A shell's retardance turns back where rays touch the core, with a slope that has no bound.
+  sample_round(scene, value, o, rim.rho_max() * o.radius_um, o.director == DropletOptics<double>::Director::shell ? std::vector{core_edge(o, rim)} : std::vector<double>{}, plan);
   return plan;
 }
 

@@ -84,6 +84,17 @@ class RadialTable {
     directions_.clear();
   }
 
+  /// How far a polynomial of this degree is from a function at the worst: the sizes of its two highest Chebyshev coefficients together.
+  double tail() const {
+    double worst = 0;
+    for (std::size_t panel = 0; panel < static_cast<std::size_t>(panels_); ++panel)
+      for (std::size_t f = 0; f < plane_; f += kPoints) {
+        const double* c = coefficients_.data() + panel * kPlanes * plane_ + f;
+        worst = std::max(worst, std::ldexp(std::abs(c[kPoints - 1]), 2 - kPoints) + std::ldexp(std::abs(c[kPoints - 2]), 3 - kPoints));
+      }
+    return worst;
+  }
+
   /// How a sum moves with the place: by v, and the same sum over another basis (its derivative by the angle).
   struct Slopes {
     P by_v = P(0.0), turned = P(0.0);

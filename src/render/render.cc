@@ -546,6 +546,8 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
   const int w = scene.view.width, h = scene.view.height;
   const Mesh mesh = plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh;
   if (std::holds_alternative<Droplet>(scene.sample)) {
+    if (scene.rays == Rays::eikonal)
+      throw UserError(Where{}, "the two polarizations that curved rays bring to one place came by different ways: no Jones matrix of one ray", "use `render`, or physics.rays: straight");
     const DropletOptics<double> optics = droplet_optics(scene, value);
     const RimTable rim(optics.ratio, optics.n_host, scene.microscope.objective_na);
     const TransportMethod<double>& method = transport_method<double>(plan.method);

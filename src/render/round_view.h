@@ -83,4 +83,26 @@ class RoundView {
   Sensitivity<S> by_center_x_, by_center_y_, by_sum_;
 };
 
+/// Light that passes by a ball, averaged over a pixel along the radius.
+template <class S>
+class PassingLight {
+ public:
+  using P = PlainOf<S>;
+  PassingLight() = default;
+  PassingLight(double pixel_um, const S& radius_um, const S& cos_between) : pixel_um_(pixel_um), radius_um_(radius_um), open_(cos_between * cos_between) {
+    dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
+  }
+  S at(const RoundView<S>& view, const typename RoundView<S>::Place& place) const {
+    if (dark_ || birefit::all(place.rho_um < plain(radius_um_) - P(pixel_um_))) return S(P(0.0));
+    S rho(place.rho_um);
+    view.add_moves(place, P(1.0), P(0.0), rho);
+    return open_ * min_of(max_of((rho - radius_um_) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
+  }
+
+ private:
+  double pixel_um_ = 1;
+  S radius_um_, open_;
+  bool dark_ = true;
+};
+
 }  // namespace birefit

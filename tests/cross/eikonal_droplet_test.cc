@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <vector>
@@ -414,6 +416,143 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
     const auto& reasons = result.micrographs[0].plan.reasons;
     EXPECT_TRUE(std::any_of(reasons.begin(), reasons.end(), [](const std::string& r) { return r.find("curved rays were chosen") != std::string::npos; })) << wall;
   }
+}
+
+/// A droplet or shell of 9 um, 96 x 96 pixels a little off its middle, seen by an aperture.
+struct Seen {
+  TableBuilder b;
+  Scene scene;
+  Seen(double host, double wall_um, double field, double ring, double na, double analyzer_deg) {
+    Droplet d;
+    d.diameter_um = b.fitted("diameter_um", 9, 8, 10);
+    if (wall_um > 0) d.director = ShellDirector{b.fitted("wall_um", wall_um, 0.1, 4), {}, b.fixed("core_index", 1.45)};
+    if (field > 0) {
+      AxialDirector axial;
+      axial.reduced_field = b.fitted("reduced_field", field, 1, 20);
+      if (ring > 0) axial.ring_radius = b.fitted("ring_radius", ring, 0.1, 0.99);
+      d.director = axial;
+    }
+    scene.sample = d;
+    scene.rays = Rays::eikonal;
+    ConstantIndices m;
+    m.ordinary = b.fixed("ordinary", 1.52);
+    m.birefringence = b.fitted("birefringence", 0.2, 0.1, 0.3);
+    scene.material = m;
+    scene.surround_index = b.fitted("index", host, 1.3, 1.6);
+    scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
+    scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+    scene.microscope.analyzer_deg = b.fixed("analyzer_deg", analyzer_deg);
+    scene.microscope.objective_na = na;
+    scene.microscope.aplanatic = true;
+    scene.view.width = scene.view.height = 96;
+    scene.view.pixel_size_um = 0.125;
+    scene.view.center_x_px = b.fixed("center_x", 47.2);
+    scene.view.center_y_px = b.fixed("center_y", 48.1);
+  }
+};
+
+// Tables between the places where light begins or ends, read everywhere, against a ray of either mode for every point; within an eighth of a pixel of such a place
+// the picture passes from one side to the other.
+TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
+  for (const auto& [host, wall, field, ring] : {std::array{1.52, 0.0, 0.0, 0.0}, {1.43, 0.0, 0.0, 0.0}, {1.45, 1.3, 0.0, 0.0}, {1.52, 0.0, 3.0, 0.0}, {1.52, 0.0, 8.0, 0.85}})
+    for (const double na : {0.0, 0.35, 0.8})
+      for (const double analyzer_deg : {90.0, 70.0}) {
+        SCOPED_TRACE(::testing::Message() << "host " << host << ", wall " << wall << ", field " << field << ", NA " << na << ", analyser " << analyzer_deg);
+        const Seen s(host, wall, field, ring, na, analyzer_deg);
+        const Theta theta = s.b.table.values();
+        const RenderPlan chosen = plan(s.scene, theta);
+        const Values<double> value(theta, {});
+        const auto model = make_pixel_model<double>(s.scene, chosen, value);
+        model->tabulate(PixelModel<double>::Wanted::picture, 1);
+        const DropletOptics<double> o = droplet_optics(s.scene, value);
+        const EikonalFan<double> fan_p(o, true, na), fan_s(o, false, na);
+        const double between = std::cos(analyzer_deg * std::numbers::pi / 180), px = s.scene.view.pixel_size_um;
+        double worst = 0;
+        for (int i = 0; i < 4000; ++i) {
+          const double rho = 5.2 * (i + 0.5) / 4000, azimuth = 2.399963 * i;
+          bool beside = std::abs(rho - o.radius_um) < px;  // light that passes by
+          for (const auto* fan : {&fan_p, &fan_s})
+            for (const double end : fan->ends_um()) beside = beside || std::abs(rho - end) < px / 8;
+          if (beside) continue;
+          const EikonalRay<double> p = fan_p.at(rho), r = fan_s.at(rho);
+          const std::complex<double> a = std::polar(p.amplitude, p.phase_rad - r.phase_rad), d = r.amplitude;
+          // From x to the analyser's direction by way of the radial and the azimuthal one.
+          const double c = std::cos(azimuth), n = std::sin(azimuth), alpha = std::acos(between) - azimuth;
+          const double expected = std::norm(a * c * std::cos(alpha) - d * n * std::sin(alpha)) + (rho > o.radius_um ? between * between : 0);
+          worst = std::max(worst, std::abs(model->intensity(47.2 + rho * c / px, 48.1 - rho * n / px) - expected));
+        }
+        EXPECT_LT(worst, 3 * chosen.numerical_error);  // which knows 64 places a part
+      }
+}
+
+// What enters, less what surfaces reflect and the aperture stops, is in the picture: half of it in either polarization, rays of the extraordinary mode that are seen
+// beyond the ordinary one's rim, too. Rays by themselves, over the angle of incidence; pixels of 1/36 of the radius leave 1e-3.
+TEST(EikonalDroplet, LightThatEntersIsInThePicture) {
+  for (const double host : {1.52, 1.43})
+    for (const double na : {0.0, 0.35, 0.8}) {
+      double light = 0;
+      for (const double analyzer_deg : {0.0, 90.0}) {
+        Seen s(host, 0, 0, 0, na, analyzer_deg);
+        s.scene.view.width = s.scene.view.height = 150;
+        s.b.table[s.scene.view.center_x_px].value = s.b.table[s.scene.view.center_y_px].value = 74.3;
+        const Theta theta = s.b.table.values();
+        const Image image = render(s.scene, plan(s.scene, theta), theta, {}, 1).intensity;
+        for (int r = 0; r < image.height(); ++r)
+          for (int c = 0; c < image.width(); ++c) {
+            const double rho = std::hypot(c - 74.3, r - 74.3) * 0.125;
+            light += image(c, r) - (analyzer_deg == 0 ? std::clamp((rho - 4.5) / 0.125 + 0.5, 0.0, 1.0) : 0);
+          }
+      }
+      double expected = 0;
+      constexpr int kRays = 20000;
+      const MeridionalDroplet<double> d{host / 1.52, 1.72 / 1.52};
+      for (const bool extraordinary : {true, false})
+        for (int i = 0; i < kRays; ++i) {
+          const double psi = (i + 0.5) / kRays * std::numbers::pi / 2;
+          const MeridionalRay<double> ray = meridional_ray(d, extraordinary, psi);
+          if (ray.arrives && ray.impact / std::cos(ray.turn_rad) > 0 && (na == 0 || host * std::abs(std::sin(ray.turn_rad)) <= na)) expected += ray.flux * std::sin(psi) * std::cos(psi) * std::numbers::pi / 2 / kRays;
+        }
+      EXPECT_NEAR(light * 0.125 * 0.125 / (std::numbers::pi * 4.5 * 4.5), expected, 1e-3) << host << ", " << na;
+    }
+}
+
+// The aperture, the rims, the core's edge and a ring's shadow move with the parameters, and pixels know it: differences of pictures, over squares of 8 x 8 pixels, of which
+// single ones feel the points where they are sampled. Beside a ring fringes are finer than these; an aperture keeps most of that light out.
+TEST(EikonalDroplet, DerivativesKnowWhereLightBeginsAndEnds) {
+  struct Case {
+    double host, wall, field, ring;
+    std::vector<double> apertures;
+    double allowed;
+  };
+  for (const auto& [host, wall, field, ring, apertures, allowed] : {Case{1.50, 0, 0, 0, {0, 0.35}, 0.03}, {1.43, 0, 0, 0, {0, 0.35}, 0.03}, {1.45, 1.3, 0, 0, {0, 0.45}, 0.05},
+                                                                    {1.50, 0, 3, 0, {0, 0.35}, 0.03}, {1.50, 0, 8, 0.85, {0.35}, 0.06}})
+    for (const double na : apertures) {
+      const Seen s(host, wall, field, ring, na, 70);
+      Theta theta = s.b.table.values();
+      const RenderPlan chosen = plan(s.scene, theta);
+      for (int index = 0; index < s.b.table.size(); ++index) {
+        if (!s.b.table[index].free) continue;
+        const Image slope = render(s.scene, chosen, theta, {index}, 1).derivatives[0];
+        const std::size_t k = static_cast<std::size_t>(index);
+        const double at = theta[k], h = 2e-3 * at;
+        const auto moved = [&](double by) {
+          theta[k] = at + by;
+          Image image = render(s.scene, chosen, theta, {}, 1).intensity;
+          theta[k] = at;
+          return image;
+        };
+        const Image up = moved(h), down = moved(-h);
+        // Over squares of 8 x 8 pixels.
+        std::map<std::size_t, std::pair<double, double>> squares;
+        for (std::size_t i = 0; i < slope.size(); ++i) {
+          auto& [here, by_differences] = squares[i % 96 / 8 + 12 * (i / 96 / 8)];
+          here += slope.values()[i], by_differences += (up.values()[i] - down.values()[i]) / (2 * h);
+        }
+        double difference = 0, size = 0;
+        for (const auto& [place, slopes] : squares) difference += square(slopes.first - slopes.second), size += square(slopes.second);
+        EXPECT_LT(std::sqrt(difference / size), allowed) << s.b.table[index].name << ", host " << host << ", wall " << wall << ", field " << field << ", NA " << na;
+      }
+    }
 }
 
 /// RMS of the difference from the picture by wave optics over the RMS of that.
