@@ -97,7 +97,9 @@ inline constexpr double kAmbiguousOdds = 0.01;
 struct RivalMinimum {
   Theta theta;
   double chi_square = 0;
-  double odds = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)) against the reported minimum
+  /// Of its evidence against the reported minimum's: likelihood_ratio times the ratio of the shares of the bounds that either takes up.
+  double odds = 0;
+  double likelihood_ratio = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)); the larger of the two decides whether the answer is ambiguous
 };
 
 /// How one branch of the sample did.
@@ -105,7 +107,7 @@ struct BranchResult {
   std::string name;
   double chi_square = 0;   ///< all branches by the noise of the best one
   int parameters = 0;      ///< free ones
-  double odds = 0;         ///< against the reported branch: exp(-difference of (chi-square / max(1, reduced) + parameters ln pixels) / 2)
+  double odds = 0;         ///< of its evidence against the reported branch's: exp(-difference of (chi-square / max(1, reduced) - 2 log_share) / 2)
   bool reported = false;
 };
 
@@ -184,6 +186,7 @@ struct FitResult {
   double chi_square = 0, reduced_chi_square = 0;
   int degrees_of_freedom = 0;
   std::optional<JointPrior::FrameScatter> frame_scatter;  ///< several images in one fit
+  double log_share = 0;  ///< ln of the share of the bounds that the answer takes up: its highest likelihood times this share is the branch's evidence
   std::vector<RivalMinimum> rivals;
   std::vector<BranchResult> branches;  ///< empty unless the job had several
   std::vector<FisherDirection> directions;

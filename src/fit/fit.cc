@@ -293,8 +293,8 @@ void Fit::look_near_rays() {
   by_rays.branches.clear();
   for (Micrograph& m : by_rays.micrographs) {
     m.scene.ceiling = Ceiling::one_way, m.scene.method = "auto", m.scene.microscope.focus_um = {};
-    // Rays through a sampled field have kinks at all its cells and are dearer than waves: good enough to start from.
-    if (std::holds_alternative<SampledVolume>(m.scene.sample)) m.scene.intensity_accuracy = std::max(m.scene.intensity_accuracy, 1e-2);
+    // They are off by a quarter of the image: good enough to start from.
+    m.scene.intensity_accuracy = std::max(m.scene.intensity_accuracy, 1e-2);
   }
   Fit rays(by_rays);
   rays.search(std::numeric_limits<double>::infinity());
@@ -759,15 +759,19 @@ void Fit::weigh_rivals() {
                                      [&](const Candidate& other) { return separation(other, rival.searched) < 5 && separation(rival, other.searched) < 5; });
       if (!known) others.push_back(std::move(rival));
     }
+    const double share = log_share(main.information, job_, unknowns_);
     for (const Candidate& rival : others) {
       RivalMinimum minimum;
-      minimum.odds = std::exp(-0.5 * std::max(0.0, rival.objective - main.objective));
-      if (!(minimum.odds > 1e-3)) continue;
+      minimum.likelihood_ratio = std::exp(-0.5 * std::max(0.0, rival.objective - main.objective));
+      minimum.odds = minimum.likelihood_ratio * std::exp(log_share(rival.information, job_, unknowns_) - share);
+      // At an extremum of the fringes a minimum is no parabola, and its share no more than a guess: neither measure alone dismisses a rival.
+      const double either = std::max(minimum.odds, minimum.likelihood_ratio);
+      if (!(either > 1e-3)) continue;
       problem_->evaluate(rival.searched, false);
       minimum.theta = problem_->theta();
       for (int g = 0; g < frames_; ++g) minimum.chi_square += problem_->frame_misfit(g).chi_square;
       minimum.chi_square += problem_->prior_chi_square();
-      if (minimum.odds > kAmbiguousOdds) result_.ambiguous = true;
+      if (either > kAmbiguousOdds) result_.ambiguous = true;
       result_.rivals.push_back(std::move(minimum));
     }
     std::stable_sort(result_.rivals.begin(), result_.rivals.end(),
@@ -1323,6 +1327,7 @@ void Fit::report() {
   }
   result_.interval_degrees_of_freedom = dof;
 
+  result_.log_share = log_share(projected_information(*problem_), job_, unknowns_);
   result_.covariance = inverse.covariance;
   const Eigen::VectorXd inverse_sd =
       inverse.covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
@@ -1371,7 +1376,7 @@ FitResult best_branch(const FitJob& job, std::vector<FitResult> results) {
     branch.name = job.branches[b].name;
     branch.chi_square = residual(results[b], *smallest, false).first;
     branch.parameters = static_cast<int>(results[b].parameters.size());
-    score.push_back(branch.chi_square / reduced + branch.parameters * std::log(pixels));
+    score.push_back(branch.chi_square / reduced - 2 * results[b].log_share);
     branches.push_back(branch);
   }
   const std::size_t best = static_cast<std::size_t>(std::min_element(score.begin(), score.end()) - score.begin());

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -158,6 +159,21 @@ Eigen::VectorXd spread_point(int index, const FitJob& job, const Unknowns& unkno
 double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
   if (minimum.searched.size() == 0) return 0;
   return (minimum.information * (other - minimum.searched)).norm();
+}
+
+double log_share(const Eigen::MatrixXd& information, const FitJob& job, const Unknowns& unknowns) {
+  if (information.size() == 0) return 0;
+  Eigen::MatrixXd in_widths = information;
+  for (Eigen::Index j = 0; j < in_widths.cols(); ++j) {
+    const Parameter& parameter = job.parameters[unknowns.searched[static_cast<std::size_t>(j)]];
+    const double width = parameter.upper - parameter.lower;
+    // Without bounds a unit serves: what is compared has the same parameters.
+    in_widths.col(j) *= parameter.prior_sd ? *parameter.prior_sd * std::sqrt(2 * std::numbers::pi) : std::isfinite(width) ? width : 1.0;
+  }
+  // Along each principal axis the Gaussian prior that is as dense in its middle as the bounds are wide: variance 1/(2 pi).
+  double sum = 0;
+  for (const double s : in_widths.jacobiSvd().singularValues()) sum -= 0.5 * std::log1p(s * s / (2 * std::numbers::pi));
+  return sum;
 }
 
 Eigen::MatrixXd projected_information(const LeastSquares& problem) {

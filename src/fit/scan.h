@@ -39,6 +39,9 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
 
 /// |R delta|: how many joint standard errors apart.
 double separation(const Candidate& minimum, const Eigen::VectorXd& other);
+/// ln of the share of the bounds that a minimum takes up (<= 0): the likelihood's integral around it, as if it were a Gaussian, over its highest value and the width of the
+/// bounds, linear unknowns following. A parameter that the data do not know takes up all. With it a likelihood becomes the minimum's evidence.
+double log_share(const Eigen::MatrixXd& information, const FitJob& job, const Unknowns& unknowns);
 /// R of the searched unknowns with the linear ones following, at the problem's last point.
 Eigen::MatrixXd projected_information(const LeastSquares& problem);
 

@@ -161,7 +161,9 @@ std::string verdict(const FitResult& result, bool signal) {
   if (result.ambiguous) {
     std::vector<std::string> others;
     for (const RivalMinimum& rival : result.rivals)
-      if (rival.odds > kAmbiguousOdds) others.push_back(fmt::format("odds {:.2g}", rival.odds));
+      if (std::max(rival.odds, rival.likelihood_ratio) > kAmbiguousOdds)
+        others.push_back(std::abs(std::log(rival.odds / rival.likelihood_ratio)) < 0.7 ? fmt::format("odds {:.2g}", rival.odds)
+                                                                                       : fmt::format("odds {:.2g}, likelihood ratio {:.2g}", rival.odds, rival.likelihood_ratio));
     sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),
                                     others.size() == 1 ? "um" : "a", joined(others)));
   }

@@ -579,7 +579,7 @@ std::string branch_table(const FitResult& result) {
   for (const BranchResult& b : result.branches)
     out += fmt::format("<tr><td class=\"name\">{}{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(b.name), b.reported ? " (reported)" : "", plain(b.chi_square), b.parameters,
                        b.odds < 1e-30 ? std::string("&lt; 10<sup>\u221230</sup>") : html_number(fmt::format("{:.2g}", b.odds)));
-  return out + "</table></div>\n<p>Odds by the Bayesian information criterion, all branches weighed by the noise of the best.</p>\n";
+  return out + "</table></div>\n<p>Odds of the evidence: the likelihood, by the noise of the best branch, times the share of the bounds that the answer takes up.</p>\n";
 }
 
 /// What the fit took as exact, and what that does to the estimates.
@@ -779,7 +779,7 @@ std::string identifiability(const Config& config, const FitResult& result) {
     out +=
         "<h3>Rival minima, with their odds against the reported one</h3>\n<div class=\"scroll\"><table>\n<tr><th>odds "
         "against the reported "
-        "minimum</th><th>chi-square</th>";
+        "minimum</th><th>likelihood ratio</th><th>chi-square</th>";
     std::vector<const ParameterEstimate*> shown;
     for (const ParameterEstimate& p : result.parameters)
       if (!p.linear && shown.size() < 6) shown.push_back(&p);
@@ -788,7 +788,7 @@ std::string identifiability(const Config& config, const FitResult& result) {
              "</th>";
     out += "</tr>\n";
     for (const RivalMinimum& rival : result.rivals) {
-      out += "<tr><td>" + html_number(fmt::format("{:.2g}", rival.odds)) + "</td><td>" +
+      out += "<tr><td>" + html_number(fmt::format("{:.2g}", rival.odds)) + "</td><td>" + html_number(fmt::format("{:.2g}", rival.likelihood_ratio)) + "</td><td>" +
              html_number(fmt::format("{:.6g}", rival.chi_square)) + "</td>";
       for (const ParameterEstimate* p : shown) {
         const ParameterRef ref = config.job.parameters.find(p->name);

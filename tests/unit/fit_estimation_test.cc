@@ -397,7 +397,26 @@ TEST(Fit, MirrorMinimaInsideTheBoundsAreAmbiguous) {
   // sin^2 is even about the half-wave voltage: the two minima are each other's mirror image.
   EXPECT_NEAR(result.theta[bar.bias.index] + result.rivals[0].theta[bar.bias.index], 2 * kHalfWave, 0.01);
   EXPECT_NEAR(result.rivals[0].odds, 1, 0.01);
+  EXPECT_NEAR(result.rivals[0].likelihood_ratio, 1, 0.01);
   EXPECT_FALSE(result.has_answer());
+}
+
+// sin^2(phase / 2) is the same at phase and 2 pi - phase, the phase goes as 1/V of the half-wave voltage V: two minima as likely as each other, of which the one at the lower voltage
+// is narrower by the square of the phases' ratio. So are its odds.
+TEST(Fit, OddsOfANarrowMinimumAreSmaller) {
+  Bar bar(700, 0);
+  bar.free(bar.half_wave, kHalfWave, 400, 3000);
+  Micrograph& micrograph = bar.add_image(30, 30, bar.bias, true);
+  micrograph.noise = NoiseModel{0.01, 0, false};
+  Gaussian gaussian(12);
+  expose(micrograph, 1, 0, 700, 0, [&](int, int, double) { return 0.01 * gaussian(); });
+  const FitResult result = fit(bar.job);
+  ASSERT_EQ(result.rivals.size(), 1u);
+  const double here = result.theta[bar.half_wave.index], there = result.rivals[0].theta[bar.half_wave.index];
+  EXPECT_NEAR(1 / here + 1 / there, 2.0 / 700, 1e-8);
+  EXPECT_NEAR(result.rivals[0].likelihood_ratio, 1, 0.01);
+  EXPECT_NEAR(result.rivals[0].odds, std::pow(there / here, 2), 0.01 * std::pow(there / here, 2));
+  EXPECT_TRUE(result.ambiguous);
 }
 
 TEST(Fit, AParameterWithoutInfluenceIsNamed) {
