@@ -127,13 +127,17 @@ struct Count {
   int wrong = 0;  ///< an answer with a searched parameter more than five standard errors off
 };
 
-Count solve(const Family& family, int problems, int first_seed = 1) {
+Count solve(const Family& family, int problems, int first_seed = 1, Ceiling ceiling = Ceiling::one_way) {
   Count count;
   std::mutex mutex;
   parallel_for(problems, 0, [&](int i) {
     Problem p;
     p.random.seed(static_cast<unsigned long>(first_seed + i) * 104729);
     family.make(p);
+    for (Scene& scene : p.scenes) {
+      scene.ceiling = ceiling;
+      if (ceiling == Ceiling::wave) scene.microscope.objective_na = p.between(0.4, 0.9);
+    }
     const double noise = kGain * std::exp(p.between(std::log(0.005), std::log(0.05)));
     const Theta truth = p.b.table.values();
     std::normal_distribution<double> normal(0, noise);
@@ -208,8 +212,18 @@ TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   EXPECT_LE(count.ambiguous, count.problems / 100);
 }
 
+// The same on pictures by wave optics, for the families that are finite: 100 of each.
+class LongWaveSearch : public GlobalSearch {};
+TEST_P(LongWaveSearch, IsNeverConfidentlyWrong) {
+  const char *problems = std::getenv("BIREFIT_PROBLEMS"), *first = std::getenv("BIREFIT_FIRST_PROBLEM");
+  const Count count = solve(kFamilies[GetParam()], problems ? std::atoi(problems) : 100, first ? std::atoi(first) : 1, Ceiling::wave);
+  EXPECT_EQ(count.wrong, 0);
+  EXPECT_LE(count.ambiguous, count.problems / 100);
+}
+
 std::string family_name(const ::testing::TestParamInfo<std::size_t>& info) { return kFamilies[info.param].name; }
 INSTANTIATE_TEST_SUITE_P(Families, GlobalSearch, ::testing::Values(0, 1, 3, 4), family_name);
+INSTANTIATE_TEST_SUITE_P(Finite, LongWaveSearch, ::testing::Range<std::size_t>(0, 3), family_name);
 INSTANTIATE_TEST_SUITE_P(Families, LongGlobalSearch, ::testing::Range<std::size_t>(0, 5), family_name);
 
 }  // namespace
