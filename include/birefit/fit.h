@@ -99,7 +99,8 @@ struct RivalMinimum {
   double chi_square = 0;
   /// Of its evidence against the reported minimum's: likelihood_ratio times the ratio of the shares of the bounds that either takes up.
   double odds = 0;
-  double likelihood_ratio = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)); the larger of the two decides whether the answer is ambiguous
+  double likelihood_ratio = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)); above 1 where the reported minimum owes its odds to its width
+  bool counts = true;           ///< makes the answer ambiguous
 };
 
 /// How one branch of the sample did.

@@ -150,6 +150,7 @@ class Fit {
   void settle_plans();
   void settle_outliers();
   void settle_misfit();
+  double ripple_period_of(std::size_t j) const;
   void weigh_rivals();
   void report();
 
@@ -444,50 +445,68 @@ void Fit::find_minima() {
       std::max(1.0, found_.candidates.front().objective / std::max(1.0, sample_rows_));
   constexpr double kPlausible = 30;
   struct Minimum {
-    Eigen::VectorXd searched;
-    double objective;
+    Candidate at;
+    double score;  ///< -2 ln of its evidence
     bool converged;
     std::string report;
   };
   std::vector<Minimum> minima;
+  const auto minimum = [&](const Eigen::VectorXd& x, const SolveSummary& summary) {
+    const Candidate at{x, problem_->objective(), projected_information(*problem_)};
+    return Minimum{at, at.objective - 2 * log_share(at.information, job_, unknowns_), summary.converged, summary.report};
+  };
   for (std::size_t i = 0; i < found_.candidates.size(); ++i) {
     if (i > 0 && found_.candidates[i].objective - found_.candidates[0].objective > kPlausible * reduced) break;
     Eigen::VectorXd x = found_.candidates[i].searched;
     const SolveSummary summary = solve(x, i == 0 ? "fit" : "", i == 0 ? 0 : 30);
-    minima.push_back({x, problem_->objective(), summary.converged, summary.report});
+    minima.push_back(minimum(x, summary));
     if (stopped_) break;
   }
-  const auto lower = [](const Minimum& a, const Minimum& b) { return a.objective < b.objective; };
+  const auto lower = [](const Minimum& a, const Minimum& b) { return a.score < b.score; };
   // A sphere's ripples are too fine for the scan's grid: from the best minimum on to its neighbours, as long as that helps.
   for (int round = 0; round < 4 && !stopped_; ++round) {
     const Minimum from = *std::min_element(minima.begin(), minima.end(), lower);
     bool better = false;
+    const auto look_from = [&](Eigen::VectorXd x) {
+      const Minimum found = minimum(x, solve(x, "", 30));
+      better = better || found.score < from.score;
+      const bool known = std::any_of(minima.begin(), minima.end(), [&](const Minimum& m) { return separation(m.at, found.at.searched) < 5 && separation(found.at, m.at.searched) < 5; });
+      if (!known && found.score - from.score < kPlausible * reduced) minima.push_back(found);
+    };
     for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
       const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
-      double period = 0;
-      for (const Micrograph& m : job_.micrographs) period = std::max(period, ripple_period(m.scene, problem_->theta(), unknowns_.searched[j]));
-      for (const double ripples : {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0}) {  // TE and TM resonances interlace
-        Eigen::VectorXd x = from.searched;
-        double& moved = x[static_cast<Eigen::Index>(j)];
-        moved += ripples * period;
-        if (period == 0 || stopped_ || moved < parameter.lower || moved > parameter.upper) continue;
-        const SolveSummary summary = solve(x, "", 30);
-        const double objective = problem_->objective();
-        better = better || objective < from.objective;
-        const bool known = std::any_of(minima.begin(), minima.end(), [&](const Minimum& m) {
-          return std::abs(m.searched[static_cast<Eigen::Index>(j)] - x[static_cast<Eigen::Index>(j)]) < 0.2 * period && std::abs(m.objective - objective) < 1;
-        });
-        if (!known && objective - from.objective < kPlausible * reduced) minima.push_back({x, objective, summary.converged, summary.report});
+      const double period = ripple_period_of(j);
+      if (period == 0) continue;
+      const auto moved = [&](double by) {
+        Eigen::VectorXd x = from.at.searched;
+        x[static_cast<Eigen::Index>(j)] += by;
+        return x;
+      };
+      const auto allowed = [&](const Eigen::VectorXd& x) { return !stopped_ && x[static_cast<Eigen::Index>(j)] > parameter.lower && x[static_cast<Eigen::Index>(j)] < parameter.upper; };
+      for (const double ripples : {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0})  // TE and TM resonances interlace
+        if (const Eigen::VectorXd x = moved(ripples * period); allowed(x)) look_from(x);
+      // A resonance that follows the noise is a dip far narrower than the valley it lies in: beside it the misfit rises less than its own width foretells.
+      const double sd = 1 / from.at.information.col(static_cast<Eigen::Index>(j)).norm();
+      for (const double side : {-1.0, 1.0}) {
+        std::optional<Eigen::VectorXd> start;
+        double least = from.at.objective + kPlausible * reduced;
+        for (double off = 8; off * sd < 0.5 * period; off *= 2) {
+          const Eigen::VectorXd x = moved(side * off * sd);
+          if (!allowed(x)) break;
+          problem_->evaluate(x, false);
+          if (problem_->objective() < least) least = problem_->objective(), start = x;
+        }
+        if (start) look_from(*start);
       }
     }
     if (!better) break;
   }
   const auto lowest = std::min_element(minima.begin(), minima.end(), lower);
-  best_ = lowest->searched;
+  best_ = lowest->at.searched;
   result_.converged = lowest->converged && !stopped_;
   result_.solver_report = lowest->report;
   for (auto i = minima.begin(); i != minima.end(); ++i)
-    if (i != lowest) rivals_.push_back(i->searched);
+    if (i != lowest) rivals_.push_back(i->at.searched);
   problem_->evaluate(best_, true);
   theta_ = problem_->theta();
 }
@@ -739,10 +758,20 @@ void Fit::settle_misfit() {
   }
 }
 
+/// Between one ripple of a sphere's image and the next, of a searched unknown; 0 where it has none.
+double Fit::ripple_period_of(std::size_t j) const {
+  double period = 0;
+  for (const Micrograph& m : job_.micrographs) period = std::max(period, ripple_period(m.scene, problem_->theta(), unknowns_.searched[j]));
+  return period;
+}
+
 /// Minima that survived the scan, with the weights of the final problem: misfit is paid for in the odds as well.
 void Fit::weigh_rivals() {
   if (!stopped_ && !rivals_.empty()) {
     Candidate main{best_, problem_->objective(), projected_information(*problem_)};
+    const auto score = [&](const Candidate& c) { return c.objective - 2 * log_share(c.information, job_, unknowns_); };
+    bool ripples = false;
+    for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) ripples = ripples || ripple_period_of(j) > 0;
     std::vector<Candidate> others;
     for (Eigen::VectorXd x : rivals_) {
       solve(x, "", 30);
@@ -751,27 +780,32 @@ void Fit::weigh_rivals() {
       // Far apart in the standard errors of either, or else they are two places of one valley. (At an extremum of the fringes one alone
       // calls everything near.)
       if (separation(main, x) < 5 && separation(rival, main.searched) < 5) {
-        if (rival.objective < main.objective) std::swap(main, rival);
+        if (score(rival) < score(main)) std::swap(main, rival);
         continue;
       }
-      if (rival.objective < main.objective) std::swap(main, rival);
+      if (score(rival) < score(main)) std::swap(main, rival);
       const bool known = std::any_of(others.begin(), others.end(),
                                      [&](const Candidate& other) { return separation(other, rival.searched) < 5 && separation(rival, other.searched) < 5; });
       if (!known) others.push_back(std::move(rival));
     }
-    const double share = log_share(main.information, job_, unknowns_);
+    // Of a dip and the valley it lies in, the valley, whose interval holds both.
+    constexpr double kHeld = 2, kWorthHolding = 0.05;
+    for (Candidate& rival : others)
+      if (separation(rival, main.searched) < kHeld && score(rival) - score(main) < -2 * std::log(kWorthHolding)) std::swap(main, rival);
     for (const Candidate& rival : others) {
       RivalMinimum minimum;
-      minimum.likelihood_ratio = std::exp(-0.5 * std::max(0.0, rival.objective - main.objective));
-      minimum.odds = minimum.likelihood_ratio * std::exp(log_share(rival.information, job_, unknowns_) - share);
-      // At an extremum of the fringes a minimum is no parabola, and its share no more than a guess: neither measure alone dismisses a rival.
-      const double either = std::max(minimum.odds, minimum.likelihood_ratio);
-      if (!(either > 1e-3)) continue;
+      minimum.likelihood_ratio = std::exp(-0.5 * (rival.objective - main.objective));
+      minimum.odds = std::exp(-0.5 * (score(rival) - score(main)));
+      // Among a sphere's many resonances one always follows the noise, a dip too narrow to be likely. Elsewhere neither measure alone dismisses a rival: at an extremum of the
+      // fringes a minimum is no parabola, and its share no more than a guess.
+      const double matters = ripples ? minimum.odds : std::max(minimum.odds, minimum.likelihood_ratio);
+      minimum.counts = matters > kAmbiguousOdds && !(separation(main, rival.searched) < kHeld);
+      if (!(std::max(minimum.odds, minimum.likelihood_ratio) > 1e-3)) continue;
       problem_->evaluate(rival.searched, false);
       minimum.theta = problem_->theta();
       for (int g = 0; g < frames_; ++g) minimum.chi_square += problem_->frame_misfit(g).chi_square;
       minimum.chi_square += problem_->prior_chi_square();
-      if (either > kAmbiguousOdds) result_.ambiguous = true;
+      result_.ambiguous = result_.ambiguous || minimum.counts;
       result_.rivals.push_back(std::move(minimum));
     }
     std::stable_sort(result_.rivals.begin(), result_.rivals.end(),

@@ -161,7 +161,7 @@ std::string verdict(const FitResult& result, bool signal) {
   if (result.ambiguous) {
     std::vector<std::string> others;
     for (const RivalMinimum& rival : result.rivals)
-      if (std::max(rival.odds, rival.likelihood_ratio) > kAmbiguousOdds)
+      if (rival.counts)
         others.push_back(std::abs(std::log(rival.odds / rival.likelihood_ratio)) < 0.7 ? fmt::format("odds {:.2g}", rival.odds)
                                                                                        : fmt::format("odds {:.2g}, likelihood ratio {:.2g}", rival.odds, rival.likelihood_ratio));
     sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),

@@ -17,7 +17,7 @@ namespace birefit {
 /// The disc's coordinates: v = sqrt(1 - rho/edge), 0 at the rim, where light ends like that root, and turn: y/x and -x/y in turn,
 /// from -1 to 1 in each quarter that is centred on half an axis; an angle without a trigonometric function, 8 a full turn.
 namespace disc {
-constexpr int kPanels = 4, kSectors = 8, kLevels = 4;  ///< squares of level 0; level l has 2^l times as many along either
+constexpr int kPanels = 4, kSectors = 8, kLevels = 6;  ///< squares of level 0; level l has 2^l times as many along either
 constexpr int panels(int level) { return kPanels << level; }
 constexpr int sectors(int level) { return kSectors << level; }
 

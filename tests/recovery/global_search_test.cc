@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -123,7 +124,9 @@ struct Family {
 const std::vector<Family> kFamilies = {{"Droplet", radial_droplet}, {"DropletInAField", droplet_in_a_field}, {"Shell", shell}, {"Cell", cell}, {"HeatedPlate", heated_plate}};
 
 struct Count {
-  int problems = 0, right = 0, limits = 0, ambiguous = 0, refused = 0;
+  int problems = 0, right = 0, limits = 0, refused = 0;
+  int undecided = 0;  ///< ambiguous, and another minimum is as likely as 1 to 100
+  int ambiguous = 0;  ///< though none is
   int wrong = 0;  ///< an answer with a searched parameter more than five standard errors off
 };
 
@@ -171,7 +174,7 @@ Count solve(const Family& family, int problems, int first_seed = 1, Ceiling ceil
     const std::scoped_lock lock(mutex);
     ++count.problems;
     if (r.ambiguous) {
-      ++count.ambiguous;
+      ++(std::any_of(r.rivals.begin(), r.rivals.end(), [](const RivalMinimum& rival) { return rival.likelihood_ratio > 0.01; }) ? count.undecided : count.ambiguous);
     } else if (!r.has_answer()) {
       ++count.refused;
     } else if (wrong) {
@@ -188,8 +191,8 @@ Count solve(const Family& family, int problems, int first_seed = 1, Ceiling ceil
       std::printf(" %s\n", r.has_answer() ? "" : r.verdict.c_str());
     }
   });
-  std::printf("  %s: %d problems, %d right, %d limits, %d ambiguous, %d without an answer, %d WRONG\n", family.name.c_str(), count.problems, count.right, count.limits,
-              count.ambiguous, count.refused, count.wrong);
+  std::printf("  %s: %d problems, %d right, %d limits, %d undecided, %d ambiguous, %d without an answer, %d WRONG\n", family.name.c_str(), count.problems, count.right, count.limits,
+              count.undecided, count.ambiguous, count.refused, count.wrong);
   return count;
 }
 
@@ -209,16 +212,23 @@ TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   const char *problems = std::getenv("BIREFIT_PROBLEMS"), *first = std::getenv("BIREFIT_FIRST_PROBLEM");
   const Count count = solve(kFamilies[GetParam()], problems ? std::atoi(problems) : 3000, first ? std::atoi(first) : 1);
   EXPECT_LE(count.wrong, count.problems / 1000);
-  EXPECT_LE(count.ambiguous, count.problems / 100);
+  EXPECT_LE(count.ambiguous + count.undecided, count.problems / 100);
 }
 
-// The same on pictures by wave optics, for the families that are finite: 100 of each.
+// The same on pictures by wave optics, for the families that are finite: 100 of each. Ripples of large droplets may be as likely as each other.
 class LongWaveSearch : public GlobalSearch {};
 TEST_P(LongWaveSearch, IsNeverConfidentlyWrong) {
   const char *problems = std::getenv("BIREFIT_PROBLEMS"), *first = std::getenv("BIREFIT_FIRST_PROBLEM");
   const Count count = solve(kFamilies[GetParam()], problems ? std::atoi(problems) : 100, first ? std::atoi(first) : 1, Ceiling::wave);
   EXPECT_EQ(count.wrong, 0);
   EXPECT_LE(count.ambiguous, count.problems / 100);
+  EXPECT_LE(count.undecided, count.problems / 20);
+}
+
+// The lowest chi-square of this shell lies in a resonance 0.6 nm wide that follows the noise, 17 of its standard errors from the truth: the valley around it is the likelier answer.
+TEST(WaveSearch, AResonanceThatFollowsTheNoiseIsNotTheAnswer) {
+  const Count count = solve(kFamilies[2], 1, 69, Ceiling::wave);
+  EXPECT_EQ(count.right, 1);
 }
 
 std::string family_name(const ::testing::TestParamInfo<std::size_t>& info) { return kFamilies[info.param].name; }
