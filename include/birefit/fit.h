@@ -100,7 +100,8 @@ struct RivalMinimum {
   /// Of its evidence against the reported minimum's: likelihood_ratio times the ratio of the shares of the bounds that either takes up.
   double odds = 0;
   double likelihood_ratio = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)); above 1 where the reported minimum owes its odds to its width
-  bool counts = true;           ///< makes the answer ambiguous
+  /// Makes the answer ambiguous: odds or likelihood_ratio above kAmbiguousOdds; among a sphere's ripples odds alone, and not within two standard errors of the reported minimum.
+  bool counts = true;
 };
 
 /// How one branch of the sample did.
@@ -108,7 +109,7 @@ struct BranchResult {
   std::string name;
   double chi_square = 0;   ///< all branches by the noise of the best one
   int parameters = 0;      ///< free ones
-  double odds = 0;         ///< of its evidence against the reported branch's: exp(-difference of (chi-square / max(1, reduced) - 2 log_share) / 2)
+  double odds = 0;         ///< of its evidence against the reported branch's: exp(-difference of (chi-square / max(1, reduced) + priors' - 2 log_share) / 2)
   bool reported = false;
 };
 

@@ -151,6 +151,9 @@ class Fit {
   void settle_outliers();
   void settle_misfit();
   double ripple_period_of(std::size_t j) const;
+  bool ripples() const;
+  double score(const Candidate&) const;
+  double rank(const Candidate&) const;
   void weigh_rivals();
   void report();
 
@@ -446,14 +449,14 @@ void Fit::find_minima() {
   constexpr double kPlausible = 30;
   struct Minimum {
     Candidate at;
-    double score;  ///< -2 ln of its evidence
+    double rank;
     bool converged;
     std::string report;
   };
   std::vector<Minimum> minima;
   const auto minimum = [&](const Eigen::VectorXd& x, const SolveSummary& summary) {
     const Candidate at{x, problem_->objective(), projected_information(*problem_)};
-    return Minimum{at, at.objective - 2 * log_share(at.information, job_, unknowns_), summary.converged, summary.report};
+    return Minimum{at, rank(at), summary.converged, summary.report};
   };
   for (std::size_t i = 0; i < found_.candidates.size(); ++i) {
     if (i > 0 && found_.candidates[i].objective - found_.candidates[0].objective > kPlausible * reduced) break;
@@ -462,16 +465,21 @@ void Fit::find_minima() {
     minima.push_back(minimum(x, summary));
     if (stopped_) break;
   }
-  const auto lower = [](const Minimum& a, const Minimum& b) { return a.score < b.score; };
+  const auto lower = [](const Minimum& a, const Minimum& b) { return a.rank < b.rank; };
   // A sphere's ripples are too fine for the scan's grid: from the best minimum on to its neighbours, as long as that helps.
   for (int round = 0; round < 4 && !stopped_; ++round) {
     const Minimum from = *std::min_element(minima.begin(), minima.end(), lower);
     bool better = false;
     const auto look_from = [&](Eigen::VectorXd x) {
-      const Minimum found = minimum(x, solve(x, "", 30));
-      better = better || found.score < from.score;
-      const bool known = std::any_of(minima.begin(), minima.end(), [&](const Minimum& m) { return separation(m.at, found.at.searched) < 5 && separation(found.at, m.at.searched) < 5; });
-      if (!known && found.score - from.score < kPlausible * reduced) minima.push_back(found);
+      const SolveSummary summary = solve(x, "", 30);
+      const Minimum found = minimum(x, summary);
+      const auto known = std::find_if(minima.begin(), minima.end(), [&](const Minimum& m) { return separation(m.at, found.at.searched) < 5 && separation(found.at, m.at.searched) < 5; });
+      if (known == minima.end()) {
+        better = better || found.rank < from.rank;
+        if (found.rank - from.rank < kPlausible * reduced) minima.push_back(found);
+      } else if (found.at.objective < known->at.objective) {
+        *known = found;
+      }
     };
     for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
       const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
@@ -494,7 +502,7 @@ void Fit::find_minima() {
           const Eigen::VectorXd x = moved(side * off * sd);
           if (!allowed(x)) break;
           problem_->evaluate(x, false);
-          if (problem_->objective() < least) least = problem_->objective(), start = x;
+          if (problem_->objective() < std::min(least, from.at.objective + 0.5 * off * off)) least = problem_->objective(), start = x;
         }
         if (start) look_from(*start);
       }
@@ -765,13 +773,23 @@ double Fit::ripple_period_of(std::size_t j) const {
   return period;
 }
 
+bool Fit::ripples() const {
+  for (std::size_t j = 0; j < unknowns_.searched.size(); ++j)
+    if (ripple_period_of(j) > 0) return true;
+  return false;
+}
+
+/// -2 ln of a minimum's evidence.
+double Fit::score(const Candidate& c) const { return c.objective - 2 * log_share(c.information, job_, unknowns_); }
+/// What the best minimum has least of. Only of a sphere's ripples, which are alike but for their width, is that the evidence: a minimum that is flat because fringes have an
+/// extremum there takes up all bounds.
+double Fit::rank(const Candidate& c) const { return ripples() ? score(c) : c.objective; }
+
 /// Minima that survived the scan, with the weights of the final problem: misfit is paid for in the odds as well.
 void Fit::weigh_rivals() {
   if (!stopped_ && !rivals_.empty()) {
     Candidate main{best_, problem_->objective(), projected_information(*problem_)};
-    const auto score = [&](const Candidate& c) { return c.objective - 2 * log_share(c.information, job_, unknowns_); };
-    bool ripples = false;
-    for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) ripples = ripples || ripple_period_of(j) > 0;
+    const bool rippled = ripples();
     std::vector<Candidate> others;
     for (Eigen::VectorXd x : rivals_) {
       solve(x, "", 30);
@@ -780,26 +798,27 @@ void Fit::weigh_rivals() {
       // Far apart in the standard errors of either, or else they are two places of one valley. (At an extremum of the fringes one alone
       // calls everything near.)
       if (separation(main, x) < 5 && separation(rival, main.searched) < 5) {
-        if (score(rival) < score(main)) std::swap(main, rival);
+        if (rival.objective < main.objective) std::swap(main, rival);
         continue;
       }
-      if (score(rival) < score(main)) std::swap(main, rival);
+      if (rank(rival) < rank(main)) std::swap(main, rival);
       const bool known = std::any_of(others.begin(), others.end(),
                                      [&](const Candidate& other) { return separation(other, rival.searched) < 5 && separation(rival, other.searched) < 5; });
       if (!known) others.push_back(std::move(rival));
     }
     // Of a dip and the valley it lies in, the valley, whose interval holds both.
     constexpr double kHeld = 2, kWorthHolding = 0.05;
-    for (Candidate& rival : others)
-      if (separation(rival, main.searched) < kHeld && score(rival) - score(main) < -2 * std::log(kWorthHolding)) std::swap(main, rival);
+    const auto valley = std::find_if(others.begin(), others.end(), [&](const Candidate& rival) {
+      return rippled && separation(rival, main.searched) < kHeld && score(rival) - score(main) < -2 * std::log(kWorthHolding);
+    });
+    if (valley != others.end()) std::swap(main, *valley);
     for (const Candidate& rival : others) {
       RivalMinimum minimum;
       minimum.likelihood_ratio = std::exp(-0.5 * (rival.objective - main.objective));
       minimum.odds = std::exp(-0.5 * (score(rival) - score(main)));
       // Among a sphere's many resonances one always follows the noise, a dip too narrow to be likely. Elsewhere neither measure alone dismisses a rival: at an extremum of the
       // fringes a minimum is no parabola, and its share no more than a guess.
-      const double matters = ripples ? minimum.odds : std::max(minimum.odds, minimum.likelihood_ratio);
-      minimum.counts = matters > kAmbiguousOdds && !(separation(main, rival.searched) < kHeld);
+      minimum.counts = rippled ? minimum.odds > kAmbiguousOdds && separation(main, rival.searched) >= kHeld : std::max(minimum.odds, minimum.likelihood_ratio) > kAmbiguousOdds;
       if (!(std::max(minimum.odds, minimum.likelihood_ratio) > 1e-3)) continue;
       problem_->evaluate(rival.searched, false);
       minimum.theta = problem_->theta();
@@ -1410,7 +1429,10 @@ FitResult best_branch(const FitJob& job, std::vector<FitResult> results) {
     branch.name = job.branches[b].name;
     branch.chi_square = residual(results[b], *smallest, false).first;
     branch.parameters = static_cast<int>(results[b].parameters.size());
-    score.push_back(branch.chi_square / reduced - 2 * results[b].log_share);
+    double prior = 0;
+    for (const ParameterEstimate& p : results[b].parameters)
+      if (p.prior_sd && p.prior_value) prior += std::pow((p.value - *p.prior_value) / *p.prior_sd, 2);
+    score.push_back(branch.chi_square / reduced + prior - 2 * results[b].log_share);
     branches.push_back(branch);
   }
   const std::size_t best = static_cast<std::size_t>(std::min_element(score.begin(), score.end()) - score.begin());

@@ -164,15 +164,18 @@ double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
 double log_share(const Eigen::MatrixXd& information, const FitJob& job, const Unknowns& unknowns) {
   if (information.size() == 0) return 0;
   Eigen::MatrixXd in_widths = information;
+  Eigen::VectorXd prior = Eigen::VectorXd::Ones(information.cols());
   for (Eigen::Index j = 0; j < in_widths.cols(); ++j) {
     const Parameter& parameter = job.parameters[unknowns.searched[static_cast<std::size_t>(j)]];
-    const double width = parameter.upper - parameter.lower;
-    // Without bounds a unit serves: what is compared has the same parameters.
-    in_widths.col(j) *= parameter.prior_sd ? *parameter.prior_sd * std::sqrt(2 * std::numbers::pi) : std::isfinite(width) ? width : 1.0;
+    const double width = parameter.upper - parameter.lower, of_gaussian = std::sqrt(2 * std::numbers::pi);
+    // Bounds as the Gaussian that is as dense in its middle: variance width^2 / (2 pi). A prior is in the information already. Without bounds a unit serves, which says something of
+    // the same parameters only.
+    in_widths.col(j) *= (parameter.prior_sd ? *parameter.prior_sd * of_gaussian : std::isfinite(width) ? width : 1.0) / of_gaussian;
+    if (parameter.prior_sd) prior[j] = 0;
   }
-  // Along each principal axis the Gaussian prior that is as dense in its middle as the bounds are wide: variance 1/(2 pi).
+  const Eigen::MatrixXd all = in_widths.transpose() * in_widths + Eigen::MatrixXd(prior.asDiagonal());
   double sum = 0;
-  for (const double s : in_widths.jacobiSvd().singularValues()) sum -= 0.5 * std::log1p(s * s / (2 * std::numbers::pi));
+  for (const double d : all.ldlt().vectorD()) sum -= 0.5 * std::log(std::max(d, 1e-300));
   return sum;
 }
 

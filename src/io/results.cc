@@ -180,7 +180,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
       if (const ParameterRef ref = config.job.parameters.find(p.name); ref && ref.index < std::ssize(rival.theta))
         values[p.name] = number(rival.theta[ref.index]);
     json["rivals"].push_back(
-        {{"odds", number(rival.odds)}, {"likelihood_ratio", number(rival.likelihood_ratio)}, {"chi_square", number(rival.chi_square)}, {"parameters", values}});
+        {{"odds", number(rival.odds)}, {"likelihood_ratio", number(rival.likelihood_ratio)}, {"counts", rival.counts}, {"chi_square", number(rival.chi_square)}, {"parameters", values}});
   }
   json["branches"] = Json::array();
   for (const BranchResult& branch : result.branches)

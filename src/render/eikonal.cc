@@ -289,7 +289,7 @@ EikonalFan<S>::EikonalFan(const DropletOptics<S>& o, bool extraordinary, double 
     if (beside) add({has_core ? incidence(core * index) : T(0.0), rim}, 0, 1, kExact);
     if (has_core) {
       const T last = incidence(core * into_core);
-      add({T(0.0), plain(last) < plain(rim) ? last : rim}, 0, 1, kExact);
+      add({T(0.0), plain(last) < plain(rim) ? last : rim, Piece::Map::rim, true}, 0, 1, kExact);
     }
   } else {
     add_rays_in_field(rim, shape[3]);
@@ -397,7 +397,7 @@ template <class S>
 void EikonalFan<S>::add(const Piece& piece, double from, double to, const Accuracy& accuracy) {
   if (std::optional<Panel> panel = panel_of(piece, from, to, accuracy)) {
     // Where one panel goes on from another, their polynomials leave no gap between them.
-    if (!panels_.empty()) {
+    if (!panels_.empty() && !(piece.jumps && from == 0)) {
       const Panel& before = panels_.back();
       if (std::abs(plain(before.piece.psi(before.middle + before.half)) - plain(piece.psi(from))) < 1e-12) panel->outer = before.inner;
     }

@@ -66,8 +66,8 @@ class EikonalFan {
   EikonalRay<S> at(const S& rho_um) const;
   int rays() const { return rays_; }  ///< that were traced
   double path_error() const { return path_error_; }  ///< of the polynomials, by their two highest coefficients; in radii times n_o
-  /// Image radii where light of this mode begins or ends: rims, the core's edge, the objective's aperture, the shadow of a ring, folds. Same in all lanes; in
-  /// no order.
+  /// Image radii where light of this mode begins, ends or jumps: rims, the core's edge, the objective's aperture, the shadow of a ring; where rays turn too far or fold, the last
+  /// panel that polynomials follow. Same in all lanes; in no order.
   const std::vector<S>& ends_um() const { return ends_um_; }
 
  private:
@@ -83,6 +83,7 @@ class EikonalFan {
     /// rim: psi = high - (high - low) u^2, in which what ends like a root at `high` is smooth. axis: psi = high (low / high)^u, steps as long as
     /// psi is large, where psi = 0 is a singular point beyond `low`.
     enum class Map { rim, axis } map = Map::rim;
+    bool jumps = false;  ///< at `high`: rays do not go on from those of the piece before, though it ends there
     T psi(double u) const;
     T by_u(double u) const;
     double bend(double u) const;  ///< second derivative

@@ -14,7 +14,8 @@ EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const 
       cos_between_(cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg))),
       aplanatic_(scene.microscope.aplanatic),
       symmetry_(round_symmetry(scene, value, false)),
-      panels_(plan.part_panels) {
+      panels_(plan.part_panels),
+      allowed_tail_(std::max(0.05 * scene.intensity_accuracy, 3 * plan.numerical_error)) {
   passing_ = PassingLight<S>(view_.pixel_um(), optics_.radius_um, cos_between_);
   std::vector<S> ends = fan_p_.ends_um();
   ends.insert(ends.end(), fan_s_.ends_um().begin(), fan_s_.ends_um().end());
@@ -93,7 +94,11 @@ double EikonalImage<S>::table_error(std::size_t which, int panels) const {
 
 template <class S>
 void EikonalImage<S>::tabulate(typename PixelModel<S>::Wanted, int threads) {
-  for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k].light = table(parts_[k], panels_[k], threads);
+  // The planner's parts had other fringes, in a fit: by values alone, so that derivatives change nothing.
+  constexpr int kMost = 64;
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    do parts_[k].light = table(parts_[k], panels_[k], threads);
+    while (parts_[k].light.tail() > allowed_tail_ && (panels_[k] *= 2) <= kMost);
 }
 
 template <class S>

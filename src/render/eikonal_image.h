@@ -57,6 +57,7 @@ class EikonalImage final : public PixelModel<S> {
   Symmetry symmetry_;
   std::vector<Part> parts_;  ///< from the axis outwards, two for each stretch between ends
   std::vector<int> panels_;  ///< of the parts
+  double allowed_tail_;      ///< of tables that are read
 };
 
 }  // namespace birefit

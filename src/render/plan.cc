@@ -118,15 +118,13 @@ double droplet_phase(const DropletOptics<double>& o, double psi) {
   });
 }
 
-void sample_by_phase(const Scene& scene, RenderPlan& plan, double center_x, double center_y, double bins,
+void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double bins,
                      const std::function<double(double)>& phase_step) {
   plan.sampling_center_x_px = center_x;
   plan.sampling_center_y_px = center_y;
   plan.sampling_bin_px = 1;
   plan.samples.clear();
-  // The error grows with the fourth power of the phase across a pixel: a coarse start of a fit takes fewer points.
-  const double coarser = std::pow(std::max(1.0, scene.intensity_accuracy / 1e-4), 0.25);
-  for (int i = 0; i < bins; ++i) plan.samples.push_back(samples_for(phase_step(i + 0.5) / coarser));
+  for (int i = 0; i < bins; ++i) plan.samples.push_back(samples_for(phase_step(i + 0.5)));
 }
 
 /// Of the accuracy asked for: the table's error stays far below it, so that neither the image nor its slope shows the
@@ -297,7 +295,7 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
       before = here;
     }
   }
-  sample_by_phase(scene, plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
+  sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
     if (r < 3) return r < 2 ? 9.0 : 5.0;  // where a defect may be
     if (std::abs(r * px - edge) < 1.5 * px) return 3.0;
     const double f = std::min(kRadii - 1e-9, r * px / edge * kRadii);
@@ -327,7 +325,7 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
   };
   double largest_phase = 0;
   for (int i = 0; i <= 64; ++i) largest_phase = std::max(largest_phase, phase_at(edge * i / 64));
-  sample_by_phase(scene, plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
+  sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
     const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
     // The cross turns within the innermost pixels; at the rim intensity ends like a root.
     if (r < 3) return r < 2 ? 9.0 : 5.0;
@@ -719,7 +717,7 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
       plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
       plan_fringe_blocks(scene, value, plan);
     } else {
-      sample_by_phase(scene, plan, cx, cy, bins, [&](double r) {
+      sample_by_phase(plan, cx, cy, bins, [&](double r) {
         const double f = std::min(23.999, r / bins * 24);
         const std::size_t i = static_cast<std::size_t>(f);
         return std::max(gradient[i], gradient[i + 1]);
@@ -774,7 +772,7 @@ RenderPlan plan_disc(const Scene& scene, const Values<double>& value) {
       gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(disc_phase(o, x + h, y) - disc_phase(o, x - h, y), disc_phase(o, x, y + h) - disc_phase(o, x, y - h)));
     }
   const int bins = std::max(2, static_cast<int>(std::ceil(radius_px)) + 2);
-  sample_by_phase(scene, plan, o.center_x_px, o.center_y_px, bins, [&](double r) {
+  sample_by_phase(plan, o.center_x_px, o.center_y_px, bins, [&](double r) {
     if (std::abs(r - radius_px) < 2) return 9.0;  // the edge
     const double f = std::min(119.999, r / radius_px * 120);
     const std::size_t i = static_cast<std::size_t>(f);

@@ -422,10 +422,10 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
 struct Seen {
   TableBuilder b;
   Scene scene;
-  Seen(double host, double wall_um, double field, double ring, double na, double analyzer_deg) {
+  Seen(double host, double wall_um, double field, double ring, double na, double analyzer_deg, double core_index = 1.45) {
     Droplet d;
     d.diameter_um = b.fitted("diameter_um", 9, 8, 10);
-    if (wall_um > 0) d.director = ShellDirector{b.fitted("wall_um", wall_um, 0.1, 4), {}, b.fixed("core_index", 1.45)};
+    if (wall_um > 0) d.director = ShellDirector{b.fitted("wall_um", wall_um, 0.1, 4), {}, b.fixed("core_index", core_index)};
     if (field > 0) {
       AxialDirector axial;
       axial.reduced_field = b.fitted("reduced_field", field, 1, 20);
@@ -454,11 +454,16 @@ struct Seen {
 // Tables between the places where light begins or ends, read everywhere, against a ray of either mode for every point; within an eighth of a pixel of such a place
 // the picture passes from one side to the other.
 TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
-  for (const auto& [host, wall, field, ring] : {std::array{1.52, 0.0, 0.0, 0.0}, {1.43, 0.0, 0.0, 0.0}, {1.45, 1.3, 0.0, 0.0}, {1.52, 0.0, 3.0, 0.0}, {1.52, 0.0, 8.0, 0.85}})
+  struct Case {
+    double host, wall, core_index, field, ring, allowed;
+  };
+  // Closed forms: a thousandth of the accuracy asked. In a field elements of the director have kinks between them, and beside a ring nothing is smooth for long.
+  for (const auto& [host, wall, core_index, field, ring, allowed] : {Case{1.52, 0, 0, 0, 0, 1e-7}, {1.43, 0, 0, 0, 0, 1e-7}, {1.45, 1.3, 1.45, 0, 0, 1e-7}, {1.45, 1.3, 1.60, 0, 0, 1e-7},
+                                                                     {1.45, 1.3, 1.80, 0, 0, 1e-7}, {1.52, 0, 0, 3, 0, 1e-5}, {1.52, 0, 0, 8, 0.85, 1e-3}})
     for (const double na : {0.0, 0.35, 0.8})
       for (const double analyzer_deg : {90.0, 70.0}) {
-        SCOPED_TRACE(::testing::Message() << "host " << host << ", wall " << wall << ", field " << field << ", NA " << na << ", analyser " << analyzer_deg);
-        const Seen s(host, wall, field, ring, na, analyzer_deg);
+        SCOPED_TRACE(::testing::Message() << "host " << host << ", wall " << wall << ", core " << core_index << ", field " << field << ", NA " << na << ", analyser " << analyzer_deg);
+        const Seen s(host, wall, field, ring, na, analyzer_deg, core_index);
         const Theta theta = s.b.table.values();
         const RenderPlan chosen = plan(s.scene, theta);
         const Values<double> value(theta, {});
@@ -481,7 +486,9 @@ TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
           const double expected = std::norm(a * c * std::cos(alpha) - d * n * std::sin(alpha)) + (rho > o.radius_um ? between * between : 0);
           worst = std::max(worst, std::abs(model->intensity(47.2 + rho * c / px, 48.1 - rho * n / px) - expected));
         }
+        EXPECT_LT(worst, allowed);
         EXPECT_LT(worst, 3 * chosen.numerical_error);  // which knows 64 places a part
+        EXPECT_LT(chosen.numerical_error, 3 * allowed);
       }
 }
 
@@ -520,14 +527,14 @@ TEST(EikonalDroplet, LightThatEntersIsInThePicture) {
 // single ones feel the points where they are sampled. Beside a ring fringes are finer than these; an aperture keeps most of that light out.
 TEST(EikonalDroplet, DerivativesKnowWhereLightBeginsAndEnds) {
   struct Case {
-    double host, wall, field, ring;
+    double host, wall, core_index, field, ring;
     std::vector<double> apertures;
     double allowed;
   };
-  for (const auto& [host, wall, field, ring, apertures, allowed] : {Case{1.50, 0, 0, 0, {0, 0.35}, 0.03}, {1.43, 0, 0, 0, {0, 0.35}, 0.03}, {1.45, 1.3, 0, 0, {0, 0.45}, 0.05},
-                                                                    {1.50, 0, 3, 0, {0, 0.35}, 0.03}, {1.50, 0, 8, 0.85, {0.35}, 0.06}})
+  for (const auto& [host, wall, core_index, field, ring, apertures, allowed] :
+       {Case{1.50, 0, 0, 0, 0, {0, 0.35}, 0.03}, {1.43, 0, 0, 0, 0, {0, 0.35}, 0.03}, {1.45, 1.3, 1.45, 0, 0, {0, 0.45}, 0.05}, {1.45, 1.3, 1.60, 0, 0, {0, 0.45}, 0.05}, {1.50, 0, 0, 3, 0, {0, 0.35}, 0.03}, {1.50, 0, 0, 8, 0.85, {0.35}, 0.06}})
     for (const double na : apertures) {
-      const Seen s(host, wall, field, ring, na, 70);
+      const Seen s(host, wall, field, ring, na, 70, core_index);
       Theta theta = s.b.table.values();
       const RenderPlan chosen = plan(s.scene, theta);
       for (int index = 0; index < s.b.table.size(); ++index) {
