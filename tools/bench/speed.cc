@@ -232,6 +232,38 @@ void time_shell(int rounds) {
   std::printf("500 x 500 concentric shell, wall 1.3 um: %.2f ms\n", 1e3 * median(times));
 }
 
+/// Each mode on its own ray.
+void time_curved(int rounds) {
+  struct Sample {
+    const char* name;
+    double wall_um, field, ring;
+  };
+  for (const auto& [name, wall_um, field, ring] : {Sample{"hedgehog", 0, 0, 0}, {"shell, wall 1.3 um", 1.3, 0, 0}, {"hedgehog in a field, e = 3", 0, 3, 0}, {"ring in a field, e = 8", 0, 8, 0.85}}) {
+    DropletScene s = droplet_scene(false, 128, 0.1);
+    Droplet& droplet = std::get<Droplet>(s.scene.sample);
+    if (wall_um > 0) {
+      ShellDirector shell;
+      shell.wall_um = s.table.add_constant("wall_um", wall_um);
+      droplet.director = shell;
+    } else if (field > 0) {
+      AxialDirector axial;
+      axial.reduced_field = s.table.add_constant("reduced_field", field);
+      if (ring > 0) axial.ring_radius = s.table.add_constant("ring_radius", ring);
+      droplet.director = axial;
+    }
+    s.scene.rays = Rays::eikonal;
+    const Theta theta = s.table.values();
+    const RenderPlan p = plan(s.scene, theta);
+    Rendering out, out_four;
+    std::vector<double> image, four;
+    for (int i = 0; i < rounds; ++i) {
+      image.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, out); }));
+      four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four, 0, out_four); }));
+    }
+    std::printf("128 x 128 by curved rays, %s: %.2f ms   with four derivatives %.2f ms, %.2f times\n", name, 1e3 * median(image), 1e3 * median(four), median(four) / median(image));
+  }
+}
+
 /// Droplets that look different from all sides: full transport, tables over squares of the disc or a ray for every point.
 void time_unsymmetric(int rounds) {
   for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 3", "with a ring under a field across the view, e = 12", "eccentric shell"}) {
@@ -430,6 +462,7 @@ int main(int argc, char** argv) {
   }
 
   time_shell(rounds);
+  time_curved(rounds);
   time_cones(rounds);
   time_unsymmetric(rounds);
   const auto peak_mb = [] {
