@@ -325,19 +325,72 @@ void Fit::look_near_rays() {
     }
   }
   say("neighbouring fringe orders by wave optics");
-  std::vector<PixelSet> sets;
-  for (int g = 0; g < frames_; ++g) sets.push_back(pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]));
-  LeastSquares all(job_, unknowns_, plans_, std::move(sets));
-  all.set_misfit(prior_misfit());
+  // A grid for the largest droplet among the places to look at: a larger one than it was made for would be cut off.
+  const auto problem_for = [&](const std::vector<Eigen::VectorXd>& places) {
+    std::vector<PixelSet> sets;
+    std::vector<RenderPlan> plans;
+    for (int g = 0; g < frames_; ++g) {
+      const Scene& scene = job_.micrographs[g].scene;
+      const auto* droplet = std::get_if<Droplet>(&scene.sample);
+      Theta theta = theta_;
+      for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
+        double& value = theta[static_cast<std::size_t>(unknowns_.searched[j])];
+        value = places.front()[static_cast<Eigen::Index>(j)];
+        if (droplet && droplet->diameter_um.index == unknowns_.searched[j])
+          for (const Eigen::VectorXd& x : places) value = std::max(value, x[static_cast<Eigen::Index>(j)]);
+      }
+      plans.push_back(plan(scene, theta));
+      sets.push_back(pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]));
+    }
+    auto problem = std::make_unique<LeastSquares>(job_, unknowns_, std::move(plans), std::move(sets));
+    problem->set_misfit(prior_misfit());
+    return problem;
+  };
+  std::unique_ptr<LeastSquares> all = problem_for(starts);
   // Less than a third of an order apart in everything that forms fringes: the same minimum.
-  found_ = polish(all, job_, std::move(starts), 3, [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-    return ((a - b).cwiseProduct(rates)).cwiseAbs().maxCoeff() < 2;
-  });
+  const auto same = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return ((a - b).cwiseProduct(rates)).cwiseAbs().maxCoeff() < 2; };
+  found_ = polish(*all, job_, std::move(starts), 3, same);
+  // Rays may have been wrong by more than that: where no minimum describes the image, along every axis through the best, half an order a step, as long as that helps. A droplet's
+  // edge carries all its rings: smaller steps of the diameter, as in the scan.
+  constexpr double kDescribed = 2, kHelps = 0.98;
+  constexpr int kRounds = 3, kDiameters = 30, kMostSteps = 100;
+  for (int round = 0; round < kRounds && !found_.interrupted; ++round) {
+    const Candidate best = found_.candidates.front();
+    if (best.objective <= kDescribed * static_cast<double>(all->pixel_rows())) break;
+    say("no minimum near that of rays describes the image: looking farther");
+    std::vector<Eigen::VectorXd> lines;
+    for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
+      const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
+      const auto at = static_cast<Eigen::Index>(j);
+      const double width = parameter.upper - parameter.lower;
+      if (!(rates[at] * width > std::numbers::pi)) continue;
+      const auto* droplet = std::get_if<Droplet>(&job_.micrographs.front().scene.sample);
+      const bool diameter = droplet && droplet->diameter_um.index == unknowns_.searched[j];
+      const int steps = std::clamp(static_cast<int>(std::ceil(rates[at] * width / std::numbers::pi)), diameter ? kDiameters : 1, kMostSteps);
+      for (int i = 0; i < steps; ++i) {
+        lines.push_back(best.searched);
+        lines.back()[at] = parameter.lower + width * (i + 0.5) / steps;
+      }
+    }
+    if (lines.empty()) break;
+    evaluations_ += all->evaluations();
+    all = problem_for(lines);
+    ScanResult more = polish(*all, job_, std::move(lines), 3, same);
+    const bool helps = more.candidates.front().objective < kHelps * best.objective;
+    found_.interrupted = more.interrupted;
+    found_.points += more.points;
+    if (!helps) break;
+    for (Candidate& other : found_.candidates)
+      if (std::none_of(more.candidates.begin(), more.candidates.end(), [&](const Candidate& known) { return same(known.searched, other.searched); })) more.candidates.push_back(std::move(other));
+    found_.candidates = std::move(more.candidates);
+  }
   found_.traces = std::move(result_.scans);
   found_.points += scan_points_;
-  evaluations_ += all.evaluations();
+  evaluations_ += all->evaluations();
   stopped_ = stopped_ || rays.stopped_ || found_.interrupted;
-  sample_rows_ = static_cast<double>(all.pixel_rows());
+  sample_rows_ = static_cast<double>(all->pixel_rows());
+  for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) theta_[static_cast<std::size_t>(unknowns_.searched[j])] = found_.candidates.front().searched[static_cast<Eigen::Index>(j)];
+  for (int g = 0; g < frames_; ++g) plans_[g] = plan(job_.micrographs[g].scene, theta_);
 }
 
 /// The start with the centre where the images show it, within its bounds; nothing where no centre is searched or the start is there already.
