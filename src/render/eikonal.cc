@@ -319,7 +319,8 @@ void EikonalFan<S>::add_rays_in_field(const T& rim, const T& ring) {
     }
     // The shadow moves with the ring. Beside it: what comes closest is turned most.
     const double h = 0.5 * kBeside;
-    const T meets = moving_root(inside, T(0.5 * (equator(inside - h) + equator(inside + h)) - ring), (plain(equator(inside + h)) - plain(equator(inside - h))) / (2 * h));
+    const T below = equator(inside - h), above = equator(inside + h);
+    const T meets = moving_root(inside, T(0.5 * (below + above) - ring), (plain(above) - plain(below)) / (2 * h));
     if (inside + 2 * kBeside < most) add({meets + kBeside, rim}, 0, 1, kIntegrated);
     add({T(kAxis), meets - kBeside}, 0, 1, kIntegrated);
     return;
@@ -487,9 +488,8 @@ template <class S>
 void EikonalFan<S>::find_ends() {
   const auto add_end = [&](const Panel& panel, double x, const One& move) {
     const double u = panel.middle + panel.half * x;
-    const auto [ratio, slope] = function_at(panel, kRatio, x);
     const One sine = sin(lifted(panel.piece.psi(u)));
-    ends_um_.push_back(radius_um_ * in_all_lanes<S>(One(sine * ratio + move * panel.place(x).by_x)));
+    ends_um_.push_back(radius_um_ * in_all_lanes<S>(One(sine * function_at(panel, kRatio, x).value + move * panel.place(x).by_x)));
   };
   for (std::size_t i = 0; i < panels_.size(); ++i) {
     const Panel& panel = panels_[i];

@@ -37,7 +37,7 @@ class EikonalImage final : public PixelModel<S> {
   /// rho = end + v^2 / inverse_span.
   struct Part {
     S end_um, inverse_span;
-    double middle_um;  ///< where it meets the part on the end's other side
+    double middle_um;  ///< half-way to the next end, whose part begins there
     double blur_um;    ///< over which a jump at the end is drawn; 0 on the axis
     bool outwards;     ///< of the end
     Sensitivity<S> by_end, by_inverse_span;
