@@ -103,7 +103,7 @@ class Fit {
   explicit Fit(const FitJob& job)
       : job_(job), unknowns_(Unknowns::of(job)), frames_(static_cast<int>(job.micrographs.size())) {}
 
-  /// The global part. Returns the best objective on the subsample of pixels; above `hopeless_above` the search ends early.
+  /// The global part. Returns the best objective on the subsample of pixels, a pixel; above `hopeless_above` the search ends early.
   double search(double hopeless_above) {
     const auto begin = std::chrono::steady_clock::now();
     prepare();
@@ -143,6 +143,8 @@ class Fit {
 
   void prepare();
   double look_for_minima(double hopeless_above);
+  /// How many pixels of a frame the search looks at: where every pixel is rays of its own, no more than it takes.
+  std::size_t scanned_pixels(int g) const;
   std::optional<Eigen::VectorXd> start_at_symmetry() const;
   void look_near_rays();
   void find_minima();
@@ -325,18 +327,21 @@ void Fit::look_near_rays() {
     }
   }
   say("neighbouring fringe orders by wave optics");
+  const auto is_diameter = [&](int g, std::size_t j) {
+    const auto* droplet = std::get_if<Droplet>(&job_.micrographs[g].scene.sample);
+    return droplet && droplet->diameter_um.index == unknowns_.searched[j];
+  };
   // A grid for the largest droplet among the places to look at: a larger one than it was made for would be cut off.
   const auto problem_for = [&](const std::vector<Eigen::VectorXd>& places) {
     std::vector<PixelSet> sets;
     std::vector<RenderPlan> plans;
     for (int g = 0; g < frames_; ++g) {
       const Scene& scene = job_.micrographs[g].scene;
-      const auto* droplet = std::get_if<Droplet>(&scene.sample);
       Theta theta = theta_;
       for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) {
         double& value = theta[static_cast<std::size_t>(unknowns_.searched[j])];
         value = places.front()[static_cast<Eigen::Index>(j)];
-        if (droplet && droplet->diameter_um.index == unknowns_.searched[j])
+        if (is_diameter(g, j))
           for (const Eigen::VectorXd& x : places) value = std::max(value, x[static_cast<Eigen::Index>(j)]);
       }
       plans.push_back(plan(scene, theta));
@@ -364,9 +369,7 @@ void Fit::look_near_rays() {
       const auto at = static_cast<Eigen::Index>(j);
       const double width = parameter.upper - parameter.lower;
       if (!(rates[at] * width > std::numbers::pi)) continue;
-      const auto* droplet = std::get_if<Droplet>(&job_.micrographs.front().scene.sample);
-      const bool diameter = droplet && droplet->diameter_um.index == unknowns_.searched[j];
-      const int steps = std::clamp(static_cast<int>(std::ceil(rates[at] * width / std::numbers::pi)), diameter ? kDiameters : 1, kMostSteps);
+      const int steps = std::clamp(static_cast<int>(std::ceil(rates[at] * width / std::numbers::pi)), is_diameter(0, j) ? kDiameters : 1, kMostSteps);
       for (int i = 0; i < steps; ++i) {
         lines.push_back(best.searched);
         lines.back()[at] = parameter.lower + width * (i + 0.5) / steps;
@@ -423,12 +426,29 @@ std::optional<Eigen::VectorXd> Fit::start_at_symmetry() const {
   return centred;
 }
 
+std::size_t Fit::scanned_pixels(int g) const {
+  const std::size_t share = std::max<std::size_t>(50, job_.options.scan_pixels / std::max(1, frames_));
+  const RenderPlan& plan = plans_[g];
+  const bool own_rays = std::holds_alternative<Droplet>(job_.micrographs[g].scene.sample) && plan.radial_panels == 0;
+  if (!own_rays) return share;
+  // A constant image is then off by as many units of chi-square, a wrong order by a good part of that.
+  constexpr double kEnough = 20000;
+  constexpr std::size_t kFewest = 300;
+  const Image& values = job_.micrographs[g].values;
+  double mean = 0, square = 0;
+  const double n = static_cast<double>(pixels_[g].size());
+  for (const auto& [x, y] : pixels_[g]) mean += values(x, y) / n;
+  for (const auto& [x, y] : pixels_[g]) square += std::pow((values(x, y) - mean) / sigma_[g](x, y), 2) / n;
+  const double needed = kEnough / std::max(square - 1, 1e-9);
+  return std::min(share, std::max(kFewest, static_cast<std::size_t>(std::min(needed, 1e9))));
+}
+
 double Fit::look_for_minima(double hopeless_above) {
   if (std::any_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) {
     look_near_rays();
     result_.scans = std::move(found_.traces);
     scan_points_ = found_.points;
-    return found_.candidates.front().objective;
+    return found_.candidates.front().objective / std::max(1.0, sample_rows_);
   }
   std::vector<double> phase(unknowns_.searched.size(), 0.0);
   for (std::size_t j = 0; j < phase.size(); ++j) {
@@ -450,10 +470,9 @@ double Fit::look_for_minima(double hopeless_above) {
       }
     }
   }
-  const std::size_t share = std::max<std::size_t>(50, job_.options.scan_pixels / std::max(1, frames_));
   const auto sampled = [&] {
     std::vector<PixelSet> part;
-    for (int g = 0; g < frames_; ++g) part.push_back(pixel_set(job_.micrographs[g], sigma_[g], subsample(pixels_[g], share)));
+    for (int g = 0; g < frames_; ++g) part.push_back(pixel_set(job_.micrographs[g], sigma_[g], subsample(pixels_[g], scanned_pixels(g))));
     auto problem = std::make_unique<LeastSquares>(job_, unknowns_, plans_, std::move(part));
     problem->set_misfit(prior_misfit());
     return problem;
@@ -477,13 +496,13 @@ double Fit::look_for_minima(double hopeless_above) {
     }
   }
   LeastSquares& sample = *sampled_pixels;
-  found_ = scan(sample, job_, unknowns_, start_, phase, hopeless_above);
+  sample_rows_ = static_cast<double>(sample.pixel_rows());
+  found_ = scan(sample, job_, unknowns_, start_, phase, hopeless_above * std::max(1.0, sample_rows_));
   evaluations_ += sample.evaluations();
   stopped_ = stopped_ || found_.interrupted;
   result_.scans = std::move(found_.traces);
   scan_points_ = found_.points;
-  sample_rows_ = static_cast<double>(sample.pixel_rows());
-  return found_.candidates.front().objective;
+  return found_.candidates.front().objective / std::max(1.0, sample_rows_);
 }
 
 void Fit::find_minima() {
@@ -1283,9 +1302,11 @@ void Fit::foretell_curved_rays() {
     sets.push_back(pixel_set(curved.micrographs[g], sigma_[g], pixels));
   }
   SolveOptions few;
-  few.max_iterations = 12;
+  few.max_iterations = 6;
   few.interrupted = job_.options.interrupted;
   double straight_objective = problem_->objective();
+  // To a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search for more would follow.
+  few.function_tolerance = 0.1 / std::max(straight_objective, 1.0);
   Theta straight = theta_;
   if (part) {
     LeastSquares problem(job_, unknowns_, plans_, sets);

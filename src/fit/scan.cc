@@ -174,9 +174,7 @@ double log_share(const Eigen::MatrixXd& information, const FitJob& job, const Un
     if (parameter.prior_sd) prior[j] = 0;
   }
   const Eigen::MatrixXd all = in_widths.transpose() * in_widths + Eigen::MatrixXd(prior.asDiagonal());
-  double sum = 0;
-  for (const double d : all.ldlt().vectorD()) sum -= 0.5 * std::log(std::max(d, 1e-300));
-  return sum;
+  return -0.5 * all.ldlt().vectorD().array().max(1e-300).log().sum();
 }
 
 Eigen::MatrixXd projected_information(const LeastSquares& problem) {

@@ -6,6 +6,7 @@
 
 #include "medium/build.h"
 #include "render/pilots.h"
+#include "render/sampling.h"
 #include "transport/magnus.h"
 
 namespace birefit {
@@ -539,8 +540,7 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
   const BallImage<Pack> image(scene, plan, value.as<Pack>());
   const StepsOfSquare steps_of(scene, plan, value);
   // Rays inside each radius were every point to have its own, and what share of them is in the picture.
-  std::vector<double> inside{0};
-  for (std::size_t i = 0; i < plan.samples.size(); ++i) inside.push_back(inside.back() + std::numbers::pi * (2.0 * static_cast<double>(i) + 1) * square(plan.sampling_bin_px * plan.samples[i]));
+  const std::vector<double> inside = points_within(plan.samples, plan.sampling_bin_px);
   const double edge_px = image.edge_um() / scene.view.pixel_size_um, disc_px = std::numbers::pi * square(edge_px);
   const double share = std::min(1.0, static_cast<double>(scene.view.width) * scene.view.height / disc_px);
   const auto rays_within = [&](double v) {

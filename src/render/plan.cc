@@ -133,13 +133,15 @@ constexpr double kTableShare = 1e-3;
 /// In two dimensions digits are dearer.
 constexpr double kSquaresShare = 1e-2;
 
-/// One ray a radius instead of one a point, when that is fewer rays.
+/// One ray a radius instead of one a point, when that is fewer rays. plan.samples says how many those are.
 void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
   using Image = DropletImage<Pack>;
   // A director from elements has small kinks between them, which no polynomial follows to more than this.
   const double share = std::holds_alternative<AxialDirector>(std::get<Droplet>(scene.sample).director) ? 10 * kTableShare : kTableShare;
   const double target = std::max(share * scene.intensity_accuracy, 2e-11);
-  const double points = static_cast<double>(scene.view.width) * scene.view.height;
+  // Rays were every point to have its own; of a droplet larger than the picture, its share.
+  const double disc_px = std::numbers::pi * square(static_cast<double>(plan.samples.size()) * plan.sampling_bin_px);
+  const double points = points_within(plan.samples, plan.sampling_bin_px).back() * std::min(1.0, scene.view.width * static_cast<double>(scene.view.height) / disc_px);
   const Values<Pack> lanes = value.template as<Pack>();
   const bool shell = std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
   Image image(scene, plan, lanes);
@@ -404,9 +406,9 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
                                      pilots.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
-  plan_radial_table(scene, value, plan);
   // A shell's retardance turns back where rays touch the core, with a slope that has no bound.
   sample_round(scene, value, o, rim.rho_max() * o.radius_um, o.director == DropletOptics<double>::Director::shell ? std::vector{core_edge(o, rim)} : std::vector<double>{}, plan);
+  plan_radial_table(scene, value, plan);
   return plan;
 }
 

@@ -247,7 +247,13 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
   });
   const Symmetry symmetry = model->symmetry();
   const int computed = symmetry != Symmetry::none ? (h + 1) / 2 : h;  // rows; the others are copied
-  parallel_for((computed + Band::kRows - 1) / Band::kRows, threads, [&](int b) {
+  // Bands with most of the object first: what is left at the end, when one thread waits for the other, is background.
+  std::vector<int> bands(static_cast<std::size_t>((computed + Band::kRows - 1) / Band::kRows));
+  std::iota(bands.begin(), bands.end(), 0);
+  const auto off_centre = [&](int b) { return std::abs((b + 0.5) * Band::kRows - plan.sampling_center_y_px); };
+  std::sort(bands.begin(), bands.end(), [&](int a, int b) { return off_centre(a) < off_centre(b); });
+  parallel_for(static_cast<int>(bands.size()), threads, [&](int i) {
+    const int b = bands[static_cast<std::size_t>(i)];
     thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
     thread_local NeededPoints needed;
     const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
@@ -358,16 +364,23 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   const int n = static_cast<int>(pixels.size());
   constexpr int kStep = kLanesOf<S>;
   const int groups = (n + kStep - 1) / kStep;
+  // All lanes take as many samples as the one that needs most: pixels that need as many go together.
+  std::vector<std::uint8_t> samples;
+  for (const auto& [x, y] : pixels) samples.push_back(static_cast<std::uint8_t>(samples_at(plan, x, y)));
+  std::vector<std::size_t> order(pixels.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return samples[a] < samples[b]; });
   parallel_for((groups + 15) / 16, threads, [&](int block) {
     for (int g = 16 * block; g < std::min(groups, 16 * block + 16); ++g) {
       double columns[kLanes], rows[kLanes];
-      int most = 1;
+      std::array<std::size_t, kLanes> at;
       for (int k = 0; k < kLanes; ++k) {
-        const auto& pixel = pixels[static_cast<std::size_t>(std::min(g * kStep + k, n - 1))];
+        at[static_cast<std::size_t>(k)] = order[static_cast<std::size_t>(std::min(g * kStep + k, n - 1))];
+        const auto& pixel = pixels[at[static_cast<std::size_t>(k)]];
         columns[k] = pixel[0];
         rows[k] = pixel[1];
-        if (k < kStep) most = std::max(most, samples_at(plan, pixel[0], pixel[1]));
       }
+      const int most = samples[at[kStep - 1]];
       const PlainOf<S> column = load_lanes<PlainOf<S>>(columns), row = load_lanes<PlainOf<S>>(rows);
       S v;
       if (most == 1 && plan.fringe_means) {
@@ -379,10 +392,11 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
         v = mean_over_pixel(*model, column, row, std::max(most, 2));  // the point value alone is no pixel mean
       }
       for (int k = 0; k < std::min(kStep, n - g * kStep); ++k) {
-        out.intensity(g * kStep + k) = lane(plain(v), k);
+        const auto pixel = static_cast<Eigen::Index>(at[static_cast<std::size_t>(k)]);
+        out.intensity(pixel) = lane(plain(v), k);
         if constexpr (ScalarTraits<S>::derivatives > 0)
           for (std::size_t j = 0; j < active.size(); ++j)
-            out.derivatives(g * kStep + k, first_column + static_cast<int>(j)) = lane(v.d[j], k);
+            out.derivatives(pixel, first_column + static_cast<int>(j)) = lane(v.d[j], k);
       }
     }
   });

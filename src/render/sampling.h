@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 namespace birefit {
@@ -17,6 +18,16 @@ inline int samples_for(double radians) {
   if (radians < 4.5) return 4;
   if (radians < 8) return 6;
   return 8;
+}
+
+/// Points of a round picture's pixels within each radius, 0, 1, 2 .. bins of `samples` (points per pixel side, by radius).
+inline std::vector<double> points_within(const std::vector<int>& samples, double bin_px) {
+  std::vector<double> inside{0};
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double side = bin_px * samples[i];
+    inside.push_back(inside.back() + std::numbers::pi * (2.0 * static_cast<double>(i) + 1) * side * side);
+  }
+  return inside;
 }
 
 /// Gauss-Legendre points on [-1/2, 1/2], weights summing to 1.

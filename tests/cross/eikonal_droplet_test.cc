@@ -389,10 +389,11 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
   for (const bool wall : {true, false}) {
     const auto job_of = [&](Rays rays, bool free) {
       Job job(10, rays, free, 96);
+      AxialDirector axial;
       if (wall)
         std::get<Droplet>(job.scene.sample).director = ShellDirector{job.b.fixed("wall_um", 2), {}, job.b.fixed("core_index", 1.45)};
       else
-        std::get<Droplet>(job.scene.sample).director = AxialDirector{job.b.fixed("reduced_field", 3)};
+        axial.reduced_field = job.b.fixed("reduced_field", 3), std::get<Droplet>(job.scene.sample).director = axial;
       return job;
     };
     const Job truth = job_of(Rays::eikonal, false);
