@@ -50,7 +50,7 @@ struct Micrograph {
 struct FitOptions {
   int threads = 0;             ///< 0 = all cores
   int max_iterations = 100;
-  int scan_pixels = 4000;      ///< of the coarse scan, spread over all micrographs
+  int scan_pixels = 4000;      ///< at most, of the coarse scan, spread over all micrographs
   int scan_candidates = 12;    ///< starts polished after the scan, of four times as many looked at; more where the image is described badly
   bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
   bool choose_waves = false;   ///< Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds

@@ -103,7 +103,7 @@ class Fit {
   explicit Fit(const FitJob& job)
       : job_(job), unknowns_(Unknowns::of(job)), frames_(static_cast<int>(job.micrographs.size())) {}
 
-  /// The global part. Returns the best objective on the subsample of pixels, a pixel; above `hopeless_above` the search ends early.
+  /// The global part. Returns the best objective per pixel of the subsample; above `hopeless_above` the search ends early.
   double search(double hopeless_above) {
     const auto begin = std::chrono::steady_clock::now();
     prepare();
@@ -431,16 +431,21 @@ std::size_t Fit::scanned_pixels(int g) const {
   const RenderPlan& plan = plans_[g];
   const bool own_rays = std::holds_alternative<Droplet>(job_.micrographs[g].scene.sample) && plan.radial_panels == 0;
   if (!own_rays) return share;
-  // A constant image is then off by as many units of chi-square, a wrong order by a good part of that.
-  constexpr double kEnough = 20000;
-  constexpr std::size_t kFewest = 300;
+  // A constant image is then off by as many units of chi-square, a wrong order by a good part of that; and as many pixels show it as there must be in all, however much
+  // of the picture is background.
+  constexpr double kEnough = 20000, kFewest = 300;
   const Image& values = job_.micrographs[g].values;
-  double mean = 0, square = 0;
+  double mean = 0, square = 0, fourth = 0;
   const double n = static_cast<double>(pixels_[g].size());
   for (const auto& [x, y] : pixels_[g]) mean += values(x, y) / n;
-  for (const auto& [x, y] : pixels_[g]) square += std::pow((values(x, y) - mean) / sigma_[g](x, y), 2) / n;
-  const double needed = kEnough / std::max(square - 1, 1e-9);
-  return std::min(share, std::max(kFewest, static_cast<std::size_t>(std::min(needed, 1e9))));
+  for (const auto& [x, y] : pixels_[g]) {
+    const double z = (values(x, y) - mean) / sigma_[g](x, y), z2 = z * z;
+    square += z2 / n, fourth += z2 * z2 / n;
+  }
+  if (!(fourth > 0)) return share;
+  const double showing = square * square / fourth;  // their share: 1 where all are as far off as each other
+  const double needed = std::max(kFewest / showing, kEnough / std::max(square - 1, 1e-9));
+  return needed < static_cast<double>(share) ? static_cast<std::size_t>(needed) : share;
 }
 
 double Fit::look_for_minima(double hopeless_above) {
@@ -1302,7 +1307,7 @@ void Fit::foretell_curved_rays() {
     sets.push_back(pixel_set(curved.micrographs[g], sigma_[g], pixels));
   }
   SolveOptions few;
-  few.max_iterations = 6;
+  few.max_iterations = 12;
   few.interrupted = job_.options.interrupted;
   double straight_objective = problem_->objective();
   // To a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search for more would follow.
@@ -1624,7 +1629,7 @@ FitResult fit(const FitJob& job) {
     doubt_priors(job, result);
     return result;
   }
-  // A branch whose misfit on the same pixels, by the same noise, is this many times the best one's has lost.
+  // A branch whose misfit per pixel, by the same noise, is this many times the best one's has lost.
   constexpr double kBeaten = 10;
   std::vector<Fit> fits;
   std::vector<FitJob> jobs;

@@ -364,14 +364,15 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   const int n = static_cast<int>(pixels.size());
   constexpr int kStep = kLanesOf<S>;
   const int groups = (n + kStep - 1) / kStep;
-  // All lanes take as many samples as the one that needs most: pixels that need as many go together.
+  // All lanes take as many samples as the one that needs most: pixels that need as many go together, the dearest first.
   std::vector<std::uint8_t> samples;
   for (const auto& [x, y] : pixels) samples.push_back(static_cast<std::uint8_t>(samples_at(plan, x, y)));
   std::vector<std::size_t> order(pixels.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return samples[a] < samples[b]; });
-  parallel_for((groups + 15) / 16, threads, [&](int block) {
-    for (int g = 16 * block; g < std::min(groups, 16 * block + 16); ++g) {
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return samples[a] > samples[b]; });
+  const int together = std::clamp(groups / 64, 1, 16);
+  parallel_for((groups + together - 1) / together, threads, [&](int block) {
+    for (int g = together * block; g < std::min(groups, together * (block + 1)); ++g) {
       double columns[kLanes], rows[kLanes];
       std::array<std::size_t, kLanes> at;
       for (int k = 0; k < kLanes; ++k) {
@@ -380,7 +381,7 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
         columns[k] = pixel[0];
         rows[k] = pixel[1];
       }
-      const int most = samples[at[kStep - 1]];
+      const int most = samples[at[0]];
       const PlainOf<S> column = load_lanes<PlainOf<S>>(columns), row = load_lanes<PlainOf<S>>(rows);
       S v;
       if (most == 1 && plan.fringe_means) {

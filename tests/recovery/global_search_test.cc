@@ -206,11 +206,9 @@ TEST_P(GlobalSearch, FindsTheOrder) {
   EXPECT_GE(count.right, 3);
 }
 
-// One in 1,000, as asked of the tool; BIREFIT_PROBLEMS takes another number of problems than 3,000, BIREFIT_FIRST_PROBLEM others than
-// the first ones.
+// One in 1,000, as asked of the tool.
 TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
-  const char *problems = std::getenv("BIREFIT_PROBLEMS"), *first = std::getenv("BIREFIT_FIRST_PROBLEM");
-  const Count count = solve(kFamilies[GetParam()], problems ? std::atoi(problems) : 3000, first ? std::atoi(first) : 1);
+  const Count count = solve(kFamilies[GetParam()], problems_or(3000), first_problem());
   EXPECT_LE(count.wrong, count.problems / 1000);
   EXPECT_LE(count.ambiguous + count.undecided, count.problems / 100);
 }
@@ -218,8 +216,7 @@ TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
 // The same on pictures by wave optics, for the families that are finite: 100 of each. Ripples of large droplets may be as likely as each other.
 class LongWaveSearch : public GlobalSearch {};
 TEST_P(LongWaveSearch, IsNeverConfidentlyWrong) {
-  const char *problems = std::getenv("BIREFIT_PROBLEMS"), *first = std::getenv("BIREFIT_FIRST_PROBLEM");
-  const Count count = solve(kFamilies[GetParam()], problems ? std::atoi(problems) : 100, first ? std::atoi(first) : 1, Ceiling::wave);
+  const Count count = solve(kFamilies[GetParam()], problems_or(100), first_problem(), Ceiling::wave);
   EXPECT_EQ(count.wrong, 0);
   EXPECT_LE(count.ambiguous, count.problems / 100);
   EXPECT_LE(count.undecided, count.problems / 20);

@@ -29,7 +29,7 @@ struct Draw {
   TableBuilder b;
   Scene scene;
   std::mt19937_64 random;
-  bool searched = true;  ///< false: no bounds, and a start within 0.01 of the truth. Four parameters that form fringes make a long search, which has its own test
+  bool searched = true;  ///< false: no bounds, and a start within 0.01 of the truth. Four parameters that form fringes make a long search
   double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
   /// Free, its truth drawn from [low, high]; bounds `margin` beyond the draw, on both sides.
   ParameterRef drawn(const std::string& name, double low, double high, double margin) {
@@ -67,16 +67,6 @@ struct Scatter {
   std::map<std::string, Spread> by_name;
   int inside = 0, all = 0, refused = 0;
 };
-
-/// BIREFIT_PROBLEMS takes another number of problems, BIREFIT_FIRST_PROBLEM others than the first ones.
-int problems_or(int usual) {
-  const char* n = std::getenv("BIREFIT_PROBLEMS");
-  return n ? std::atoi(n) : usual;
-}
-int first_problem() {
-  const char* n = std::getenv("BIREFIT_FIRST_PROBLEM");
-  return n ? std::atoi(n) : 1;
-}
 
 /// Fits of `draws` pictures, one a thread. Starts are drawn within the bounds: where one of another order could win, the scan decides.
 Scatter scatter(int draws, const std::function<void(Draw&)>& make, const std::string& of) {
@@ -188,9 +178,14 @@ void heated_plate(Draw& d) {
   d.scene.microscope.wavelength_nm = d.b.fixed("wavelength_640", 640);
 }
 
-const std::vector<std::pair<std::string, void (*)(Draw&)>> kScenes = {
-    {"hedgehog in a field", hedgehog_in_a_field}, {"ring in a field", ring_in_a_field}, {"shell", shell}, {"eccentric shell", eccentric_shell},
-    {"bipolar droplet", bipolar},                 {"heated plate", heated_plate}};
+struct Kind {
+  std::string name;
+  void (*make)(Draw&);
+  double refused = 0.01;  ///< share that may be without an answer
+};
+// Of rings in the strongest fields one in ten cannot be told, field, ring and gain trading off: a right refusal.
+const std::vector<Kind> kScenes = {
+    {"hedgehog in a field", hedgehog_in_a_field}, {"ring in a field", ring_in_a_field, 0.1}, {"shell", shell}, {"eccentric shell", eccentric_shell}, {"bipolar droplet", bipolar}, {"heated plate", heated_plate}};
 
 // A hedgehog and a ring at the same field, each fitted as both: the branch that made the picture has all the odds.
 TEST(BranchRecovery, TheBranchThatMadeThePictureIsReported) {
@@ -304,18 +299,17 @@ class LongScenesRecovery : public ScenesRecovery {};
 
 // Four pictures a scene: no estimate far outside its error.
 TEST_P(ScenesRecovery, EstimatesAreWithinTheirErrors) {
-  const auto& [name, make] = kScenes[GetParam()];
+  const auto& [name, make, refused] = kScenes[GetParam()];
   const Scatter s = scatter(4, make, name);
   EXPECT_EQ(s.refused, 0);
   for (const auto& [parameter, spread] : s.by_name) EXPECT_LT(spread.worst(), 5) << parameter;
 }
 
-// 300 pictures a scene: the spread of 300 numbers is known to 4 %, that of some 25 parameters never more than three times that below the bound.
+// 300 pictures a scene. A spread of at most 1.1 times the bound is what is asked; that of 300 numbers is known to 4 %, and of some 25 parameters none is three times that below it.
 TEST_P(LongScenesRecovery, SpreadIsThatOfTheCramerRaoBound) {
-  const auto& [name, make] = kScenes[GetParam()];
+  const auto& [name, make, refused] = kScenes[GetParam()];
   const Scatter s = scatter(problems_or(300), make, name);
-  // Of rings in the strongest fields one in ten cannot be told, field, ring and gain trading off, and is refused.
-  EXPECT_LE(s.refused, problems_or(300) / 10);
+  EXPECT_LE(s.refused, refused * problems_or(300));
   for (const auto& [parameter, spread] : s.by_name) {
     EXPECT_LT(spread.ratio(), 1.1) << parameter;
     EXPECT_GT(spread.ratio(), 0.88) << parameter;
@@ -325,7 +319,7 @@ TEST_P(LongScenesRecovery, SpreadIsThatOfTheCramerRaoBound) {
 }
 
 std::string scene_name(const ::testing::TestParamInfo<std::size_t>& info) {
-  std::string name = kScenes[info.param].first;
+  std::string name = kScenes[info.param].name;
   std::replace(name.begin(), name.end(), ' ', '_');
   return name;
 }

@@ -2,6 +2,7 @@
 // Scenes and fit jobs built in code, without files.
 
 #include <cmath>
+#include <cstdlib>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,16 @@
 #include "birefit/fit.h"
 
 namespace birefit::testing {
+
+/// How many random problems a long test solves, and from which on: BIREFIT_PROBLEMS takes another number, BIREFIT_FIRST_PROBLEM others than the first ones.
+inline int problems_or(int usual) {
+  const char* n = std::getenv("BIREFIT_PROBLEMS");
+  return n ? std::atoi(n) : usual;
+}
+inline int first_problem() {
+  const char* n = std::getenv("BIREFIT_FIRST_PROBLEM");
+  return n ? std::atoi(n) : 1;
+}
 
 /// Adds parameters to a table; every scene of a test draws its numbers from one of these.
 struct TableBuilder {
