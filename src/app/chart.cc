@@ -200,7 +200,7 @@ std::string waves_script(const std::vector<WavePoint>& points, const std::string
     plot += fmt::format("{}$w{} with points pt 7 ps 0.8 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++, kModelColours[m], kModels[m]);
   }
   if (plot.empty()) return script + "unset multiplot\n";  // of a quick run
-  return script + "set logscale x\nset yrange [0.3:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS error of the picture'\nset ylabel 'ms a picture' offset 1.5,0\nplot " + plot +
+  return script + "set logscale x\nset yrange [0.05:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS error of the picture'\nset ylabel 'ms a picture' offset 1.5,0\nplot " + plot +
          "\nunset multiplot\n";
 }
 
