@@ -433,7 +433,7 @@ std::size_t Fit::scanned_pixels(int g) const {
   if (!own_rays) return share;
   // A constant image is then off by as many units of chi-square, a wrong order by a good part of that; and as many pixels show it as there must be in all, however much
   // of the picture is background.
-  constexpr double kEnough = 20000, kFewest = 300;
+  constexpr double kEnough = 20000, kFewest = 100;
   const Image& values = job_.micrographs[g].values;
   double mean = 0, square = 0, fourth = 0;
   const double n = static_cast<double>(pixels_[g].size());

@@ -183,7 +183,7 @@ struct Kind {
   void (*make)(Draw&);
   double refused = 0.01;  ///< share that may be without an answer
 };
-// Of rings in the strongest fields one in ten cannot be told, field, ring and gain trading off: a right refusal.
+// Of one ring in ten field, ring and gain trade off within the noise: a right refusal.
 const std::vector<Kind> kScenes = {
     {"hedgehog in a field", hedgehog_in_a_field}, {"ring in a field", ring_in_a_field, 0.1}, {"shell", shell}, {"eccentric shell", eccentric_shell}, {"bipolar droplet", bipolar}, {"heated plate", heated_plate}};
 
