@@ -431,8 +431,8 @@ std::size_t Fit::scanned_pixels(int g) const {
   const RenderPlan& plan = plans_[g];
   const bool own_rays = std::holds_alternative<Droplet>(job_.micrographs[g].scene.sample) && plan.radial_panels == 0;
   if (!own_rays) return share;
-  // A constant image is then off by as many units of chi-square, a wrong order by a good part of that; and as many pixels show it as there must be in all, however much
-  // of the picture is background.
+  // kEnough: units of chi-square by which a constant image is then off; a wrong order is by a good part of that. kFewest: pixels that lie where the image is not flat, however
+  // much of it is background.
   constexpr double kEnough = 20000, kFewest = 100;
   const Image& values = job_.micrographs[g].values;
   double mean = 0, square = 0, fourth = 0;

@@ -11,9 +11,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "birefit/fit.h"
@@ -370,6 +372,36 @@ void time_field() {
               first[1] / first[0]);
 }
 
+/// Where a search begins and between which bounds.
+struct Range {
+  double start, low, high;
+};
+
+/// A fit of s.four, gain and offset to `values`.
+FitJob job_of(DropletScene s, Image values, const std::array<Range, 4>& ranges, std::optional<NoiseModel> noise = {}) {
+  for (std::size_t k = 0; k < ranges.size(); ++k) {
+    Parameter& parameter = s.table[s.four[k]];
+    parameter.free = true;
+    parameter.value = ranges[k].start, parameter.lower = ranges[k].low, parameter.upper = ranges[k].high;
+  }
+  Micrograph micrograph;
+  micrograph.name = "synthetic";
+  micrograph.mask = Mask(values.width(), values.height(), 1);
+  micrograph.values = std::move(values);
+  micrograph.noise = noise;
+  for (const char* name : {"gain", "offset"}) {
+    Parameter parameter;
+    parameter.name = name;
+    parameter.free = parameter.automatic = parameter.linear = true;
+    (std::string(name) == "gain" ? micrograph.gain : micrograph.offset) = s.table.add(parameter);
+  }
+  micrograph.scene = s.scene;
+  FitJob job;
+  job.parameters = s.table;
+  job.micrographs = {micrograph};
+  return job;
+}
+
 /// A fit by propagation, the search for the fringe order included: a bipolar droplet, 160 x 160 pixels, noise of 0.2 %.
 void time_fit_by_waves() {
   constexpr int kSize = 160;
@@ -381,35 +413,16 @@ void time_fit_by_waves() {
   s.scene.ceiling = Ceiling::wave;
   s.scene.microscope.objective_na = 0.8;
   s.table[s.scene.surround_index].value = 1.5;
-  const std::array<double, 4> truth{9.0, 0.12, 80.3, 79.2}, start{8.8, 0.1, 80, 80}, low{8.4, 0.06, 77, 77}, high{9.6, 0.2, 83, 83};
+  const std::array<double, 4> truth{9.0, 0.12, 80.3, 79.2};
   for (std::size_t k = 0; k < truth.size(); ++k) s.table[s.four[k]].value = truth[k];
   const Theta theta = s.table.values();
-  Micrograph micrograph;
-  micrograph.name = "synthetic";
-  micrograph.values = render(s.scene, plan(s.scene, theta), theta).intensity;
+  Image values = render(s.scene, plan(s.scene, theta), theta).intensity;
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0, 0.002);
-  for (double& value : micrograph.values.values()) value += noise(random);
-  micrograph.mask = Mask(kSize, kSize, 1);
-  micrograph.noise = NoiseModel{0.002, 0, false};
-  for (std::size_t k = 0; k < truth.size(); ++k) {
-    Parameter& parameter = s.table[s.four[k]];
-    parameter.free = true;
-    parameter.value = start[k], parameter.lower = low[k], parameter.upper = high[k];
-  }
-  for (const char* name : {"gain", "offset"}) {
-    Parameter parameter;
-    parameter.name = name;
-    parameter.free = parameter.automatic = parameter.linear = true;
-    (std::string(name) == "gain" ? micrograph.gain : micrograph.offset) = s.table.add(parameter);
-  }
-  micrograph.scene = s.scene;
-  FitJob job;
-  job.parameters = s.table;
-  job.micrographs = {micrograph};
-  const auto begin = std::chrono::steady_clock::now();
-  const FitResult result = fit(job);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  for (double& value : values.values()) value += noise(random);
+  const FitJob job = job_of(s, std::move(values), {{{8.8, 8.4, 9.6}, {0.1, 0.06, 0.2}, {80, 77, 83}, {80, 77, 83}}}, NoiseModel{0.002, 0, false});
+  FitResult result;
+  const double seconds = seconds_of([&] { result = fit(job); });
   std::printf("fit by propagation, bipolar droplet of 9 um, 160 x 160 pixels, four parameters, orders searched: %.1f s, %d evaluations, %s\n", seconds, result.evaluations,
               result.has_answer() ? "answer" : "NO ANSWER");
 }
@@ -417,7 +430,6 @@ void time_fit_by_waves() {
 /// A whole fit: size x size pixels, six free parameters, the scan included.
 void time_fit(int size, int rounds) {
   const double scale = 256.0 / size;
-  DropletScene s = droplet_scene(false, size, 0.05 * scale);
   testing::IndependentDroplet truth;
   truth.center_x_px = 129.3 / scale;
   truth.center_y_px = 125.8 / scale;
@@ -425,33 +437,10 @@ void time_fit(int size, int rounds) {
   std::vector<double> mean;
   for (int row = 0; row < size; ++row)
     for (int column = 0; column < size; ++column) mean.push_back(150 + 3200 * truth.pixel(column, row, 2));
-  const std::vector<double> counts = testing::camera(mean, 0.5, 4.0, 7);
-  const auto free = [&](int index, double value, double low, double high) {
-    Parameter& parameter = s.table[index];
-    parameter.free = true;
-    parameter.value = value;
-    parameter.lower = low;
-    parameter.upper = high;
-  };
-  free(s.four[0], 9.0, 8.0, 10.5);
-  free(s.four[1], 0.15, 0.05, 0.4);
-  free(s.four[2], 130 / scale, 110 / scale, 150 / scale);
-  free(s.four[3], 126 / scale, 106 / scale, 146 / scale);
-  Micrograph micrograph;
-  micrograph.name = "synthetic";
-  micrograph.values = Image(size, size);
-  micrograph.values.values() = counts;
-  micrograph.mask = Mask(size, size, 1);
-  for (const char* name : {"gain", "offset"}) {
-    Parameter parameter;
-    parameter.name = name;
-    parameter.free = parameter.automatic = parameter.linear = true;
-    (std::string(name) == "gain" ? micrograph.gain : micrograph.offset) = s.table.add(parameter);
-  }
-  micrograph.scene = s.scene;
-  FitJob job;
-  job.parameters = s.table;
-  job.micrographs = {micrograph};
+  Image values(size, size);
+  values.values() = testing::camera(mean, 0.5, 4.0, 7);
+  const FitJob job = job_of(droplet_scene(false, size, 0.05 * scale), std::move(values),
+                            {{{9.0, 8.0, 10.5}, {0.15, 0.05, 0.4}, {130 / scale, 110 / scale, 150 / scale}, {126 / scale, 106 / scale, 146 / scale}}});
   std::vector<double> times;
   FitResult result;
   for (int i = 0; i < rounds; ++i) times.push_back(seconds_of([&] { result = fit(job); }));
