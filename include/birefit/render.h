@@ -19,9 +19,11 @@ struct WavePlan;  // grids of wave optics, render/wave.h
 
 /// A part of a droplet's disc (render/polar_table.h), of 4 x 2^level panels from the rim inwards and 8 x 2^level sectors around.
 struct DiscSquare {
+  bool of_core = false;  ///< of the disc as which a shell's core is seen: the light that passes through it; the others' passes beside it
   int level = 0, panel = 0, sector = 0;
-  int steps = 1;        ///< mesh steps of its rays
-  bool smooth = false;  ///< its light is interpolated from a few rays
+  int steps = 1;         ///< mesh steps of its rays
+  bool smooth = false;   ///< its light is interpolated from a few rays
+  double points = 0;     ///< of the picture in it
 };
 
 /// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth.

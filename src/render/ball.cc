@@ -155,14 +155,83 @@ Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, 
 
 namespace {
 
+/// The field of a shell in the sphere, if it is one.
+template <class S>
+const NestedField<S>* shell_in(const BallOptics<S>& o) {
+  return std::get_if<NestedField<S>>(&o.field);
+}
+/// The same sphere, of which no ray meets the core.
+template <class S>
+BallOptics<S> beside_core(BallOptics<S> o) {
+  if (auto* shell = std::get_if<NestedField<S>>(&o.field)) shell->core_left_out = true;
+  return o;
+}
+/// Where the ray that is seen at an azimuth passes the core's middle (reach_at_core).
+template <class S>
+void place_at_core(const NestedField<S>& shell, const DropletRay<S>& ray, const S& ca, const S& sa, S& x, S& y) {
+  const S reach = reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa), over = inverse(shell.core);
+  x = (reach * ca - shell.offset.x) * over;
+  y = (reach * sa - shell.offset.y) * over;
+}
+/// Where such a ray is seen.
+template <class S>
+struct SeenAt {
+  S rho, cos_azimuth, sin_azimuth;  ///< rho in radii of the sphere
+  PlainOf<S> miss;                  ///< by how much the ray that was found passes elsewhere, radii of the sphere
+};
+template <class S>
+SeenAt<S> seen_of_core(const NestedField<S>& shell, const S& ratio, const RimTable& rim, const S& x, const S& y) {
+  using P = PlainOf<S>;
+  // reach (cos, sin) = core (x, y) + offset gives the azimuth, and the angle of incidence by Newton's method.
+  const S px = shell.core * x + shell.offset.x, py = shell.core * y + shell.offset.y, square = px * px + py * py + 1e-18, over = inverse_root(square);
+  SeenAt<S> r;
+  r.cos_azimuth = px * over, r.sin_azimuth = py * over;
+  const S wanted = square * over;
+  const P m = plain(ratio), limit(rim.psi_max()), ca = plain(r.cos_azimuth), sa = plain(r.sin_azimuth);
+  const NestedField<P> still{{plain(shell.offset.x), plain(shell.offset.y), plain(shell.offset.z)}, plain(shell.core)};
+  const P along = still.offset.x * ca + still.offset.y * sa;
+  P psi = min_of(max_of(rim.psi_at(min_of(P(plain(wanted) * inverse(m)), P(rim.rho_max()))), P(0.0)), limit), slope(1.0);
+  constexpr int kSteps = 8;  // from a few hundredths away, quadratically
+  for (int i = 0; i < kSteps; ++i) {
+    const DropletRay<P> ray = ray_at(psi, m, P(1.0));
+    const P turning = P(1.0) - m * ray.cos_out * inverse(ray.cos_in);
+    slope = m * ray.cos_out + turning * (ray.sin_deflection * along - ray.cos_deflection * still.offset.z);
+    r.miss = reach_at_core(still, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa) - plain(wanted);
+    psi = min_of(max_of(P(psi - r.miss * inverse(slope)), P(0.0)), limit);
+  }
+  S exact(psi);
+  if constexpr (ScalarTraits<S>::derivatives > 0) {
+    const DropletRay<S> ray = ray_at(exact, ratio, S(1.0));
+    const S off = reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, r.cos_azimuth, r.sin_azimuth) - wanted;
+    for (std::size_t j = 0; j < off.d.size(); ++j) exact.d[j] = -off.d[j] * inverse(slope);  // theorem of implicit functions
+  }
+  r.rho = ray_at(exact, ratio, S(1.0)).rho_um;
+  return r;
+}
+
+/// Whether the core is seen as a disc of its own: all rays that touch it are within the sphere's.
+bool core_has_disc(const BallOptics<double>& o, const RimTable& rim) {
+  const NestedField<double>* shell = shell_in(o);
+  if (!shell) return false;
+  constexpr int kPlaces = 32;
+  for (int i = 0; i < kPlaces; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kPlaces;
+    const SeenAt<double> seen = seen_of_core(*shell, o.sphere.ratio, rim, std::cos(angle), std::sin(angle));
+    if (!(std::abs(seen.miss) < 1e-9) || seen.rho > (1 - 1e-6) * rim.rho_max()) return false;
+  }
+  return true;
+}
+
 /// Rays of one picture, with its derivatives R.
 template <class R>
 class BallRays {
  public:
   using P = PlainOf<R>;
   virtual ~BallRays() = default;
-  /// Light through the sphere as it is seen at a fraction 1 - v^2 of the way to the disc's edge.
-  virtual R at_fraction(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh&) const = 0;
+  /// Light through the sphere as it is seen at a fraction 1 - v^2 of the way to the disc's edge; `beside`: continued where a core is in its way.
+  virtual R at_fraction(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh&, bool beside) const = 0;
+  /// Light through the core, past its middle at 1 - v^2 of its radius; derivatives are those at this place in the core.
+  virtual R in_core(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh&) const = 0;
   /// The same at a distance from its middle, in radii of the sphere; angle: value as in cos, sin, and how it moves.
   virtual R at_place(const R& rho, const P& cos_azimuth, const P& sin_azimuth, const R& angle, const Mesh&) const = 0;
 };
@@ -184,36 +253,44 @@ class BallRaysIn final : public BallRays<R> {
         up_(up),
         places_(places) {
     optics_.sphere.radius_um = S(1.0);  // the medium's k0 knows how long that is
+    beside_ = beside_core(optics_);
   }
-  R at_fraction(const P& v, const P& c, const P& s, const Mesh& mesh) const override { return light(edge_ * S(P(1.0) - v * v), S(c), S(s), mesh, up_); }
+  R at_fraction(const P& v, const P& c, const P& s, const Mesh& mesh, bool beside) const override {
+    return light(beside ? beside_ : optics_, edge_ * S(P(1.0) - v * v), S(c), S(s), mesh, up_);
+  }
+  R in_core(const P& v, const P& c, const P& s, const Mesh& mesh) const override {
+    const P fraction = P(1.0) - v * v;
+    const SeenAt<S> seen = seen_of_core(*shell_in(optics_), optics_.sphere.ratio, rim_, S(fraction * c), S(fraction * s));
+    return light(optics_, seen.rho, seen.cos_azimuth, seen.sin_azimuth, mesh, up_);
+  }
   R at_place(const R& rho, const P& c, const P& s, const R& angle, const Mesh& mesh) const override {
     if constexpr (ScalarTraits<S>::derivatives == 0) {
-      return light(S(plain(rho)), S(c), S(s), mesh, up_);
+      return light(optics_, S(plain(rho)), S(c), S(s), mesh, up_);
     } else if constexpr (std::is_same_v<S, R>) {
-      return light(rho, angle.chain(c, -s), angle.chain(s, c), mesh, up_);
+      return light(optics_, rho, angle.chain(c, -s), angle.chain(s, c), mesh, up_);
     } else {
       S place(plain(rho)), cs(c), sn(s);
-      if (!places_) return light(place, cs, sn, mesh, up_);
+      if (!places_) return light(optics_, place, cs, sn, mesh, up_);
       constexpr std::size_t n = Directions<S, R>::kFrom;
       Directions<S, R> up = up_;
       if constexpr (n >= 2) {
         place.d[n - 2] = P(1.0), cs.d[n - 1] = -s, sn.d[n - 1] = c;
         for (std::size_t j = 0; j < up.by.size(); ++j) up.by[j][n - 2] = rho.d[j], up.by[j][n - 1] = angle.d[j];
       }
-      return light(place, cs, sn, mesh, up);
+      return light(optics_, place, cs, sn, mesh, up);
     }
   }
 
  private:
-  R light(const S& rho, const S& c, const S& s, const Mesh& mesh, const Directions<S, R>& up) const {
-    const DropletRay<S> ray = trace(optics_.sphere, rim_, rho);
+  R light(const BallOptics<S>& optics, const S& rho, const S& c, const S& s, const Mesh& mesh, const Directions<S, R>& up) const {
+    const DropletRay<S> ray = trace(optics.sphere, rim_, rho);
     S tube = ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
     if (!aplanatic_) tube = tube * inverse(ray.cos_twice);
-    const Mat2<R> j = jones_of(optics_, medium_, up, ray, c, s, method_, mesh, aplanatic_ ? S(1.0) : ray.cos_twice);
+    const Mat2<R> j = jones_of(optics, medium_, up, ray, c, s, method_, mesh, aplanatic_ ? S(1.0) : ray.cos_twice);
     const Complex<R> out = light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
     return up(tube) * norm(out);
   }
-  BallOptics<S> optics_;
+  BallOptics<S> optics_, beside_;
   static BallMedium<R> in_radii(const DropletOptics<R>& o) { return {o, o.radius_um}; }
   BallMedium<R> medium_;
   Polarizers<R> light_;
@@ -295,7 +372,8 @@ template <class S>
 class BallImage final : public PixelModel<S> {
  public:
   using P = PlainOf<S>;
-  BallImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+  /// core_apart: a shell's core is a disc of its own, beside which the wall's light is continued.
+  BallImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, bool core_apart)
       : scene_(scene),
         plan_(plan),
         optics_(ball_optics(scene, value)),
@@ -307,7 +385,9 @@ class BallImage final : public PixelModel<S> {
         edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
         inverse_edge_(inverse(edge_um_)),
         inverse_radius_(inverse(optics_.sphere.radius_um)),
+        core_apart_(core_apart),
         map_(plan.disc) {
+    if (core_apart) plain_ = ball_optics(scene, value.template as<P>()), core_map_ = DiscMap(plan.disc, true);
     std::vector<int> steps;
     for (const DiscSquare& q : plan.disc) steps.push_back(q.steps);
     std::sort(steps.begin(), steps.end());
@@ -355,14 +435,29 @@ class BallImage final : public PixelModel<S> {
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
   /// Light at a place of a PolarTable.
-  S light_at(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh& mesh) const { return rays_of_table_->at_fraction(v, cos_azimuth, sin_azimuth, mesh); }
+  S light_at(const DiscSquare& square, const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh& mesh) const {
+    return square.of_core ? rays_of_table_->in_core(v, cos_azimuth, sin_azimuth, mesh) : rays_of_table_->at_fraction(v, cos_azimuth, sin_azimuth, mesh, core_apart_);
+  }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture) return;
     table_ = PolarTable<S>(plan_.disc, kGivenUp * scene_.intensity_accuracy, threads,
-                           [this](int square, const P& v, const P& c, const P& s) { return light_at(v, c, s, meshes_[mesh_of_[static_cast<std::size_t>(square)]]); });
+                           [this](int square, const P& v, const P& c, const P& s) {
+                             const std::size_t i = static_cast<std::size_t>(square);
+                             return light_at(plan_.disc[i], v, c, s, meshes_[mesh_of_[i]]);
+                           });
   }
 
  private:
+  static void place_on_disc(const S& x, const S& y, const S& fraction, S& v, S& turn) {
+    P inverse_major;
+    turn = S(disc::turn_of(plain(x), plain(y), inverse_major));
+    const P to_rim = root(P(1.0) - plain(fraction));
+    v = S(to_rim);
+    if constexpr (ScalarTraits<S>::derivatives > 0) {
+      v = fraction.chain(to_rim, P(-0.5) * inverse(to_rim));
+      for (std::size_t j = 0; j < turn.d.size(); ++j) turn.d[j] = (x.value * y.d[j] - y.value * x.d[j]) * (inverse_major * inverse_major);
+    }
+  }
   template <class Mask>
   S through(const S& x, const S& y, const S& rho_um, const S& over, const Mask& inside) const {
     // How the angle moves; its value is not asked for.
@@ -374,19 +469,26 @@ class BallImage final : public PixelModel<S> {
       return rays_->at_place(rho_um * inverse_radius_, c, s, angle, mesh);
     };
     if (plan_.disc.empty()) return by_ray(meshes_[0]);
-    P inverse_major;
-    const P angle = disc::turn_of(plain(x), plain(y), inverse_major);
-    const S fraction = rho_um * inverse_edge_;
-    const P to_rim = root(P(1.0) - plain(fraction)), square = map_.find(to_rim, angle);
-    S result(0.0);
-    if (!table_.empty()) {
-      S v(to_rim), turn(angle);
-      if constexpr (ScalarTraits<S>::derivatives > 0) {
-        v = fraction.chain(to_rim, P(-0.5) * inverse(to_rim));
-        for (std::size_t j = 0; j < turn.d.size(); ++j) turn.d[j] = (x.value * y.d[j] - y.value * x.d[j]) * (inverse_major * inverse_major);
+    S v, turn;
+    place_on_disc(x, y, S(rho_um * inverse_edge_), v, turn);
+    P square = map_.find(plain(v), plain(turn));
+    if (core_apart_) {
+      const P c = plain(x) * plain(over), s = plain(y) * plain(over);
+      P core_x, core_y;
+      const NestedField<P>& core = *shell_in(plain_);
+      place_at_core(core, trace(plain_.sphere, rim_, plain(rho_um)), c, s, core_x, core_y);
+      const auto in_core = core_x * core_x + core_y * core_y < P(1.0);
+      if (!birefit::none(in_core)) {
+        S at_x(core_x), at_y(core_y);
+        if constexpr (ScalarTraits<S>::derivatives > 0) place_at_core(*shell_in(optics_), trace(optics_.sphere, rim_, rho_um), S(x * over), S(y * over), at_x, at_y);
+        at_x = select(in_core, at_x, S(0.5)), at_y = select(in_core, at_y, S(0.0));
+        S v_core, turn_core;
+        place_on_disc(at_x, at_y, root(S(at_x * at_x + at_y * at_y + 1e-18)), v_core, turn_core);
+        v = select(in_core, v_core, v), turn = select(in_core, turn_core, turn), square = select(in_core, core_map_.find(plain(v_core), plain(turn_core)), square);
       }
-      if (table_.read(square, v, turn, inside, result)) return result;
     }
+    S result(0.0);
+    if (!table_.empty() && table_.read(square, v, turn, inside, result)) return result;
     P mesh;
     if constexpr (kLanesOf<S> == 1) {
       mesh = static_cast<double>(mesh_of_[static_cast<std::size_t>(square)]);
@@ -405,6 +507,7 @@ class BallImage final : public PixelModel<S> {
   const Scene& scene_;
   const RenderPlan& plan_;
   BallOptics<S> optics_;
+  BallOptics<P> plain_;  ///< only with core_apart_
   RimTable rim_;
   std::vector<Mesh> meshes_;         ///< from the fewest steps on
   std::vector<std::size_t> mesh_of_; ///< which of them, by square of the disc; none: the first
@@ -413,7 +516,8 @@ class BallImage final : public PixelModel<S> {
   double pixel_um_;
   S center_x_, center_y_, edge_um_, inverse_edge_, inverse_radius_, open_;
   std::unique_ptr<BallRays<S>> rays_of_table_, rays_;
-  DiscMap map_;
+  bool core_apart_;
+  DiscMap map_, core_map_;
   PolarTable<S> table_;
 };
 
@@ -426,6 +530,7 @@ class StepsOfSquare {
  public:
   StepsOfSquare(const Scene& scene, const RenderPlan& plan, const Values<double>& value)
       : optics_(ball_optics(scene, value.as<Pack>())),
+        beside_(beside_core(optics_)),
         rim_(lane(optics_.sphere.ratio, 0), lane(optics_.sphere.n_host, 0), scene.microscope.objective_na),
         method_(transport_method<Pack>(plan.method)),
         target_(0.25 * scene.intensity_accuracy) {
@@ -446,14 +551,14 @@ class StepsOfSquare {
         optics_.field);
   }
   /// Until two more refinements change no pilot ray by more than a quarter of the accuracy: one alone may agree by chance. `change`: by how much they do.
-  int operator()(const DiscSquare& square, double& change) const {
+  int operator()(const DiscSquare& square, bool beside, double& change) const {
     // Between breaks all have the same number: others would be the same mesh again.
     const int unit = static_cast<int>(ball_mesh(optics_, 1).size()) - 1;
     int n = unit, m = 2 * unit;
-    Rays coarse = rays(square, n), fine = rays(square, m);
+    Rays coarse = rays(square, beside, n), fine = rays(square, beside, m);
     for (double first = distance(coarse, fine);;) {
       const int finer = m + std::max(unit, (m / 8 * 2 + unit - 1) / unit * unit);
-      Rays finest = rays(square, finer);
+      Rays finest = rays(square, beside, finer);
       const double second = distance(fine, finest);
       change = std::max(first, second);
       if (change <= target_) return n;
@@ -467,7 +572,8 @@ class StepsOfSquare {
   static constexpr int kPilots = 16, kMost = 512;
   using Rays = std::vector<Mat2<double>>;
 
-  Rays rays(const DiscSquare& square, int steps) const {
+  Rays rays(const DiscSquare& square, bool beside, int steps) const {
+    const BallOptics<Pack>& optics = beside ? beside_ : optics_;
     const Mesh mesh = ball_mesh(optics_, steps);
     Rays result;
     for (int i = 0; i < kPilots; i += kLanes) {
@@ -480,9 +586,9 @@ class StepsOfSquare {
         for (const Grazing& g : grazing_)
           if ((i + k) % 2 == 0 && g.turn > disc::turn_in(square, 0) && g.turn < disc::turn_in(square, 1)) cs[k] = g.cos, ss[k] = g.sin;
       }
-      const Pack v = Pack::load_aligned(vs);
-      const Pack rho = optics_.sphere.radius_um * Pack(rim_.rho_max()) * (Pack(1.0) - v * v);
-      const Mat2<Pack> j = ball_jones<Pack>(optics_, trace<Pack>(optics_.sphere, rim_, rho), Pack::load_aligned(cs), Pack::load_aligned(ss), method_, mesh);
+      const Pack v = Pack::load_aligned(vs), fraction = Pack(1.0) - v * v, c = Pack::load_aligned(cs), s = Pack::load_aligned(ss);
+      const SeenAt<Pack> seen = square.of_core ? seen_of_core(*shell_in(optics), optics.sphere.ratio, rim_, Pack(fraction * c), Pack(fraction * s)) : SeenAt<Pack>{rim_.rho_max() * fraction, c, s, Pack(0.0)};
+      const Mat2<Pack> j = ball_jones<Pack>(optics, trace<Pack>(optics.sphere, rim_, optics.sphere.radius_um * seen.rho), seen.cos_azimuth, seen.sin_azimuth, method_, mesh);
       for (int k = 0; k < kLanes; ++k) {
         const auto z = [&](const Complex<Pack>& x) { return Complex<double>(lane(x.re, k), lane(x.im, k)); };
         result.push_back({z(j.a), z(j.b), z(j.c), z(j.d)});
@@ -503,7 +609,7 @@ class StepsOfSquare {
   struct Grazing {
     double turn, cos, sin;
   };
-  BallOptics<Pack> optics_;
+  BallOptics<Pack> optics_, beside_;
   RimTable rim_;
   const TransportMethod<Pack>& method_;
   double target_;
@@ -521,7 +627,7 @@ double error_in(const BallImage<Pack>& image, const PolarTable<Pack>& table, con
     for (int first = 0; first < 8; first += kLanes) {
       alignas(64) double place[kLanes];
       for (int k = 0; k < kLanes; ++k) place[k] = disc::v_in(square, 0.01 + 0.98 * std::min(first + k, 7) / 7);
-      const Pack v = Pack::load_aligned(place), exact = image.light_at(v, Pack(c), Pack(s), mesh);
+      const Pack v = Pack::load_aligned(place), exact = image.light_at(square, v, Pack(c), Pack(s), mesh);
       Pack read;
       if (!table.read(Pack(number), v, Pack(turn), v < Pack(2.0), read)) return 1.0;
       for (int k = 0; k < kLanes; ++k) {
@@ -534,35 +640,113 @@ double error_in(const BallImage<Pack>& image, const PolarTable<Pack>& table, con
   return error;
 }
 
+/// How many points of a picture lie in parts of its disc, were every point to have a ray of its own.
+class PointsOfSquares {
+ public:
+  PointsOfSquares(const Scene& scene, const RenderPlan& plan, const Values<double>& value, const RimTable& rim)
+      : plan_(plan), optics_(ball_optics(scene, value)), rim_(rim), within_(points_within(plan.samples, plan.sampling_bin_px)) {
+    radius_px_ = optics_.sphere.radius_um / scene.view.pixel_size_um;
+    edge_px_ = radius_px_ * rim.rho_max();
+    share_ = std::min(1.0, static_cast<double>(scene.view.width) * scene.view.height / (std::numbers::pi * square(edge_px_)));
+    core_apart_ = core_has_disc(optics_, rim);
+  }
+  bool core_apart() const { return core_apart_; }
+  double all() const { return share_ * within_.back(); }
+  /// `beside`: share of the square's places that lie outside of the core.
+  double operator()(const DiscSquare& q, double& beside) const {
+    beside = 1;
+    double points = 0;
+    if (q.of_core) {
+      // The area of a parallelogram in the picture, and the points of its middle.
+      const auto at = [&](double across, double around) { return seen(q, across, around); };
+      const std::array<double, 2> a = at(0, 0.5), b = at(1, 0.5), c = at(0.5, 0), d = at(0.5, 1), middle = at(0.5, 0.5);
+      const double area = std::abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0]));
+      const std::size_t bin = std::min(plan_.samples.size() - 1, static_cast<std::size_t>(std::hypot(middle[0], middle[1]) / plan_.sampling_bin_px));
+      points = share_ * area * square(static_cast<double>(plan_.samples[bin]));
+    } else {
+      points = (inside(disc::v_in(q, 0)) - inside(disc::v_in(q, 1))) / disc::sectors(q.level);
+      if (core_apart_) points *= beside = share_beside(q);
+    }
+    return points;
+  }
+
+ private:
+  /// Pixels from the sphere's middle.
+  std::array<double, 2> seen(const DiscSquare& q, double across, double around) const {
+    double c, s;
+    disc::direction_of(disc::turn_in(q, around), c, s);
+    const double fraction = 1 - square(disc::v_in(q, across));
+    const SeenAt<double> at = seen_of_core(*shell_in(optics_), optics_.sphere.ratio, rim_, fraction * c, fraction * s);
+    return {radius_px_ * at.rho * at.cos_azimuth, radius_px_ * at.rho * at.sin_azimuth};
+  }
+  double share_beside(const DiscSquare& q) const {
+    // A little farther in than the edge: what a fit may come to need.
+    constexpr double kMargin = 0.03;
+    constexpr int kPlaces = 5;
+    int outside = 0;
+    for (int i = 0; i < kPlaces; ++i)
+      for (int k = 0; k < kPlaces; ++k) {
+        const double v = disc::v_in(q, i / (kPlaces - 1.0));
+        double c, s, x, y;
+        disc::direction_of(disc::turn_in(q, k / (kPlaces - 1.0)), c, s);
+        place_at_core(*shell_in(optics_), trace(optics_.sphere, rim_, optics_.sphere.radius_um * rim_.rho_max() * (1 - v * v)), c, s, x, y);
+        outside += std::hypot(x, y) > 1 - kMargin;
+      }
+    return outside / static_cast<double>(kPlaces * kPlaces);
+  }
+  double inside(double v) const {
+    const double bin = std::clamp(edge_px_ * (1 - v * v) / plan_.sampling_bin_px, 0.0, static_cast<double>(within_.size() - 1));
+    const std::size_t i = std::min(static_cast<std::size_t>(bin), within_.size() - 2);
+    return share_ * (within_[i] + (bin - static_cast<double>(i)) * (within_[i + 1] - within_[i]));
+  }
+  const RenderPlan& plan_;
+  BallOptics<double> optics_;
+  const RimTable& rim_;
+  std::vector<double> within_;  ///< points by bins of the radius
+  double radius_px_, edge_px_, share_;
+  bool core_apart_;
+};
+
+/// A table pays from this share of its rays on: with derivatives a point's own ray costs three times one of the table.
+constexpr double kWorth = 0.4;
+
 }  // namespace
 
 void plan_disc_squares(const Scene& scene, const Values<double>& value, double target, RenderPlan& plan) {
-  const BallImage<Pack> image(scene, plan, value.as<Pack>());
+  const DropletOptics<double> sphere = droplet_optics(scene, value);
+  const RimTable rim(sphere.ratio, sphere.n_host, scene.microscope.objective_na);
+  const PointsOfSquares points_of(scene, plan, value, rim);
+  const bool core_apart = points_of.core_apart();
+  const BallImage<Pack> image(scene, plan, value.as<Pack>(), core_apart);
   const StepsOfSquare steps_of(scene, plan, value);
-  // Rays inside each radius were every point to have its own, and what share of them is in the picture.
-  const std::vector<double> inside = points_within(plan.samples, plan.sampling_bin_px);
-  const double edge_px = image.edge_um() / scene.view.pixel_size_um, disc_px = std::numbers::pi * square(edge_px);
-  const double share = std::min(1.0, static_cast<double>(scene.view.width) * scene.view.height / disc_px);
-  const auto rays_within = [&](double v) {
-    const double bin = std::clamp(edge_px * (1 - v * v) / plan.sampling_bin_px, 0.0, static_cast<double>(inside.size() - 1));
-    const std::size_t i = std::min(static_cast<std::size_t>(bin), inside.size() - 2);
-    return share * (inside[i] + (bin - static_cast<double>(i)) * (inside[i + 1] - inside[i]));
-  };
-  const auto rays_of = [&](const DiscSquare& q) { return (rays_within(disc::v_in(q, 0)) - rays_within(disc::v_in(q, 1))) / disc::sectors(q.level); };
+  constexpr int kRays = PolarTable<Pack>::kRays;
 
   std::vector<DiscSquare> open;
-  for (int sector = 0; sector < disc::kSectors; ++sector)
-    for (int panel = 0; panel < disc::kPanels; ++panel) open.push_back({.level = 0, .panel = panel, .sector = sector});
+  for (const bool of_core : {false, true})
+    for (int sector = 0; sector < disc::kSectors; ++sector)
+      for (int panel = 0; panel < disc::kPanels; ++panel)
+        if (!of_core || core_apart) open.push_back({.of_core = of_core, .level = 0, .panel = panel, .sector = sector});
   double error = 0, smooth_error = 0, rays = 0, work = 0;
   while (!open.empty()) {
     std::vector<double> changes(open.size()), errors(open.size(), 0.0);
     const int count = static_cast<int>(open.size());
     parallel_for(count, 0, [&](int b) {
       DiscSquare& q = open[static_cast<std::size_t>(b)];
-      q.steps = steps_of(q, changes[static_cast<std::size_t>(b)]);
-      q.smooth = rays_of(q) > PolarTable<Pack>::kRays;  // to be tried
+      double& change = changes[static_cast<std::size_t>(b)];
+      double beside;
+      q.points = points_of(q, beside);
+      q.steps = steps_of(q, false, change);
+      if (core_apart && !q.of_core && beside > 0) {
+        double change_beside;
+        q.steps = std::max(q.steps, steps_of(q, true, change_beside));
+        change = std::max(change, change_beside);
+      }
+      q.smooth = q.points > kWorth * kRays;  // to be tried
     });
-    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0, [&](int b, const Pack& v, const Pack& c, const Pack& s) { return image.light_at(v, c, s, image.mesh(open[static_cast<std::size_t>(b)].steps)); });
+    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0, [&](int b, const Pack& v, const Pack& c, const Pack& s) {
+      const DiscSquare& q = open[static_cast<std::size_t>(b)];
+      return image.light_at(q, v, c, s, image.mesh(q.steps));
+    });
     parallel_for(count, 0, [&](int b) {
       const std::size_t i = static_cast<std::size_t>(b);
       if (!open[i].smooth) return;
@@ -572,15 +756,15 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
     std::vector<DiscSquare> next;
     for (std::size_t i = 0; i < open.size(); ++i) {
       const DiscSquare& q = open[i];
-      if (!q.smooth && q.level + 1 < disc::kLevels && rays_of(q) > 4 * PolarTable<Pack>::kRays) {
+      if (!q.smooth && q.level + 1 < disc::kLevels && q.points > kWorth * 4 * kRays) {
         for (const int down : {0, 1})
-          for (const int right : {0, 1}) next.push_back({.level = q.level + 1, .panel = 2 * q.panel + right, .sector = 2 * q.sector + down});
+          for (const int right : {0, 1}) next.push_back({.of_core = q.of_core, .level = q.level + 1, .panel = 2 * q.panel + right, .sector = 2 * q.sector + down});
         continue;
       }
       plan.disc.push_back(q);
       error = std::max(error, changes[i]);
       if (q.smooth) smooth_error = std::max(smooth_error, errors[i]);
-      const double here = q.smooth ? PolarTable<Pack>::kRays : rays_of(q);
+      const double here = q.smooth ? kRays : q.points;
       rays += here;
       work += here * q.steps;
     }
@@ -592,7 +776,7 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
   plan.reasons.push_back(fmt::format("steps by place on the disc, as its rays need: {} to {}, {:.0f} a ray in the mean", fewest->steps, most->steps, work / std::max(rays, 1.0)));
   plan.reasons.push_back(fmt::format(
       "the droplet does not look the same from all sides of the viewing axis: {} of {} parts of the disc are smooth enough to be interpolated from {} rays each{}, elsewhere one ray a point; {:.0f} rays instead of {:.0f}",
-      smooth, plan.disc.size(), PolarTable<Pack>::kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays, inside.back() * share));
+      smooth, plan.disc.size(), kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays, points_of.all()));
 }
 
 int StepsByPlace::at(double fraction, double x, double y) const {
@@ -604,17 +788,23 @@ int StepsByPlace::at(double fraction, double x, double y) const {
 
 bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before) {
   if (now.empty() || before.empty()) return now.empty() != before.empty();
-  const DiscMap now_at(now), before_at(before);
-  for (std::size_t i = 0; i < now_at.cells().size(); ++i) {
-    const DiscSquare &a = now[static_cast<std::size_t>(now_at.cells()[i])], &b = before[static_cast<std::size_t>(before_at.cells()[i])];
-    if (a.steps > 1.25 * b.steps + 1 || (b.smooth && (!a.smooth || a.level > b.level))) return true;
+  for (const bool of_core : {false, true}) {
+    const DiscMap now_at(now, of_core), before_at(before, of_core);
+    for (std::size_t i = 0; i < now_at.cells().size(); ++i) {
+      const int new_one = now_at.cells()[i], old_one = before_at.cells()[i];
+      if ((new_one < 0) != (old_one < 0)) return true;  // the core has come to be a disc of its own
+      if (new_one < 0) break;
+      const DiscSquare &a = now[static_cast<std::size_t>(new_one)], &b = before[static_cast<std::size_t>(old_one)];
+      if (a.steps > 1.25 * b.steps + 1 || (b.smooth && (!a.smooth || a.level > b.level))) return true;
+    }
   }
   return false;
 }
 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<BallImage<S>>(scene, plan, value);
+  const bool core_apart = std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; });
+  return std::make_unique<BallImage<S>>(scene, plan, value, core_apart);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                        \
   template BallOptics<S> ball_optics<S>(const Scene&, const Values<S>&);                                              \

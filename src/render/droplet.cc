@@ -102,40 +102,21 @@ DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho
   P start = rim.psi_at(plain(rho_um) * inverse(plain(o.radius_um)));
   // No step leaves the accepted interval: at its end the intensity vanishes.
   const P limit(rim.psi_max());
-  DropletRay<S> ray;
-  const auto geometry = [&](auto psi, auto ratio, auto radius, auto& r) {
-    using T = decltype(psi);
-    sin_cos(psi, r.sin_out, r.cos_out);
-    r.sin_in = ratio * r.sin_out;
-    r.cos_in = root(max_of(T(1.0) - r.sin_in * r.sin_in, T(1e-14)));
-    r.sin_deflection = r.sin_out * r.cos_in - r.cos_out * r.sin_in;
-    r.cos_deflection = r.cos_out * r.cos_in + r.sin_out * r.sin_in;
-    r.cos_twice = 1.0 - 2.0 * r.sin_deflection * r.sin_deflection;
-    const T sin_twice = 2.0 * r.sin_deflection * r.cos_deflection;
-    const T secant = inverse(r.cos_twice);
-    r.rho_um = radius * r.sin_out * secant;
-    // d rho / d psi
-    r.slope_um = radius * secant *
-                 (r.cos_out + 2.0 * r.sin_out * sin_twice * secant * (1.0 - ratio * r.cos_out * inverse(r.cos_in)));
-  };
   const P ratio = plain(o.ratio), radius = plain(o.radius_um);
   for (int i = 0; i < kNewtonSteps; ++i) {
-    DropletRay<P> r;
-    geometry(start, ratio, radius, r);
+    const DropletRay<P> r = ray_at(start, ratio, radius);
     start = start - (r.rho_um - plain(rho_um)) * inverse(r.slope_um);
     start = min_of(max_of(start, P(0.0)), limit);
   }
   S psi(start);
   if constexpr (ScalarTraits<S>::derivatives > 0) {
     // d psi = (d rho_wanted - d rho(psi; parameters)) / slope: implicit function theorem.
-    DropletRay<S> first;
-    geometry(S(start), o.ratio, o.radius_um, first);
+    const DropletRay<S> first = ray_at(S(start), o.ratio, o.radius_um);
     const P inverse_slope = inverse(plain(first.slope_um));
     for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
       psi.d[j] = (rho_um.d[j] - first.rho_um.d[j]) * inverse_slope;
   }
-  geometry(psi, o.ratio, o.radius_um, ray);
-  return ray;
+  return ray_at(psi, o.ratio, o.radius_um);
 }
 
 template <class S>

@@ -61,6 +61,22 @@ struct DropletRay {
   S sin_out, cos_out, sin_in, cos_in, sin_deflection, cos_deflection, cos_twice, rho_um, slope_um;
 };
 
+/// The ray of an angle of incidence psi on the sphere; ratio: n_host / n_o.
+template <class S>
+DropletRay<S> ray_at(const S& psi, const S& ratio, const S& radius_um) {
+  DropletRay<S> r;
+  sin_cos(psi, r.sin_out, r.cos_out);
+  r.sin_in = ratio * r.sin_out;
+  r.cos_in = root(max_of(S(1.0) - r.sin_in * r.sin_in, S(1e-14)));
+  r.sin_deflection = r.sin_out * r.cos_in - r.cos_out * r.sin_in;
+  r.cos_deflection = r.cos_out * r.cos_in + r.sin_out * r.sin_in;
+  r.cos_twice = 1.0 - 2.0 * r.sin_deflection * r.sin_deflection;
+  const S sin_twice = 2.0 * r.sin_deflection * r.cos_deflection, secant = inverse(r.cos_twice);
+  r.rho_um = radius_um * r.sin_out * secant;
+  r.slope_um = radius_um * secant * (r.cos_out + 2.0 * r.sin_out * sin_twice * secant * (1.0 - ratio * r.cos_out * inverse(r.cos_in)));
+  return r;
+}
+
 template <class S>
 DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value);
 /// rim.rho_max() with its derivatives by the indices.

@@ -15,9 +15,10 @@
 namespace birefit {
 
 /// The disc's coordinates: v = sqrt(1 - rho/edge), 0 at the rim, where light ends like that root, and turn: y/x and -x/y in turn,
-/// from -1 to 1 in each quarter that is centred on half an axis; an angle without a trigonometric function, 8 a full turn.
+/// from -1 to 1 in each quarter that is centred on half an axis; an angle without a trigonometric function, 8 a full turn. A shell's core is
+/// a disc of its own, whose rho is the distance at which a ray passes its middle: so begins the way through it at its edge.
 namespace disc {
-constexpr int kPanels = 4, kSectors = 8, kLevels = 6;  ///< squares of level 0; level l has 2^l times as many along either
+constexpr int kPanels = 4, kSectors = 8, kLevels = 7;  ///< squares of level 0; level l has 2^l times as many along either
 constexpr int panels(int level) { return kPanels << level; }
 constexpr int sectors(int level) { return kSectors << level; }
 
@@ -47,9 +48,11 @@ inline double turn_in(const DiscSquare& q, double around) { return (q.sector + a
 class DiscMap {
  public:
   DiscMap() = default;
-  explicit DiscMap(const std::vector<DiscSquare>& squares) : at_(static_cast<std::size_t>(kAcross * kAround), -1) {
+  /// Of the squares of the core, or of the others.
+  explicit DiscMap(const std::vector<DiscSquare>& squares, bool of_core = false) : at_(static_cast<std::size_t>(kAcross * kAround), -1) {
     for (std::size_t i = 0; i < squares.size(); ++i) {
       const DiscSquare& q = squares[i];
+      if (q.of_core != of_core) continue;
       const int size = 1 << (disc::kLevels - 1 - q.level);
       for (int r = q.sector * size; r < (q.sector + 1) * size; ++r)
         for (int c = q.panel * size; c < (q.panel + 1) * size; ++c) at_[static_cast<std::size_t>(r * kAcross + c)] = static_cast<int>(i);

@@ -482,9 +482,8 @@ bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::v
     left = 1 - smooth / static_cast<double>(plan.fringe_blocks.size());
   } else {
     for (const DiscSquare& q : plan.disc) {
-      const auto within = [](double v) { return square(1 - v * v); };
       if (q.smooth) tables += PolarTable<Pack>::kRays;
-      else left += (within(disc::v_in(q, 0)) - within(disc::v_in(q, 1))) / disc::sectors(q.level);
+      else left += q.points / (all * rays);
     }
   }
   constexpr double kReading = 0.05;  // of a ray's time, a pixel

@@ -67,6 +67,7 @@ template <class S>
 struct NestedField {
   Vec3<S> offset;
   S core;
+  bool core_left_out = false;  ///< rays find the wall's director go on within the core: what is seen beside it, continued smoothly
   template <class T>
   Vec3<T> at(const Vec3<T>& r) const {
     const S wall = 1.0 - core, a = dot(offset, offset) - wall * wall;
@@ -78,6 +79,14 @@ struct NestedField {
     return normalized(Vec3<T>{r.x - s * offset.x, r.y - s * offset.y, r.z - s * offset.z});
   }
 };
+
+/// Where a ray, of BallRay's geometry, passes the core's middle: across the ray in its frame (t, phi), that turned back into the picture, in radii
+/// of the core. Of length 1 where it touches the core. `reach`, in radii of the sphere, along the azimuth of the image point, less the offset:
+/// (impact t - offset).t = reach - offset.rho, as t - rho = (cos d - 1) rho + sin d z.
+template <class S>
+S reach_at_core(const NestedField<S>& f, const S& impact, const S& sin_deflection, const S& cos_deflection, const S& cos_azimuth, const S& sin_azimuth) {
+  return impact + (1.0 - cos_deflection) * (f.offset.x * cos_azimuth + f.offset.y * sin_azimuth) - sin_deflection * f.offset.z;
+}
 
 template <class S>
 using BallField = std::variant<BipolarField<S>, TiltedAxialField<S>, NestedField<S>>;
@@ -118,7 +127,7 @@ class BallColumn final : public Column<S> {
       const Vec3<S> away{ray_.impact * t.x - field.offset.x, ray_.impact * t.y - field.offset.y, ray_.impact * t.z - field.offset.z};
       const S h = away.x * k.x + away.y * k.y + away.z * k.z;
       const S c = away.x * away.x + away.y * away.y + away.z * away.z - field.core * field.core;
-      const S half_way = root(max_of(h * h - c, S(1e-14)));
+      const S half_way = field.core_left_out ? S(0.0) : root(max_of(h * h - c, S(1e-14)));
       before_ = S(0.0) - h - half_way;
       after_ = half_way - h;
     } else if constexpr (std::is_same_v<Field, TiltedAxialField<S>>) {
