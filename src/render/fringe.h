@@ -16,9 +16,12 @@ struct FringePoint {
   S amplitude, phase, mean, quadrature;
 };
 
-/// A set of a FringePoint's fields, bit k the k-th.
-using FringeFields = unsigned;
-inline constexpr FringeFields kAllFringeFields = 15;
+/// What a derivative changes of a FringePoint.
+struct FringeFields {
+  unsigned own = 15;       ///< the fields with values of their own, bit k the k-th
+  double phase_share = 0;  ///< of the phase itself, added to its change: a thickness, a wavelength scale it
+  bool has(std::size_t field) const { return own >> field & 1; }
+};
 
 /// Moments of e^{i g x} over x in [-1/2, 1/2]: m0 = int e^{igx} = sinc(g/2), int x e^{igx} = -i m0', int x^2 e^{igx} =
 /// -m0''. With s(q) = sin(sqrt q)/sqrt q, q = g^2/4: m0' = (g/2) s', and 4 q s'' + 6 s' + s = 0 gives m0'' = -s' - s/4,
@@ -97,8 +100,8 @@ class NineWeights {
 
 /// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact in the
 /// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others their derivatives by
-/// parameters; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. fields(plane): which
-/// fields a parameter moves (FringeFields); the others are not read. What a change of any of the nine points does to the mean is found once,
+/// parameters; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. fields(plane): what
+/// of them a parameter moves; the others are not read. What a change of any of the nine points does to the mean is found once,
 /// backwards through the formula, and serves all derivatives.
 template <bool kQuadrature, class P, class Load, class Fields, class Put>
 BIREFIT_INLINE void fringe_means(int planes, const Load& load, const Fields& fields, const Put& put) {
@@ -157,11 +160,12 @@ BIREFIT_INLINE void fringe_means(int planes, const Load& load, const Fields& fie
   for (int plane = 1; plane < planes; ++plane) {
     const FringeFields moved = fields(plane);
     P d(0.0);
-    if (moved & 1) d = by_amplitude.times(field(plane, 0));
-    if (moved & 2) d = d + by_phase.times(field(plane, 1));
-    if (moved & 4) d = d + mean_of(plane);
+    if (moved.has(0)) d = by_amplitude.times(field(plane, 0));
+    if (moved.has(1)) d = d + by_phase.times(field(plane, 1));
+    if (moved.phase_share != 0) d = d + P(moved.phase_share) * by_phase.times(field(0, 1));
+    if (moved.has(2)) d = d + mean_of(plane);
     if constexpr (kQuadrature)
-      if (moved & 8) d = d + by_quadrature.times(field(plane, 3));
+      if (moved.has(3)) d = d + by_quadrature.times(field(plane, 3));
     put(plane, d);
   }
 }
@@ -179,7 +183,7 @@ S fringe_mean(const FringePoint<S> (&p)[3][3]) {
     }
     return plain(part);
   };
-  fringe_means<kQuadrature, P>(1 + ScalarTraits<S>::derivatives, load, [](int) { return kAllFringeFields; }, [&mean](int plane, const P& value) {
+  fringe_means<kQuadrature, P>(1 + ScalarTraits<S>::derivatives, load, [](int) { return FringeFields{}; }, [&mean](int plane, const P& value) {
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       if (plane > 0) {
         mean.d[static_cast<std::size_t>(plane - 1)] = value;

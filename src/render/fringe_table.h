@@ -95,8 +95,6 @@ class FringeTable {
       if (!(left <= allowed)) start_[static_cast<std::size_t>(list[i])] = kGone;
     }
     for (std::size_t plane = 1; plane < planes_; ++plane) fields_[derivatives_[plane - 1] + 1] = fields_of(values, list.size(), plane);
-    for (const FringeMove& m : moves_) fields_[m.derivative + 1] = kAllFringeFields;
-    fields_[0] = kAllFringeFields;
     parallel_for(static_cast<int>(list.size() * kFields * planes_), threads, [&](int plane) {
       const std::size_t at = static_cast<std::size_t>(plane) * kRays;
       to_powers<kPoints>(values.data() + at, coefficients_.data() + at);
@@ -120,7 +118,7 @@ class FringeTable {
       x0 = first;
     for (std::size_t f = 0; f < (quadrature ? kFields : kFields - 1); ++f, line += kOut * kPoints)
       for (std::size_t plane = 0; plane < kOut; ++plane) {
-        if (!(fields_[plane] >> f & 1)) continue;
+        if (!fields_[plane].has(f)) continue;
         std::array<P, kPoints> c;
         for (std::size_t i = 0; i < kPoints; ++i) c[i] = P(line[plane * kPoints + i]);
         double* to = out[f * kOut + plane];
@@ -142,10 +140,10 @@ class FringeTable {
     return end - column;
   }
 
-  /// Fields that change with derivative plane - 1 of S, those left out to which no square owes more than rounding of it: run() does not write them.
+  /// What changes with derivative plane - 1 of S, fields left out to which no square owes more than rounding of it: run() does not write them.
   FringeFields fields(std::size_t plane) const { return fields_[plane]; }
   /// None is left out, for a picture of which a part is traced.
-  void keep_all_fields() { fields_.fill(kAllFringeFields); }
+  void keep_all_fields() { fields_.fill({}); }
   /// All squares that were asked for are there.
   bool complete() const { return std::none_of(start_.begin(), start_.end(), [](int s) { return s == kGone; }); }
 
@@ -178,11 +176,22 @@ class FringeTable {
           value[f] = std::max(value[f], std::abs(at[0]));
           change[f] = std::max(change[f], std::abs(at[plane * kRays]));
         }
-    change[1] *= value[0] + value[3];
-    const double all = change[0] + change[1] + change[2] + change[3];
-    FringeFields fields = 0;
+    const double fringes = value[0] + value[3], all = change[0] + change[1] * fringes + change[2] + change[3];
+    FringeFields fields{.own = 0};
     for (std::size_t f = 0; f < kFields; ++f)
-      if (!(change[f] <= 1e-14 * all)) fields |= 1u << f;
+      if (!(change[f] * (f == 1 ? fringes : 1) <= 1e-14 * all)) fields.own |= 1u << f;
+    if (!fields.has(1)) return fields;
+    double along = 0, square = 0, beside = 0;
+    const auto of_phase = [&](const auto& work) {
+      for (std::size_t i = 0; i < squares; ++i) {
+        const double* at = values.data() + (i * kFields + 1) * planes_ * kRays;
+        for (int k = 0; k < kRays; ++k) work(at[k], at[plane * kRays + static_cast<std::size_t>(k)]);
+      }
+    };
+    of_phase([&](double phase, double by) { along += phase * by, square += phase * phase; });
+    const double share = square > 0 ? along / square : 0;
+    of_phase([&](double phase, double by) { beside = std::max(beside, std::abs(by - share * phase)); });
+    if (beside <= 1e-13 * change[1]) fields.own &= ~2u, fields.phase_share = share;
     return fields;
   }
   const double* line_at(int column, double row, FringeScratch& scratch) const {
@@ -207,7 +216,7 @@ class FringeTable {
         double* line = scratch.lines.data() + (static_cast<std::size_t>(bx) * kFields + f) * kOut * kPoints;
         Line value, by_y;
         for (std::size_t plane = 0; plane < planes_; ++plane) {
-          if (plane > 0 && !(fields_[derivatives_[plane - 1] + 1] >> f & 1)) continue;
+          if (plane > 0 && !fields_[derivatives_[plane - 1] + 1].has(f)) continue;
           const double* powers = c + plane * kRays;
           std::copy(powers + kRays - kPoints, powers + kRays, value.begin());
           by_y.fill(0);

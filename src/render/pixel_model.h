@@ -65,7 +65,7 @@ class PixelModel {
   /// The same of up to `count` columns of a row from `column` on, read from a table (FringeTable::run); 0 where there is none.
   virtual int fringe_run(int /*column*/, double /*row*/, int /*count*/, FringeScratch&, double* const* /*out*/) const { return 0; }
   /// Which fields the derivative of number plane - 1 changes; plane 0 has all.
-  virtual FringeFields fringe_fields(int /*plane*/) const { return kAllFringeFields; }
+  virtual FringeFields fringe_fields(int /*plane*/) const { return {}; }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
   /// Of the picture and every derivative.

@@ -158,7 +158,7 @@ class PlanarModel final : public PixelModel<S> {
     return table_.run(column, row, count, !in_phase(), scratch, out);
   }
   FringeFields fringe_fields(int plane) const override {
-    return tabulated_blocks_.empty() ? kAllFringeFields : table_.fields(static_cast<std::size_t>(plane));
+    return tabulated_blocks_.empty() ? FringeFields{} : table_.fields(static_cast<std::size_t>(plane));
   }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
   Symmetry symmetry() const override { return symmetry_; }
