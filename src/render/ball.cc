@@ -6,6 +6,7 @@
 
 #include "medium/build.h"
 #include "render/pilots.h"
+#include "render/radial_table.h"
 #include "render/sampling.h"
 #include "transport/magnus.h"
 
@@ -168,10 +169,14 @@ BallOptics<S> beside_core(BallOptics<S> o) {
 }
 /// Where the ray that is seen at an azimuth passes the core's middle (reach_at_core).
 template <class S>
-void place_at_core(const NestedField<S>& shell, const DropletRay<S>& ray, const S& ca, const S& sa, S& x, S& y) {
-  const S reach = reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa), over = inverse(shell.core);
+void place_at_core(const NestedField<S>& shell, const S& reach, const S& ca, const S& sa, S& x, S& y) {
+  const S over = inverse(shell.core);
   x = (reach * ca - shell.offset.x) * over;
   y = (reach * sa - shell.offset.y) * over;
+}
+template <class S>
+void place_at_core(const NestedField<S>& shell, const DropletRay<S>& ray, const S& ca, const S& sa, S& x, S& y) {
+  place_at_core(shell, reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa), ca, sa, x, y);
 }
 /// Where such a ray is seen.
 template <class S>
@@ -387,7 +392,23 @@ class BallImage final : public PixelModel<S> {
         inverse_radius_(inverse(optics_.sphere.radius_um)),
         core_apart_(core_apart),
         map_(plan.disc) {
-    if (core_apart) plain_ = ball_optics(scene, value.template as<P>()), core_map_ = DiscMap(plan.disc, true);
+    if (shell_in(optics_)) {
+      plain_ = ball_optics(scene, value.template as<P>());
+      core_map_ = DiscMap(plan.disc, true);
+      const auto table = [&]<class T>(const BallOptics<T>& o, const T& edge_um, int panels) {
+        return RadialTable<T>(panels, 3, 1, [&](const P& v, T* out) {
+          const DropletRay<T> ray = trace(o.sphere, rim_, T(edge_um * (P(1.0) - v * v)));
+          const Vec3<T>& offset = shell_in(o)->offset;
+          const T bent = 1.0 - ray.cos_deflection;
+          out[0] = ray.sin_in - ray.sin_deflection * offset.z, out[1] = bent * offset.x, out[2] = bent * offset.y;
+        });
+      };
+      constexpr double kExact = 1e-9;
+      int panels = 4;
+      for (; panels <= 64; panels *= 2)
+        if (reach_ = table(plain_, plain(edge_um_), panels); reach_.tail() < kExact) break;
+      if constexpr (ScalarTraits<S>::derivatives > 0) reach_and_slopes_ = table(optics_, edge_um_, panels);
+    }
     std::vector<int> steps;
     for (const DiscSquare& q : plan.disc) steps.push_back(q.steps);
     std::sort(steps.begin(), steps.end());
@@ -432,6 +453,14 @@ class BallImage final : public PixelModel<S> {
     const S within = select(inside, rho, 0.5 * edge_um_);
     return beside + select(inside, through(x, y, within, over, inside), S(0.0));
   }
+  bool has_edge() const override { return shell_in(optics_) != nullptr; }
+  P beyond_edge(const P& column, const P& row) const override {
+    const P x = (column - plain(center_x_)) * pixel_um_, y = (plain(center_y_) - row) * pixel_um_;
+    const P rho2 = x * x + y * y + 1e-18, over = inverse_root(rho2), rho_um = rho2 * over;
+    P core_x, core_y;
+    seen_at_core(root(max_of(P(1.0) - rho_um * plain(inverse_edge_), P(0.0))), P(x * over), P(y * over), core_x, core_y);
+    return select(rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));  // beyond the sphere's rim there is none
+  }
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
   /// Light at a place of a PolarTable.
@@ -448,6 +477,21 @@ class BallImage final : public PixelModel<S> {
   }
 
  private:
+  /// place_at_core() at a fraction 1 - v^2 of the way to the disc's edge.
+  void seen_at_core(const P& v, const P& c, const P& s, P& x, P& y) const {
+    const P basis[3] = {P(1.0), c, s};
+    place_at_core(*shell_in(plain_), reach_.template sum<3>(v, basis), c, s, x, y);
+  }
+  /// The same with derivatives; angle: of the azimuth, its value is not read.
+  void seen_at_core(const S& v, const P& c, const P& s, const S& angle, S& x, S& y) const {
+    if constexpr (ScalarTraits<S>::derivatives > 0) {
+      const P basis[3] = {P(1.0), c, s}, turned[3] = {P(0.0), -s, c};
+      typename RadialTable<S>::Slopes slopes;
+      S reach = reach_and_slopes_.template sum<3>(plain(v), basis, turned, &slopes);
+      for (std::size_t j = 0; j < reach.d.size(); ++j) reach.d[j] = reach.d[j] + slopes.by_v * v.d[j] + slopes.turned * angle.d[j];
+      place_at_core(*shell_in(optics_), reach, angle.chain(c, -s), angle.chain(s, c), x, y);
+    }
+  }
   static void place_on_disc(const S& x, const S& y, const S& fraction, S& v, S& turn) {
     P inverse_major;
     turn = S(disc::turn_of(plain(x), plain(y), inverse_major));
@@ -460,27 +504,26 @@ class BallImage final : public PixelModel<S> {
   }
   template <class Mask>
   S through(const S& x, const S& y, const S& rho_um, const S& over, const Mask& inside) const {
+    const P c = plain(x) * plain(over), s = plain(y) * plain(over);
     // How the angle moves; its value is not asked for.
-    const auto by_ray = [&](const Mesh& mesh) {
-      const P c = plain(x) * plain(over), s = plain(y) * plain(over);
-      S angle(P(0.0));
+    const auto angle = [&] {
+      S a(P(0.0));
       if constexpr (ScalarTraits<S>::derivatives > 0)
-        for (std::size_t j = 0; j < angle.d.size(); ++j) angle.d[j] = (c * y.d[j] - s * x.d[j]) * plain(over);
-      return rays_->at_place(rho_um * inverse_radius_, c, s, angle, mesh);
+        for (std::size_t j = 0; j < a.d.size(); ++j) a.d[j] = (c * y.d[j] - s * x.d[j]) * plain(over);
+      return a;
     };
+    const auto by_ray = [&](const Mesh& mesh) { return rays_->at_place(rho_um * inverse_radius_, c, s, angle(), mesh); };
     if (plan_.disc.empty()) return by_ray(meshes_[0]);
     S v, turn;
     place_on_disc(x, y, S(rho_um * inverse_edge_), v, turn);
     P square = map_.find(plain(v), plain(turn));
     if (core_apart_) {
-      const P c = plain(x) * plain(over), s = plain(y) * plain(over);
       P core_x, core_y;
-      const NestedField<P>& core = *shell_in(plain_);
-      place_at_core(core, trace(plain_.sphere, rim_, plain(rho_um)), c, s, core_x, core_y);
+      seen_at_core(plain(v), c, s, core_x, core_y);
       const auto in_core = core_x * core_x + core_y * core_y < P(1.0);
       if (!birefit::none(in_core)) {
         S at_x(core_x), at_y(core_y);
-        if constexpr (ScalarTraits<S>::derivatives > 0) place_at_core(*shell_in(optics_), trace(optics_.sphere, rim_, rho_um), S(x * over), S(y * over), at_x, at_y);
+        if constexpr (ScalarTraits<S>::derivatives > 0) seen_at_core(v, c, s, angle(), at_x, at_y);
         at_x = select(in_core, at_x, S(0.5)), at_y = select(in_core, at_y, S(0.0));
         S v_core, turn_core;
         place_on_disc(at_x, at_y, root(S(at_x * at_x + at_y * at_y + 1e-18)), v_core, turn_core);
@@ -507,7 +550,9 @@ class BallImage final : public PixelModel<S> {
   const Scene& scene_;
   const RenderPlan& plan_;
   BallOptics<S> optics_;
-  BallOptics<P> plain_;  ///< only with core_apart_
+  BallOptics<P> plain_;   ///< of a shell, and reach_at_core() by v, which is one function, one times the cosine and one times the sine of the azimuth
+  RadialTable<P> reach_;
+  RadialTable<S> reach_and_slopes_;
   RimTable rim_;
   std::vector<Mesh> meshes_;         ///< from the fewest steps on
   std::vector<std::size_t> mesh_of_; ///< which of them, by square of the disc; none: the first

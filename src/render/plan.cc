@@ -406,8 +406,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
                                      pilots.size(), sci(scene.intensity_accuracy)));
   plan.reasons.push_back("normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique terms");
 
-  // A shell's retardance turns back where rays touch the core, with a slope that has no bound.
-  sample_round(scene, value, o, rim.rho_max() * o.radius_um, o.director == DropletOptics<double>::Director::shell ? std::vector{core_edge(o, rim)} : std::vector<double>{}, plan);
+  sample_round(scene, value, o, rim.rho_max() * o.radius_um, {}, plan);
   plan_radial_table(scene, value, plan);
   return plan;
 }

@@ -9,6 +9,7 @@
 #include "core/threads.h"
 #include "render/ball.h"
 #include "render/cone_view.h"
+#include "render/edge_pixels.h"
 #include "render/fringe_table.h"
 #include "render/pixel_model.h"
 #include "render/planar.h"
@@ -259,6 +260,11 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
     band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes);
     for (int r = -1; r <= rows + 2; ++r) rings.fill(std::clamp(top + r, 0, h + 1), band.samples(r), wide);
+    if (model->has_edge()) {
+      thread_local EdgeMarks marks;
+      marks.look(*model, top - 2, rows + 4, -1, wide);
+      for (int r = -1; r <= rows + 2; ++r) marks.mark(r + 1, band.samples(r));
+    }
     FringeScratch scratch;
     const auto compute = [&](int r) {
       needed.find(band.samples(r - 1), band.samples(r), band.samples(r + 1), wide);
@@ -327,6 +333,10 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       };
       for (int c = 0; c < w; ++c) {
         if (n[c] == 1) continue;
+        if (n[c] & kEdgePixel) {
+          store(mean_over_edge_pixel(*model, c, top + r, n[c] - kEdgePixel), targets(c), planes, 0, 1);
+          continue;
+        }
         const std::size_t most = n[c];
         if ((n[c] * n[c]) % kStep == 0) {
           store(mean_over_one_pixel(*model, c, top + r, n[c]), targets(c), planes, 0, 1);
@@ -363,20 +373,33 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   model->tabulate(PixelModel<S>::Wanted::points, threads);
   const int n = static_cast<int>(pixels.size());
   constexpr int kStep = kLanesOf<S>;
-  const int groups = (n + kStep - 1) / kStep;
   // All lanes take as many samples as the one that needs most: pixels that need as many go together, the dearest first.
-  std::vector<std::uint8_t> samples;
-  for (const auto& [x, y] : pixels) samples.push_back(static_cast<std::uint8_t>(samples_at(plan, x, y)));
+  std::vector<std::uint8_t> samples(pixels.size());
+  parallel_for(n, threads, [&](int i) {
+    const auto& [x, y] = pixels[static_cast<std::size_t>(i)];
+    const int edge = model->has_edge() && is_edge_pixel(*model, x, y) ? kEdgePixel : 0;
+    samples[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(edge + samples_at(plan, x, y));
+  });
   std::vector<std::size_t> order(pixels.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return samples[a] > samples[b]; });
+  const auto put = [&](std::size_t pixel, const S& v, int k) {
+    out.intensity(static_cast<Eigen::Index>(pixel)) = lane(plain(v), k);
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (std::size_t j = 0; j < active.size(); ++j) out.derivatives(static_cast<Eigen::Index>(pixel), first_column + static_cast<int>(j)) = lane(v.d[j], k);
+  };
+  const int edges = static_cast<int>(std::count_if(samples.begin(), samples.end(), [](std::uint8_t k) { return (k & kEdgePixel) != 0; })), groups = (n - edges + kStep - 1) / kStep;
+  parallel_for(edges, threads, [&](int i) {
+    const std::size_t pixel = order[static_cast<std::size_t>(i)];
+    put(pixel, mean_over_edge_pixel(*model, pixels[pixel][0], pixels[pixel][1], samples[pixel] - kEdgePixel), 0);
+  });
   const int together = std::clamp(groups / 64, 1, 16);
   parallel_for((groups + together - 1) / together, threads, [&](int block) {
     for (int g = together * block; g < std::min(groups, together * (block + 1)); ++g) {
       double columns[kLanes], rows[kLanes];
       std::array<std::size_t, kLanes> at;
       for (int k = 0; k < kLanes; ++k) {
-        at[static_cast<std::size_t>(k)] = order[static_cast<std::size_t>(std::min(g * kStep + k, n - 1))];
+        at[static_cast<std::size_t>(k)] = order[static_cast<std::size_t>(std::min(edges + g * kStep + k, n - 1))];
         const auto& pixel = pixels[at[static_cast<std::size_t>(k)]];
         columns[k] = pixel[0];
         rows[k] = pixel[1];
@@ -392,13 +415,7 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
       } else {
         v = mean_over_pixel(*model, column, row, std::max(most, 2));  // the point value alone is no pixel mean
       }
-      for (int k = 0; k < std::min(kStep, n - g * kStep); ++k) {
-        const auto pixel = static_cast<Eigen::Index>(at[static_cast<std::size_t>(k)]);
-        out.intensity(pixel) = lane(plain(v), k);
-        if constexpr (ScalarTraits<S>::derivatives > 0)
-          for (std::size_t j = 0; j < active.size(); ++j)
-            out.derivatives(pixel, first_column + static_cast<int>(j)) = lane(v.d[j], k);
-      }
+      for (int k = 0; k < std::min(kStep, n - edges - g * kStep); ++k) put(at[static_cast<std::size_t>(k)], v, k);
     }
   });
 }

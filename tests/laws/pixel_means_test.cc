@@ -133,15 +133,14 @@ TEST(PixelMeans, OfShellsAndDropletsAreThoseOfFinerPixels) {
           shell.wall_um = b.fixed("wall_um", wall);
           droplet.director = shell;
         });
-        // Pixels on the edge of a core, where the retardance has a kink without a bound to its slope, are means of 64 points; the
-        // others' are good to the accuracy of 1e-4.
-        EXPECT_LT(worst, wall > 0 ? 0.02 : 1e-3) << "wall " << wall << " um, pixel " << pixel << " um, off " << off;
-        EXPECT_LT(rms, wall > 0 ? 1e-3 : 1e-4) << "wall " << wall << " um, pixel " << pixel << " um, off " << off;
+        // The edge of a core, where the retardance has a kink without a bound to its slope, is no worse than the rest.
+        EXPECT_LT(worst, 2e-3) << "wall " << wall << " um, pixel " << pixel << " um, off " << off;
+        EXPECT_LT(rms, 2e-4) << "wall " << wall << " um, pixel " << pixel << " um, off " << off;
       }
 }
 
-// Points a pixel are planned from the fringes on 64 radii and 24 azimuths: a boojum at a bipolar droplet's pole, the kink at the edge of a core off the middle lie between them. A few
-// pixels there are means of too few points; of the picture's mean square that leaves 1e-4 and, along a core's whole edge, 1.2e-3.
+// Points a pixel are planned from the fringes on 64 radii and 24 azimuths, and a boojum at a bipolar droplet's pole lies between them: a few
+// pixels there are means of too few points. The edge of a core off the middle is no worse.
 TEST(PixelMeans, OfUnsymmetricDropletsAreThoseOfFinerPixels) {
   using testing::TableBuilder;
   const auto bipolar = [](TableBuilder& b, Droplet& droplet) { droplet.director = BipolarDirector{b.fixed("azimuth_deg", 25), b.fixed("tilt_deg", 10), {}}; };
@@ -163,7 +162,7 @@ TEST(PixelMeans, OfUnsymmetricDropletsAreThoseOfFinerPixels) {
     std::function<void(TableBuilder&, Droplet&)> director;
     double worst, rms;
   };
-  for (const Sample& s : {Sample{"bipolar", bipolar, 3e-3, 1e-4}, {"in a field", in_field, 1e-3, 1e-4}, {"shell", shell(1.5, 0.5), 0.03, 1.2e-3}, {"thin shell", shell(0.6, 0.2), 0.03, 1.2e-3}})
+  for (const Sample& s : {Sample{"bipolar", bipolar, 3e-3, 1e-4}, {"in a field", in_field, 1e-3, 1e-4}, {"shell", shell(1.5, 0.5), 3e-3, 2e-4}, {"thin shell", shell(0.6, 0.2), 3e-3, 2e-4}})
     for (const double off : {0.0, 0.31})
       for (const double pixel : {0.15, 0.3}) {
         const auto [worst, rms] = from_finer_pixels(40 * pixel, pixel, off, s.director);

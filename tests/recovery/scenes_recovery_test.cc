@@ -112,7 +112,8 @@ Scatter scatter(int draws, const std::function<void(Draw&)>& make, const std::st
       if (p.linear || p.at_bound || !p.limit.empty()) continue;
       const double error = p.value - f.truth[f.truth.find(p.name)].value;
       result.by_name[p.name].add(error, p.stderr_);
-      if (std::abs(error) > 4 * p.stderr_) std::printf("  %d: %s %g off by %.1f standard errors, reduced chi-square %.2f\n", number, p.name.c_str(), p.value - error, error / p.stderr_, f.result.reduced_chi_square);
+      if (std::abs(error) > 4 * p.stderr_) std::printf("  %d: %s %g off by %.1f standard errors, 95 %% interval %g to %g, reduced chi-square %.2f\n", number, p.name.c_str(), p.value - error, error / p.stderr_,
+                                                         p.interval95_low, p.interval95_high, f.result.reduced_chi_square);
       result.all += 1;
       result.inside += p.interval95_low <= p.value - error && p.value - error <= p.interval95_high;
     }
