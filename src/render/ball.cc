@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "medium/build.h"
+#include "render/ball_core.h"
 #include "render/pilots.h"
 #include "render/radial_table.h"
 #include "render/sampling.h"
@@ -155,77 +156,6 @@ Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, 
 }
 
 namespace {
-
-/// The field of a shell in the sphere, if it is one.
-template <class S>
-const NestedField<S>* shell_in(const BallOptics<S>& o) {
-  return std::get_if<NestedField<S>>(&o.field);
-}
-/// The same sphere, of which no ray meets the core.
-template <class S>
-BallOptics<S> beside_core(BallOptics<S> o) {
-  if (auto* shell = std::get_if<NestedField<S>>(&o.field)) shell->core_left_out = true;
-  return o;
-}
-/// Where the ray that is seen at an azimuth passes the core's middle (reach_at_core).
-template <class S>
-void place_at_core(const NestedField<S>& shell, const S& reach, const S& ca, const S& sa, S& x, S& y) {
-  const S over = inverse(shell.core);
-  x = (reach * ca - shell.offset.x) * over;
-  y = (reach * sa - shell.offset.y) * over;
-}
-template <class S>
-void place_at_core(const NestedField<S>& shell, const DropletRay<S>& ray, const S& ca, const S& sa, S& x, S& y) {
-  place_at_core(shell, reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa), ca, sa, x, y);
-}
-/// Where such a ray is seen.
-template <class S>
-struct SeenAt {
-  S rho, cos_azimuth, sin_azimuth;  ///< rho in radii of the sphere
-  PlainOf<S> miss;                  ///< by how much the ray that was found passes elsewhere, radii of the sphere
-};
-template <class S>
-SeenAt<S> seen_of_core(const NestedField<S>& shell, const S& ratio, const RimTable& rim, const S& x, const S& y) {
-  using P = PlainOf<S>;
-  // reach (cos, sin) = core (x, y) + offset gives the azimuth, and the angle of incidence by Newton's method.
-  const S px = shell.core * x + shell.offset.x, py = shell.core * y + shell.offset.y, square = px * px + py * py + 1e-18, over = inverse_root(square);
-  SeenAt<S> r;
-  r.cos_azimuth = px * over, r.sin_azimuth = py * over;
-  const S wanted = square * over;
-  const P m = plain(ratio), limit(rim.psi_max()), ca = plain(r.cos_azimuth), sa = plain(r.sin_azimuth);
-  const NestedField<P> still{{plain(shell.offset.x), plain(shell.offset.y), plain(shell.offset.z)}, plain(shell.core)};
-  const P along = still.offset.x * ca + still.offset.y * sa;
-  P psi = min_of(max_of(rim.psi_at(min_of(P(plain(wanted) * inverse(m)), P(rim.rho_max()))), P(0.0)), limit), slope(1.0);
-  constexpr int kSteps = 8;  // from a few hundredths away, quadratically
-  for (int i = 0; i < kSteps; ++i) {
-    const DropletRay<P> ray = ray_at(psi, m, P(1.0));
-    const P turning = P(1.0) - m * ray.cos_out * inverse(ray.cos_in);
-    slope = m * ray.cos_out + turning * (ray.sin_deflection * along - ray.cos_deflection * still.offset.z);
-    r.miss = reach_at_core(still, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa) - plain(wanted);
-    psi = min_of(max_of(P(psi - r.miss * inverse(slope)), P(0.0)), limit);
-  }
-  S exact(psi);
-  if constexpr (ScalarTraits<S>::derivatives > 0) {
-    const DropletRay<S> ray = ray_at(exact, ratio, S(1.0));
-    const S off = reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, r.cos_azimuth, r.sin_azimuth) - wanted;
-    for (std::size_t j = 0; j < off.d.size(); ++j) exact.d[j] = -off.d[j] * inverse(slope);  // theorem of implicit functions
-  }
-  r.rho = ray_at(exact, ratio, S(1.0)).rho_um;
-  return r;
-}
-
-/// Whether the core is seen as a disc of its own: all rays that touch it are within the sphere's.
-bool core_has_disc(const BallOptics<double>& o, const RimTable& rim) {
-  const NestedField<double>* shell = shell_in(o);
-  if (!shell) return false;
-  constexpr int kPlaces = 32;
-  for (int i = 0; i < kPlaces; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kPlaces;
-    const SeenAt<double> seen = seen_of_core(*shell, o.sphere.ratio, rim, std::cos(angle), std::sin(angle));
-    if (!(std::abs(seen.miss) < 1e-9) || seen.rho > (1 - 1e-6) * rim.rho_max()) return false;
-  }
-  return true;
-}
 
 /// Rays of one picture, with its derivatives R.
 template <class R>

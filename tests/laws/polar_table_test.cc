@@ -166,7 +166,6 @@ TEST(PolarTable, DerivativesAreThoseOfWhatIsRead) {
       ASSERT_GT(size, 0) << c.name << ", " << k;
       // The rays' own: an error of 1e-6 in the value is more in its slope.
       EXPECT_LT(largest_difference(d, rays.derivatives[k]), (elements ? 1e-3 : 2e-4) * size) << c.name << ", parameter " << k;
-      if (kink) continue;  // light has no slope at the core's edge to compare differences with
       // Central differences of the same picture, extrapolated once, away from the rim, where light ends like a root.
       const std::size_t at = static_cast<std::size_t>(j.by[k]);
       const double h = 1e-3 * std::max(1.0, std::abs(theta[at])) / (k == 4 || k == 5 ? 80 : 1);
@@ -179,13 +178,19 @@ TEST(PolarTable, DerivativesAreThoseOfWhatIsRead) {
         return r;
       };
       const Image wide = difference(h), narrow = difference(0.5 * h);
-      double worst = 0;
+      double worst = 0, off = 0, all = 0;
       for (int row = 0; row < 160; ++row)
         for (int column = 0; column < 160; ++column) {
           if (std::hypot(column - 80.3, row - 78.9) > 0.85 * 72.6) continue;
-          worst = std::max(worst, std::abs((4 * narrow(column, row) - wide(column, row)) / 3 - d(column, row)));
+          const double difference = (4 * narrow(column, row) - wide(column, row)) / 3;
+          worst = std::max(worst, std::abs(difference - d(column, row)));
+          off += (difference - d(column, row)) * (difference - d(column, row)), all += difference * difference;
         }
-      EXPECT_LT(worst, (elements ? 3e-3 : 1e-3) * size) << c.name << ", parameter " << k;
+      // Over a step the core's edge goes from pixel to pixel, which take their points by where it passes: worst pixels say little there.
+      EXPECT_LT(std::sqrt(off / all), kink ? 1e-2 : 2e-3) << c.name << ", parameter " << k;
+      if (!kink) {
+        EXPECT_LT(worst, (elements ? 3e-3 : 1e-3) * size) << c.name << ", parameter " << k;
+      }
     }
   }
 }
