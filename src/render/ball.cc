@@ -334,9 +334,9 @@ class BallImage final : public PixelModel<S> {
         });
       };
       constexpr double kExact = 1e-9;
+      constexpr int kMostPanels = 64;
       int panels = 4;
-      for (; panels <= 64; panels *= 2)
-        if (reach_ = table(plain_, plain(edge_um_), panels); reach_.tail() < kExact) break;
+      while ((reach_ = table(plain_, plain(edge_um_), panels)).tail() > kExact && panels < kMostPanels) panels *= 2;
       if constexpr (ScalarTraits<S>::derivatives > 0) reach_and_slopes_ = table(optics_, edge_um_, panels);
     }
     std::vector<int> steps;
