@@ -16,6 +16,18 @@ namespace birefit {
 /// Added to a pixel's number of samples a side: the line passes through it or one beside it.
 inline constexpr std::uint8_t kEdgePixel = 16;
 
+/// The sum over all lanes, in each of them; derivatives, too.
+template <class S>
+S over_lanes(S x) {
+  if constexpr (ScalarTraits<S>::derivatives > 0) {
+    x.value = PlainOf<S>(sum_of_lanes(x.value));
+    for (auto& d : x.d) d = PlainOf<S>(sum_of_lanes(d));
+    return x;
+  } else {
+    return S(sum_of_lanes(x));
+  }
+}
+
 /// beyond_edge() is positive at so many of the nine pixels about one.
 template <class S>
 int beyond_edge_about(const PixelModel<S>& model, double column, double row) {
@@ -149,13 +161,7 @@ S mean_over_edge_pixel(const PixelModel<S>& model, double column, double row) {
     else
       sum = sum + S(Pack::load_aligned(&w[i])) * model.intensity(Pack::load_aligned(&x[i]), Pack::load_aligned(&y[i]));
   }
-  if constexpr (ScalarTraits<S>::derivatives > 0) {
-    sum.value = P(sum_of_lanes(sum.value));
-    for (auto& d : sum.d) d = P(sum_of_lanes(d));
-    return sum;
-  } else {
-    return S(sum_of_lanes(sum));
-  }
+  return over_lanes(sum);
 }
 
 /// `samples`: as many a side as the light beside the edge needs.

@@ -120,13 +120,7 @@ S mean_over_one_pixel(const PixelModel<S>& model, double column, double row, int
   S sum(0.0);
   for (std::size_t i = 0; i < x.size(); i += static_cast<std::size_t>(kLanesOf<S>))
     sum = sum + S(load_lanes<P>(&w[i])) * model.intensity(P(column) + load_lanes<P>(&x[i]), P(row) + load_lanes<P>(&y[i]));
-  if constexpr (ScalarTraits<S>::derivatives > 0) {
-    sum.value = P(sum_of_lanes(sum.value));
-    for (auto& d : sum.d) d = P(sum_of_lanes(d));
-    return sum;
-  } else {
-    return S(sum_of_lanes(sum));
-  }
+  return over_lanes(sum);
 }
 
 /// Writes lanes [first, first + count) to `to`.

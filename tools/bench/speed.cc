@@ -310,68 +310,6 @@ void time_unsymmetric(int rounds) {
   }
 }
 
-/// The equilibrium of a droplet under a field, and what it makes of a fit in the field against one in the birefringence: as many unknowns
-/// and pixels, the first run of each, when no equilibrium is known yet, and one more.
-void time_field() {
-  for (const double ring : {0.0, 0.9}) {
-    double alone = 0, near = 0;
-    constexpr int kCalls = 20;
-    for (int i = 0; i < kCalls; ++i) {
-      const double e = 9 + 0.013 * i;  // a rung's neighbours
-      const auto seconds = [](const auto& work) {
-        const auto start = std::chrono::steady_clock::now();
-        work();
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / kCalls;
-      };
-      alone += seconds([&] { axial_equilibrium(e, ring, axial_production_grid(ring)); });
-      if (i == 0) known_axial_equilibrium(e - 0.001, ring, false);
-      near += seconds([&] { known_axial_equilibrium(e, ring, true); });
-    }
-    std::printf("equilibrium of a droplet under a field, %s, with slopes: %.1f ms from the start, %.1f ms from the nearest kept\n", ring > 0 ? "ring" : "hedgehog", 1e3 * alone, 1e3 * near);
-  }
-  double first[2], second[2];
-  for (const bool field : {true, false}) {
-    DropletScene s = droplet_scene(false, 128, 0.08);
-    AxialDirector axial;
-    axial.reduced_field = s.table.add_constant("reduced_field", 17);  // away from the calls above
-    std::get<Droplet>(s.scene.sample).director = axial;
-    FitJob job;
-    Micrograph micrograph;
-    micrograph.name = "synthetic";
-    micrograph.values = render(s.scene, plan(s.scene, s.table.values()), s.table.values(), {}, 0).intensity;
-    std::mt19937_64 random(3);
-    std::normal_distribution<double> noise(0, 20);
-    for (double& value : micrograph.values.values()) value = 150 + 3200 * value + noise(random);
-    micrograph.mask = Mask(128, 128, 1);
-    const auto free = [&](int index, double value, double low, double high) {
-      Parameter& parameter = s.table[index];
-      parameter.free = true, parameter.value = value, parameter.lower = low, parameter.upper = high;
-    };
-    free(s.four[0], 9.0, 8.5, 10);
-    free(s.four[2], 66, 58, 70);
-    free(s.four[3], 62, 58, 70);
-    if (field) free(axial.reduced_field.index, 12, 0, 40);
-    else free(s.four[1], 0.15, 0.05, 0.4);
-    for (const char* name : {"gain", "offset"}) {
-      Parameter parameter;
-      parameter.name = name;
-      parameter.free = parameter.automatic = parameter.linear = true;
-      (std::string(name) == "gain" ? micrograph.gain : micrograph.offset) = s.table.add(parameter);
-    }
-    micrograph.scene = s.scene;
-    job.parameters = s.table;
-    job.micrographs = {micrograph};
-    for (double* seconds : {&first[field], &second[field]}) {
-      const auto start = std::chrono::steady_clock::now();
-      const FitResult result = fit(job);
-      *seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      if (!result.has_answer()) std::printf("NO ANSWER\n");
-    }
-  }
-  std::printf("fit of a 128 x 128 droplet under a field: the field %.2f s (again %.2f), the birefringence %.2f s (again %.2f): %.1f times\n", first[1], second[1], first[0], second[0],
-              first[1] / first[0]);
-}
-
 /// Where a search begins and between which bounds.
 struct Range {
   double start, low, high;
@@ -400,6 +338,48 @@ FitJob job_of(DropletScene s, Image values, const std::array<Range, 4>& ranges, 
   job.parameters = s.table;
   job.micrographs = {micrograph};
   return job;
+}
+
+/// The equilibrium of a droplet under a field, and what it makes of a fit in the field against one in the birefringence: as many unknowns
+/// and pixels, the first run of each, when no equilibrium is known yet, and one more.
+void time_field() {
+  for (const double ring : {0.0, 0.9}) {
+    double alone = 0, near = 0;
+    constexpr int kCalls = 20;
+    for (int i = 0; i < kCalls; ++i) {
+      const double e = 9 + 0.013 * i;  // a rung's neighbours
+      const auto seconds = [](const auto& work) {
+        const auto start = std::chrono::steady_clock::now();
+        work();
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / kCalls;
+      };
+      alone += seconds([&] { axial_equilibrium(e, ring, axial_production_grid(ring)); });
+      if (i == 0) known_axial_equilibrium(e - 0.001, ring, false);
+      near += seconds([&] { known_axial_equilibrium(e, ring, true); });
+    }
+    std::printf("equilibrium of a droplet under a field, %s, with slopes: %.1f ms from the start, %.1f ms from the nearest kept\n", ring > 0 ? "ring" : "hedgehog", 1e3 * alone, 1e3 * near);
+  }
+  double first[2], second[2];
+  for (const bool field : {true, false}) {
+    DropletScene s = droplet_scene(false, 128, 0.08);
+    AxialDirector axial;
+    axial.reduced_field = s.table.add_constant("reduced_field", 17);  // away from the calls above
+    std::get<Droplet>(s.scene.sample).director = axial;
+    Image values = render(s.scene, plan(s.scene, s.table.values()), s.table.values(), {}, 0).intensity;
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> noise(0, 20);
+    for (double& value : values.values()) value = 150 + 3200 * value + noise(random);
+    if (field) s.four[1] = axial.reduced_field.index;
+    const FitJob job = job_of(s, std::move(values), {{{9.0, 8.5, 10}, field ? Range{12, 0, 40} : Range{0.15, 0.05, 0.4}, {66, 58, 70}, {62, 58, 70}}});
+    for (double* seconds : {&first[field], &second[field]}) {
+      const auto start = std::chrono::steady_clock::now();
+      const FitResult result = fit(job);
+      *seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      if (!result.has_answer()) std::printf("NO ANSWER\n");
+    }
+  }
+  std::printf("fit of a 128 x 128 droplet under a field: the field %.2f s (again %.2f), the birefringence %.2f s (again %.2f): %.1f times\n", first[1], second[1], first[0], second[0],
+              first[1] / first[0]);
 }
 
 /// A fit by propagation, the search for the fringe order included: a bipolar droplet, 160 x 160 pixels, noise of 0.2 %.
