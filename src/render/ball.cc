@@ -399,7 +399,10 @@ class BallImage final : public PixelModel<S> {
   }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture) return;
-    table_ = PolarTable<S>(plan_.disc, kGivenUp * scene_.intensity_accuracy, threads,
+    std::vector<DiscSquare> squares = plan_.disc;
+    if (!core_apart_)  // it was when the picture was planned
+      for (DiscSquare& q : squares) q.smooth = q.smooth && !q.of_core;
+    table_ = PolarTable<S>(squares, kGivenUp * scene_.intensity_accuracy, threads,
                            [this](int square, const P& v, const P& c, const P& s) {
                              const std::size_t i = static_cast<std::size_t>(square);
                              return light_at(plan_.disc[i], v, c, s, meshes_[mesh_of_[i]]);
@@ -425,7 +428,7 @@ class BallImage final : public PixelModel<S> {
   static void place_on_disc(const S& x, const S& y, const S& fraction, S& v, S& turn) {
     P inverse_major;
     turn = S(disc::turn_of(plain(x), plain(y), inverse_major));
-    const P to_rim = root(P(1.0) - plain(fraction));
+    const P to_rim = root(max_of(P(P(1.0) - plain(fraction)), P(1e-15)));  // rounding may have left the disc
     v = S(to_rim);
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       v = fraction.chain(to_rim, P(-0.5) * inverse(to_rim));
@@ -562,7 +565,7 @@ class StepsOfSquare {
           if ((i + k) % 2 == 0 && g.turn > disc::turn_in(square, 0) && g.turn < disc::turn_in(square, 1)) cs[k] = g.cos, ss[k] = g.sin;
       }
       const Pack v = Pack::load_aligned(vs), fraction = Pack(1.0) - v * v, c = Pack::load_aligned(cs), s = Pack::load_aligned(ss);
-      const SeenAt<Pack> seen = square.of_core ? seen_of_core(*shell_in(optics), optics.sphere.ratio, rim_, Pack(fraction * c), Pack(fraction * s)) : SeenAt<Pack>{rim_.rho_max() * fraction, c, s, Pack(0.0)};
+      const SeenAt<Pack> seen = square.of_core ? seen_of_core(*shell_in(optics), optics.sphere.ratio, rim_, Pack(fraction * c), Pack(fraction * s)) : SeenAt<Pack>{rim_.rho_max() * fraction, c, s};
       const Mat2<Pack> j = ball_jones<Pack>(optics, trace<Pack>(optics.sphere, rim_, optics.sphere.radius_um * seen.rho), seen.cos_azimuth, seen.sin_azimuth, method_, mesh);
       for (int k = 0; k < kLanes; ++k) {
         const auto z = [&](const Complex<Pack>& x) { return Complex<double>(lane(x.re, k), lane(x.im, k)); };
@@ -778,7 +781,11 @@ bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSqu
 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  const bool core_apart = std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; });
+  // A fit may have moved the core since.
+  const bool core_apart = std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; }) && [&] {
+    const BallOptics<double> o = ball_optics(scene, value.template as<double>());
+    return core_has_disc(o, RimTable(o.sphere.ratio, o.sphere.n_host, scene.microscope.objective_na));
+  }();
   return std::make_unique<BallImage<S>>(scene, plan, value, core_apart);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                        \

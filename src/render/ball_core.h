@@ -31,7 +31,6 @@ void place_at_core(const NestedField<S>& shell, const DropletRay<S>& ray, const 
 template <class S>
 struct SeenAt {
   S rho, cos_azimuth, sin_azimuth;  ///< rho in radii of the sphere
-  PlainOf<S> miss;                  ///< by how much the ray that was found passes elsewhere, radii of the sphere
 };
 template <class S>
 SeenAt<S> seen_of_core(const NestedField<S>& shell, const S& ratio, const RimTable& rim, const S& x, const S& y) {
@@ -50,8 +49,8 @@ SeenAt<S> seen_of_core(const NestedField<S>& shell, const S& ratio, const RimTab
     const DropletRay<P> ray = ray_at(psi, m, P(1.0));
     const P turning = P(1.0) - m * ray.cos_out * inverse(ray.cos_in);
     slope = m * ray.cos_out + turning * (ray.sin_deflection * along - ray.cos_deflection * still.offset.z);
-    r.miss = reach_at_core(still, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa) - plain(wanted);
-    psi = min_of(max_of(P(psi - r.miss * inverse(slope)), P(0.0)), limit);
+    const P miss = reach_at_core(still, ray.sin_in, ray.sin_deflection, ray.cos_deflection, ca, sa) - plain(wanted);
+    psi = min_of(max_of(P(psi - miss * inverse(slope)), P(0.0)), limit);
   }
   S exact(psi);
   if constexpr (ScalarTraits<S>::derivatives > 0) {
@@ -63,15 +62,34 @@ SeenAt<S> seen_of_core(const NestedField<S>& shell, const S& ratio, const RimTab
   return r;
 }
 
-/// Whether the core is seen as a disc of its own: all rays that touch it are within the sphere's.
+/// Whether the core is seen as a disc of its own: the sphere's rim passes beside it on all sides, and no place in it is seen twice. With a core
+/// towards the light rays near the rim may turn back into it: reach then falls with the angle of incidence.
 inline bool core_has_disc(const BallOptics<double>& o, const RimTable& rim) {
   const NestedField<double>* shell = shell_in(o);
   if (!shell) return false;
-  constexpr int kPlaces = 32;
-  for (int i = 0; i < kPlaces; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kPlaces;
-    const SeenAt<double> seen = seen_of_core(*shell, o.sphere.ratio, rim, std::cos(angle), std::sin(angle));
-    if (!(std::abs(seen.miss) < 1e-9) || seen.rho > (1 - 1e-6) * rim.rho_max()) return false;
+  constexpr double kMargin = 1e-3;  // of the core's radius
+  constexpr int kAzimuths = 32, kAngles = 48;
+  NestedField<Pack> field{{Pack(shell->offset.x), Pack(shell->offset.y), Pack(shell->offset.z)}, Pack(shell->core)};
+  const Pack ratio(o.sphere.ratio);
+  alignas(64) double cs[kLanes], sn[kLanes];
+  for (int first = 0; first < kAzimuths; first += kLanes) {
+    for (int k = 0; k < kLanes; ++k) {
+      const double angle = 2 * std::numbers::pi * (first + k) / kAzimuths;
+      cs[k] = std::cos(angle), sn[k] = std::sin(angle);
+    }
+    const Pack c = Pack::load_aligned(cs), s = Pack::load_aligned(sn);
+    Pack before(0.0);
+    for (int i = kAngles; i >= 0; --i) {  // from the middle to the rim, closer together there
+      const double t = static_cast<double>(i) / kAngles;
+      const DropletRay<Pack> ray = ray_at(Pack(rim.psi_max() * (1 - t * t)), ratio, Pack(1.0));
+      const Pack reach = reach_at_core(field, ray.sin_in, ray.sin_deflection, ray.cos_deflection, c, s);
+      Pack x, y;
+      place_at_core(field, reach, c, s, x, y);
+      const auto within = x * x + y * y < Pack((1 + kMargin) * (1 + kMargin));
+      if (i == 0 && !none(within)) return false;
+      if (i < kAngles && !none(within && reach <= before)) return false;
+      before = reach;
+    }
   }
   return true;
 }

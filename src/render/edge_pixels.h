@@ -95,7 +95,8 @@ class EdgeMarks {
 
 /// Mean over the pixel about (column, row): Gauss lines across the edge, each with Gauss points on either side of it. Beyond it, at a distance
 /// u, light and its derivatives are smooth functions of sqrt u (times 1/sqrt u, for the latter), of which the points are Gauss's. Light is continuous
-/// at the edge, so that no derivative needs to know how the edge moves.
+/// at the edge, so that no derivative needs to know how the edge moves. Of a core no larger than a pixel or two, which a line meets twice, the mean is
+/// no better than that of as many points.
 template <class S, std::size_t kLines, std::size_t kNodes>
 S mean_over_edge_pixel(const PixelModel<S>& model, double column, double row) {
   using P = PlainOf<S>;
@@ -132,6 +133,7 @@ S mean_over_edge_pixel(const PixelModel<S>& model, double column, double row) {
     // The secant method, a pixel beyond the pixel's ends at most.
     constexpr double kFar = 1.5;
     constexpr int kSteps = 5;
+    constexpr double kNothing = 1e-6;  // within rounding of the edge a slope may be anything
     P a(-0.5), b(0.5), fa = beyond(a), fb = beyond(b);
     const P rising = fb - fa;
     for (int i = 0; i < kSteps; ++i) {
@@ -143,12 +145,12 @@ S mean_over_edge_pixel(const PixelModel<S>& model, double column, double row) {
       const double place = lane(b, static_cast<int>(k)), sign = lane(rising, static_cast<int>(k)) >= 0 ? 1 : -1, edge = std::isfinite(place) ? place : sign * kFar;
       // u = sign (s - edge) from `low` to `high` within the pixel.
       const double low = -0.5 - sign * edge, high = 0.5 - sign * edge, line = lines.w[first + k];
-      if (const double from = std::sqrt(std::max(0.0, low)), length = high > 0 ? std::sqrt(high) - from : 0; length > 0)
+      if (const double from = std::sqrt(std::max(0.0, low)), length = high > 0 ? std::sqrt(high) - from : 0; length > kNothing)
         for (std::size_t n = 0; n < kNodes; ++n) {
           const double t = from + length * (0.5 + nodes.x[n]);
           add(edge + sign * t * t, beside[k], line * nodes.w[n] * length * 2 * t);
         }
-      if (const double length = std::min(0.0, high) - low; length > 0)
+      if (const double length = std::min(0.0, high) - low; length > kNothing)
         for (std::size_t n = 0; n < kNodes; ++n) add(edge + sign * (low + length * (0.5 + nodes.x[n])), beside[k], line * nodes.w[n] * length);
     }
   }

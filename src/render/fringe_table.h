@@ -94,6 +94,9 @@ class FringeTable {
       const double left = tail<kPoints>(field(0)) + tail<kPoints>(field(2)) + tail<kPoints>(field(3)) + (largest_of(0) + largest_of(3)) * tail<kPoints>(field(1));
       if (!(left <= allowed)) start_[static_cast<std::size_t>(list[i])] = kGone;
     }
+    fields_.fill({.own = 0});
+    fields_[0] = {};
+    for (const FringeMove& m : moves_) fields_[m.derivative + 1] = {};
     for (std::size_t plane = 1; plane < planes_; ++plane) fields_[derivatives_[plane - 1] + 1] = fields_of(values, list.size(), plane);
     parallel_for(static_cast<int>(list.size() * kFields * planes_), threads, [&](int plane) {
       const std::size_t at = static_cast<std::size_t>(plane) * kRays;

@@ -132,6 +132,32 @@ TEST(PolarTable, PicturesAreThoseOfRays) {
   }
 }
 
+// A core towards the light, in a host of much lower index: rays near the sphere's rim turn back into it, so that places in the core are seen twice and
+// its disc cannot be told from the way a ray passes its middle. Such a picture is planned without, and a picture that was planned with a disc of its
+// own does without when a fit has moved the core there.
+TEST(PolarTable, ACoreThatIsSeenTwiceHasNoDisc) {
+  Job j = job_of({"shell", [](TableBuilder& b, Droplet& d, std::vector<int>& by) {
+                    ShellDirector shell;
+                    shell.wall_um = b.fixed("wall_um", 3.1 * 0.45);
+                    shell.offset_um = {b.fixed("offset_x_um", 0.045), b.fixed("offset_y_um", 0), b.fixed("offset_z_um", 2.8 * 0.45)};
+                    by = {shell.offset_um[2].index, shell.wall_um.index};
+                    d.director = shell;
+                  }});
+  Theta theta = j.b.table.values();
+  const auto set = [&](const char* name, double value) { theta[static_cast<std::size_t>(j.b.table.find(name).index)] = value; };
+  set("ordinary", 1.6), set("birefringence", 0.1), set("surround", 1.33);
+  j.scene.view.pixel_size_um = 0.126;
+  const auto of_core = [](const RenderPlan& p) { return std::count_if(p.disc.begin(), p.disc.end(), [](const DiscSquare& q) { return q.of_core; }); };
+  const RenderPlan there = plan(j.scene, theta);
+  EXPECT_EQ(of_core(there), 0);
+  EXPECT_LT(largest_difference(render(j.scene, there, theta, {}, 2).intensity, render(j.scene, with_rays_alone(there), theta, {}, 2).intensity), 3e-2 * j.scene.intensity_accuracy);
+  const Theta seen_twice = theta;
+  set("offset_z_um", 0.2);
+  const RenderPlan apart = plan(j.scene, theta);
+  ASSERT_GT(of_core(apart), 0);
+  EXPECT_LT(largest_difference(render(j.scene, apart, seen_twice, {}, 2).intensity, render(j.scene, with_rays_alone(apart), seen_twice, {}, 2).intensity), 0.5 * j.scene.intensity_accuracy);
+}
+
 // A fit moves the droplet, lets it grow and turns it with the plan it has; what is no longer smooth (a core's edge has come in) must be
 // found out.
 TEST(PolarTable, PartsFollowTheDroplet) {
