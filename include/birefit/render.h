@@ -26,7 +26,8 @@ struct DiscSquare {
   double points = 0;     ///< of the picture in it
 };
 
-/// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth.
+/// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth (but for which
+/// pixels lie at a core's edge: their points follow it, which changes a mean by some 1e-4).
 struct RenderPlan {
   std::string method;               ///< transport method by name
   std::string physics;              ///< the ceiling's name

@@ -70,7 +70,7 @@ class PixelModel {
   virtual bool in_phase() const { return false; }
   /// Light may have a line along which its slope has no bound on one side, like a root's: a core's edge.
   virtual bool has_edge() const { return false; }
-  /// Positive on that side of the line, negative on the other, and all but linear across a few pixels of it.
+  /// Positive on that side of the line, negative on the other, and all but linear across a few pixels of it, where it does not end (at a rim).
   virtual PlainOf<S> beyond_edge(const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const { return PlainOf<S>(-1.0); }
   /// Of the picture and every derivative.
   virtual Symmetry symmetry() const { return Symmetry::none; }
