@@ -368,12 +368,13 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   const int n = static_cast<int>(pixels.size());
   constexpr int kStep = kLanesOf<S>;
   // All lanes take as many samples as the one that needs most: pixels that need as many go together, the dearest first.
-  std::vector<std::uint8_t> samples(pixels.size());
-  parallel_for(n, threads, [&](int i) {
-    const auto& [x, y] = pixels[static_cast<std::size_t>(i)];
-    const int edge = model->has_edge() && is_edge_pixel(*model, x, y) ? kEdgePixel : 0;
-    samples[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(edge + samples_at(plan, x, y));
-  });
+  std::vector<std::uint8_t> samples;
+  for (const auto& [x, y] : pixels) samples.push_back(static_cast<std::uint8_t>(samples_at(plan, x, y)));
+  if (model->has_edge())
+    parallel_for(n, threads, [&](int i) {
+      const auto& [x, y] = pixels[static_cast<std::size_t>(i)];
+      if (is_edge_pixel(*model, x, y)) samples[static_cast<std::size_t>(i)] |= kEdgePixel;
+    });
   std::vector<std::size_t> order(pixels.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return samples[a] > samples[b]; });
