@@ -63,9 +63,16 @@ struct PixelMoments {
       }
       return a;
     }();
-    P total(c[kTerms - 1 - kOrder]);
-    for (int k = kTerms - 2 - kOrder; k >= 0; --k) total = total * q + P(c[static_cast<std::size_t>(k)]);
-    return total;
+    // Even and odd powers apart: each product waits for the one before it.
+    const P square = q * q;
+    P high(c[kTerms - 1 - kOrder]), low(c[kTerms - 2 - kOrder]);
+    int k = kTerms - 3 - kOrder;
+    for (; k > 0; k -= 2) {
+      high = high * square + P(c[static_cast<std::size_t>(k)]);
+      low = low * square + P(c[static_cast<std::size_t>(k - 1)]);
+    }
+    if (k == 0) return low * q + (high * square + P(c[0]));
+    return high * q + low;
   }
 };
 
@@ -91,7 +98,7 @@ class NineWeights {
         corners_(P(0.25) * by.xy) {}
   template <class At>
   BIREFIT_INLINE P times(const At& at) const {
-    return middle_ * at(1, 1) + left_ * at(1, 0) + right_ * at(1, 2) + up_ * at(0, 1) + down_ * at(2, 1) + corners_ * ((at(2, 2) - at(2, 0)) - (at(0, 2) - at(0, 0)));
+    return (middle_ * at(1, 1) + left_ * at(1, 0) + right_ * at(1, 2)) + (up_ * at(0, 1) + down_ * at(2, 1) + corners_ * ((at(2, 2) - at(2, 0)) - (at(0, 2) - at(0, 0))));
   }
 
  private:
@@ -100,14 +107,15 @@ class NineWeights {
 
 /// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact in the
 /// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others their derivatives by
-/// parameters; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. fields(plane): what
-/// of them a parameter moves; the others are not read. What a change of any of the nine points does to the mean is found once,
+/// parameters, kMostPlanes with them or fewer; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. averaged: the mean field
+/// is so over pixels already. fields(plane): what of them a parameter moves; the others are not read. What a change of any of the nine points does to the mean is found once,
 /// backwards through the formula, and serves all derivatives.
-template <bool kQuadrature, class P, class Load, class Fields, class Put>
-BIREFIT_INLINE void fringe_means(int planes, const Load& load, const Fields& fields, const Put& put) {
+template <bool kQuadrature, int kMostPlanes, class P, class Load, class Fields, class Put>
+BIREFIT_INLINE void fringe_means(int planes, bool averaged, const Load& load, const Fields& fields, const Put& put) {
   const auto field = [&load](int plane, int f) BIREFIT_INLINE_LAMBDA { return [&load, plane, f](int row, int column) BIREFIT_INLINE_LAMBDA { return load(plane, f, row, column); }; };
   const auto mean_of = [&](int plane) BIREFIT_INLINE_LAMBDA {
     const auto at = field(plane, 2);
+    if (averaged) return at(1, 1);
     return P(1 - 4.0 / 24) * at(1, 1) + P(1.0 / 24) * ((at(1, 0) + at(1, 2)) + (at(0, 1) + at(2, 1)));
   };
   const NinePoints<P> phase = NinePoints<P>::of(field(0, 1)), amplitude = NinePoints<P>::of(field(0, 0));
@@ -130,7 +138,7 @@ BIREFIT_INLINE void fringe_means(int planes, const Load& load, const Fields& fie
   P s, c;
   sin_cos(phase.f, s, c);
   put(0, mean_of(0) + re * c - im * s);
-  if (planes <= 1) return;
+  if (kMostPlanes == 1 || planes <= 1) return;
 
   // Backwards: by_* is the mean's derivative by *.
   const P half_xx = P(0.5) * xx, half_yy = P(0.5) * yy;
@@ -183,7 +191,8 @@ S fringe_mean(const FringePoint<S> (&p)[3][3]) {
     }
     return plain(part);
   };
-  fringe_means<kQuadrature, P>(1 + ScalarTraits<S>::derivatives, load, [](int) { return FringeFields{}; }, [&mean](int plane, const P& value) {
+  constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
+  fringe_means<kQuadrature, kPlanes, P>(kPlanes, false, load, [](int) { return FringeFields{}; }, [&mean](int plane, const P& value) {
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       if (plane > 0) {
         mean.d[static_cast<std::size_t>(plane - 1)] = value;

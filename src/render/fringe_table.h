@@ -108,7 +108,8 @@ class FringeTable {
   /// those of column + i, fields in the order of FringePoint, those that fields() names. Returns of how many: up to the end of a square, 0 in one that was not asked for. Places up
   /// to the next whole number of lanes are overwritten. `scratch` belongs to this table and one thread.
   int run(int column, double row, int count, bool quadrature, FringeScratch& scratch, double* const* out) const {
-    const double* line = line_at(column, row, scratch);
+    const std::size_t fields = quadrature ? kFields : kFields - 1;
+    const double* line = line_at(column, row, fields, scratch);
     if (!line) return 0;
     const int bx = (column + 1) / blocks_.block_px, end = std::min(column + count, (bx + 1) * blocks_.block_px - 1);
     const double per_px = 2.0 / blocks_.block_px, first = (column + 1 - bx * blocks_.block_px) * per_px - 1;
@@ -119,7 +120,7 @@ class FringeTable {
       x0 = P::load_aligned(steps);
     else
       x0 = first;
-    for (std::size_t f = 0; f < (quadrature ? kFields : kFields - 1); ++f, line += kOut * kPoints)
+    for (std::size_t f = 0; f < fields; ++f, line += kOut * kPoints)
       for (std::size_t plane = 0; plane < kOut; ++plane) {
         if (!fields_[plane].has(f)) continue;
         std::array<P, kPoints> c;
@@ -143,6 +144,26 @@ class FringeTable {
     return end - column;
   }
 
+  /// From now on the mean field is its mean over a pixel, as far as its curvature makes one, for a picture of which none is traced. False, and
+  /// nothing is done: a parameter scales the fringes, and with them what a pixel sees of the curvature.
+  bool average_means() {
+    if (std::any_of(moves_.begin(), moves_.end(), [](const FringeMove& m) { return m.log_scale != 0; })) return false;
+    const double share = square(2.0 / blocks_.block_px) / 24;
+    for (std::size_t i = 0; i < coefficients_.size() / (kFields * planes_ * kRays); ++i)
+      for (std::size_t plane = 0; plane < planes_; ++plane) {
+        double* c = coefficients_.data() + ((i * kFields + 2) * planes_ + plane) * kRays;
+        // Upwards: a power's curvature is made of higher ones, which are as they were.
+        for (std::size_t j = 0; j < kPoints; ++j)
+          for (std::size_t k = 0; k < kPoints; ++k) {
+            double bend = 0;
+            if (k + 2 < kPoints) bend += static_cast<double>((k + 1) * (k + 2)) * c[j * kPoints + k + 2];
+            if (j + 2 < kPoints) bend += static_cast<double>((j + 1) * (j + 2)) * c[(j + 2) * kPoints + k];
+            c[j * kPoints + k] += share * bend;
+          }
+      }
+    return true;
+  }
+
   /// What changes with derivative plane - 1 of S, fields left out to which no square owes more than rounding of it: run() does not write them.
   FringeFields fields(std::size_t plane) const { return fields_[plane]; }
   /// None is left out, for a picture of which a part is traced.
@@ -152,7 +173,7 @@ class FringeTable {
 
   /// Values at one place; false in a square that was not asked for.
   bool read(double column, double row, FringeScratch& scratch, FringePoint<double>& out) const {
-    const double* line = line_at(static_cast<int>(std::floor(column)), row, scratch);
+    const double* line = line_at(static_cast<int>(std::floor(column)), row, kFields, scratch);
     if (!line) return false;
     const double at = (column + 1) / blocks_.block_px, x = 2 * (at - std::floor(at)) - 1;
     double* parts[kFields] = {&out.amplitude, &out.phase, &out.mean, &out.quadrature};
@@ -197,15 +218,15 @@ class FringeTable {
     if (beside <= 1e-13 * change[1]) fields.own &= ~2u, fields.phase_share = share;
     return fields;
   }
-  const double* line_at(int column, double row, FringeScratch& scratch) const {
+  const double* line_at(int column, double row, std::size_t fields, FringeScratch& scratch) const {
     if (start_.empty()) return nullptr;
     const int bx = (column + 1) / blocks_.block_px, by = static_cast<int>(std::floor((row + 1) / blocks_.block_px));
     if (column < -1 || by < 0 || bx >= blocks_.columns || by >= blocks_.rows || start_[static_cast<std::size_t>(by * blocks_.columns + bx)] < 0) return nullptr;
-    if (scratch.row != row) follow_row(row, by, scratch);
+    if (scratch.row != row) follow_row(row, by, fields, scratch);
     return scratch.lines.data() + static_cast<std::size_t>(bx) * kFields * kOut * kPoints;
   }
-  /// Polynomials of the column alone for one row: [square][field][value and derivatives of S][power].
-  void follow_row(double row, int by, FringeScratch& scratch) const {
+  /// Polynomials of the column alone for one row: [square][field][value and derivatives of S][power], of the first `fields`.
+  void follow_row(double row, int by, std::size_t fields, FringeScratch& scratch) const {
     using Line = std::array<double, kPoints>;
     const double per_px = 2.0 / blocks_.block_px, y = (row - (by * blocks_.block_px - 1.0)) * per_px - 1;
     scratch.row = row;
@@ -214,22 +235,22 @@ class FringeTable {
       const int start = start_[static_cast<std::size_t>(by * blocks_.columns + bx)];
       if (start < 0) continue;
       const double middle = (bx + 0.5) * blocks_.block_px - 1 - centre_.column;  // columns from the centre: middle + x/per_px
-      for (std::size_t f = 0; f < kFields; ++f) {
+      for (std::size_t f = 0; f < fields; ++f) {
         const double* c = coefficients_.data() + (static_cast<std::size_t>(start) * kFields + f) * planes_ * kRays;
         double* line = scratch.lines.data() + (static_cast<std::size_t>(bx) * kFields + f) * kOut * kPoints;
-        Line value, by_y;
         for (std::size_t plane = 0; plane < planes_; ++plane) {
           if (plane > 0 && !fields_[derivatives_[plane - 1] + 1].has(f)) continue;
           const double* powers = c + plane * kRays;
+          const bool moved = plane == 0 && !moves_.empty();
+          Line value, by_y{};
           std::copy(powers + kRays - kPoints, powers + kRays, value.begin());
-          by_y.fill(0);
-          for (std::size_t j = kPoints - 1; j-- > 0;)
-            for (std::size_t i = 0; i < kPoints; ++i) {
-              by_y[i] = by_y[i] * y + value[i];
-              value[i] = value[i] * y + powers[j * kPoints + i];
-            }
+          for (std::size_t j = kPoints - 1; j-- > 0;) {
+            if (moved)
+              for (std::size_t i = 0; i < kPoints; ++i) by_y[i] = by_y[i] * y + value[i];
+            for (std::size_t i = 0; i < kPoints; ++i) value[i] = value[i] * y + powers[j * kPoints + i];
+          }
           std::copy(value.begin(), value.end(), line + (plane == 0 ? 0 : derivatives_[plane - 1] + 1) * kPoints);
-          if (plane > 0) continue;
+          if (!moved) continue;
           // A move's derivative along the row is a polynomial, too: u = a + b x columns and v rows to the point.
           for (const FringeMove& m : moves_) {
             const double a = middle * m.log_scale - m.column, b = m.log_scale / per_px, v = (row - centre_.row) * m.log_scale - m.row;

@@ -160,6 +160,7 @@ class PlanarModel final : public PixelModel<S> {
   FringeFields fringe_fields(int plane) const override {
     return tabulated_blocks_.empty() ? FringeFields{} : table_.fields(static_cast<std::size_t>(plane));
   }
+  bool means_are_averaged() const override { return means_are_averaged_; }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
   Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
@@ -254,7 +255,10 @@ class PlanarModel final : public PixelModel<S> {
       const auto t = cone.at(column, row);
       return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
     });
-    if (left_to_rays_ || !table_.complete()) table_.keep_all_fields();
+    if (left_to_rays_ || !table_.complete())
+      table_.keep_all_fields();
+    else
+      means_are_averaged_ = table_.average_means();
   }
   S intensity_of(const Mat2<S>& sample) const {
     const Mat2<S> j = compensator_ ? *compensator_ * sample : sample;
@@ -275,6 +279,7 @@ class PlanarModel final : public PixelModel<S> {
   FringeBlocks blocks_;
   std::vector<std::uint8_t> tabulated_blocks_;
   bool left_to_rays_;  ///< some of the picture
+  bool means_are_averaged_ = false;
   FringeTable<S> table_;
   S constant_;
 };

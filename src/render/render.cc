@@ -232,7 +232,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
   constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives;
   using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
   model->tabulate(PixelModel<S>::Wanted::picture, threads);
-  const bool in_phase = model->in_phase();
+  const bool in_phase = model->in_phase(), averaged = model->means_are_averaged();
   std::array<FringeFields, static_cast<std::size_t>(kPlanes)> fields_of{};
   for (int p = 0; p < kPlanes; ++p) fields_of[static_cast<std::size_t>(p)] = model->fringe_fields(p);
   const SampleRings rings(plan);
@@ -294,15 +294,20 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
         return out;
       };
       if (plan.fringe_means) {
+        // Where rows begin is asked for once: a pack reads dozens of them.
+        std::array<std::array<const double*, 3>, static_cast<std::size_t>(4 * kPlanes)> from;
+        for (std::size_t p = 0; p < from.size(); ++p)
+          for (int j = 0; j < 3; ++j) from[p][static_cast<std::size_t>(j)] = band.row(static_cast<int>(p), r + j);
+        const Targets to = targets(0);
         for (int c0 = 0; c0 < w; c0 += kStep) {
           using P = PlainOf<S>;
-          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_shifted<P>(band.row(field * kPlanes + plane, r + j) + c0, i); };
-          const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, images[static_cast<std::size_t>(plane)]->row(top + r) + c0, 0, std::min(kStep, w - c0)); };
+          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_shifted<P>(from[static_cast<std::size_t>(field * kPlanes + plane)][static_cast<std::size_t>(j)] + c0, i); };
+          const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, to[static_cast<std::size_t>(plane)] + c0, 0, std::min(kStep, w - c0)); };
           const auto fields = [&](int plane) BIREFIT_INLINE_LAMBDA { return fields_of[static_cast<std::size_t>(plane)]; };
           if (in_phase)
-            fringe_means<false, P>(planes, load, fields, put);
+            fringe_means<false, kPlanes, P>(planes, averaged, load, fields, put);
           else
-            fringe_means<true, P>(planes, load, fields, put);
+            fringe_means<true, kPlanes, P>(planes, averaged, load, fields, put);
         }
       } else {
         for (int p = 0; p < planes; ++p) {
