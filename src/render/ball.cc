@@ -8,6 +8,7 @@
 #include "render/ball_core.h"
 #include "render/pilots.h"
 #include "render/radial_table.h"
+#include "render/round_view.h"
 #include "render/sampling.h"
 #include "transport/magnus.h"
 
@@ -314,11 +315,10 @@ class BallImage final : public PixelModel<S> {
         optics_(ball_optics(scene, value)),
         rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0), scene.microscope.objective_na),
         light_(polarizers(scene, value)),
-        pixel_um_(scene.view.pixel_size_um),
-        center_x_(value(scene.view.center_x_px)),
-        center_y_(value(scene.view.center_y_px)),
+        view_(scene, value),
         edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
         inverse_edge_(inverse(edge_um_)),
+        by_inverse_edge_(inverse_edge_),
         inverse_radius_(inverse(optics_.sphere.radius_um)),
         core_apart_(core_apart),
         map_(plan.disc) {
@@ -346,11 +346,11 @@ class BallImage final : public PixelModel<S> {
     for (const DiscSquare& q : plan.disc) mesh_of_.push_back(static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
     for (const int n : steps) meshes_.push_back(ball_mesh(optics_, n));
     if (meshes_.empty()) meshes_.push_back(ball_mesh(optics_, plan.steps));
-    const S between = light_.px * light_.ax + light_.py * light_.ay;
-    open_ = between * between;
+    passing_ = PassingLight<S>(scene.view.pixel_size_um, optics_.sphere.radius_um, light_.px * light_.ax + light_.py * light_.ay);
+    const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
     bool moves = false;
     if constexpr (ScalarTraits<S>::derivatives > 0)
-      for (const S* x : {&center_x_, &center_y_, &optics_.sphere.radius_um})
+      for (const S* x : std::initializer_list<const S*>{&center_x, &center_y, &optics_.sphere.radius_um})
         for (const P& d : x->d) moves = moves || lane(d, 0) != 0;
     rays_of_table_ = ball_rays(scene, plan, value, optics_, rim_, false);
     rays_ = ball_rays(scene, plan, value, optics_, rim_, moves);
@@ -367,29 +367,25 @@ class BallImage final : public PixelModel<S> {
       else
         return stays_at(field.offset.y, 0.0);
     };
-    if (centred(scene, center_x_, center_y_) && std::visit(turned, optics_.field))
+    if (centred(scene, center_x, center_y) && std::visit(turned, optics_.field))
       symmetry_ = Symmetry::half_turn;
-    else if (on_middle_row(scene, center_y_) && along_axes(light_) && std::visit(reflected, optics_.field))
+    else if (on_middle_row(scene, center_y) && along_axes(light_) && std::visit(reflected, optics_.field))
       symmetry_ = Symmetry::mirror;
   }
   Symmetry symmetry() const override { return symmetry_; }
   S intensity(const P& column, const P& row) const override {
-    const S x = (column - center_x_) * pixel_um_, y = (center_y_ - row) * pixel_um_;
-    const S rho2 = x * x + y * y + 1e-18, over = inverse_root(rho2), rho = rho2 * over;
-    // Light that passes by, averaged over a pixel.
-    const S beside = open_ * min_of(max_of((rho - optics_.sphere.radius_um) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
-    const auto inside = plain(rho) < plain(edge_um_) * P(1 - 1e-12);
+    const auto place = view_.at(column, row);
+    const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
+    const S beside = passing_.at(view_, place);
     if (birefit::none(inside)) return beside;
-    const S within = select(inside, rho, 0.5 * edge_um_);
-    return beside + select(inside, through(x, y, within, over, inside), S(0.0));
+    return beside + select(inside, through(place, inside), S(0.0));
   }
   bool has_edge() const override { return shell_in(optics_) != nullptr; }
   P beyond_edge(const P& column, const P& row) const override {
-    const P x = (column - plain(center_x_)) * pixel_um_, y = (plain(center_y_) - row) * pixel_um_;
-    const P rho2 = x * x + y * y + 1e-18, over = inverse_root(rho2), rho_um = rho2 * over;
+    const auto place = view_.at(column, row);
     P core_x, core_y;
-    seen_at_core(root(max_of(P(1.0) - rho_um * plain(inverse_edge_), P(0.0))), P(x * over), P(y * over), core_x, core_y);
-    return select(rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));  // beyond the sphere's rim there is none
+    seen_at_core(root(max_of(P(1.0) - place.rho_um * plain(inverse_edge_), P(0.0))), P(place.x * place.inverse_rho), P(place.y * place.inverse_rho), core_x, core_y);
+    return select(place.rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));  // beyond the sphere's rim there is none
   }
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
@@ -425,46 +421,72 @@ class BallImage final : public PixelModel<S> {
       place_at_core(*shell_in(optics_), reach, angle.chain(c, -s), angle.chain(s, c), x, y);
     }
   }
-  static void place_on_disc(const S& x, const S& y, const S& fraction, S& v, S& turn) {
+  template <class T>
+  static void place_on_disc(const T& x, const T& y, const T& fraction, T& v, T& turn) {
     P inverse_major;
-    turn = S(disc::turn_of(plain(x), plain(y), inverse_major));
+    turn = T(disc::turn_of(plain(x), plain(y), inverse_major));
     const P to_rim = root(max_of(P(P(1.0) - plain(fraction)), P(1e-15)));  // rounding may have left the disc
-    v = S(to_rim);
-    if constexpr (ScalarTraits<S>::derivatives > 0) {
+    v = T(to_rim);
+    if constexpr (ScalarTraits<T>::derivatives > 0) {
       v = fraction.chain(to_rim, P(-0.5) * inverse(to_rim));
       for (std::size_t j = 0; j < turn.d.size(); ++j) turn.d[j] = (x.value * y.d[j] - y.value * x.d[j]) * (inverse_major * inverse_major);
     }
   }
+  /// Distance from the centre and azimuth as the centre moves; the angle's value is not asked for.
+  struct Moving {
+    S rho_um, angle;
+  };
+  Moving moving(const typename CentredView<S>::Place& place, const P& rho_um) const {
+    Moving m{S(rho_um), S(P(0.0))};
+    view_.add_moves(place, P(1.0), P(0.0), m.rho_um);
+    view_.add_moves(place, P(0.0), P(1.0), m.angle);
+    return m;
+  }
   template <class Mask>
-  S through(const S& x, const S& y, const S& rho_um, const S& over, const Mask& inside) const {
-    const P c = plain(x) * plain(over), s = plain(y) * plain(over);
-    // How the angle moves; its value is not asked for.
-    const auto angle = [&] {
-      S a(P(0.0));
-      if constexpr (ScalarTraits<S>::derivatives > 0)
-        for (std::size_t j = 0; j < a.d.size(); ++j) a.d[j] = (c * y.d[j] - s * x.d[j]) * plain(over);
-      return a;
+  S through(const typename CentredView<S>::Place& place, const Mask& inside) const {
+    const P c = place.x * place.inverse_rho, s = place.y * place.inverse_rho, rho_um = select(inside, place.rho_um, P(0.5) * plain(edge_um_));
+    const auto by_ray = [&](const Mesh& mesh) {
+      const Moving m = moving(place, rho_um);
+      return rays_->at_place(m.rho_um * inverse_radius_, c, s, m.angle, mesh);
     };
-    const auto by_ray = [&](const Mesh& mesh) { return rays_->at_place(rho_um * inverse_radius_, c, s, angle(), mesh); };
     if (plan_.disc.empty()) return by_ray(meshes_[0]);
-    S v, turn;
-    place_on_disc(x, y, S(rho_um * inverse_edge_), v, turn);
-    P square = map_.find(plain(v), plain(turn));
+    P v_around, turn_around;
+    place_on_disc<P>(place.x, place.y, rho_um * plain(inverse_edge_), v_around, turn_around);
+    P v = v_around, turn = turn_around, square = map_.find(v, turn);
+    S v_core, turn_core;
+    Mask in_core = inside && !inside;
     if (core_apart_) {
       P core_x, core_y;
-      seen_at_core(plain(v), c, s, core_x, core_y);
-      const auto in_core = core_x * core_x + core_y * core_y < P(1.0);
+      seen_at_core(v, c, s, core_x, core_y);
+      in_core = inside && core_x * core_x + core_y * core_y < P(1.0);
       if (!birefit::none(in_core)) {
         S at_x(core_x), at_y(core_y);
-        if constexpr (ScalarTraits<S>::derivatives > 0) seen_at_core(v, c, s, angle(), at_x, at_y);
+        if constexpr (ScalarTraits<S>::derivatives > 0) {
+          const Moving m = moving(place, rho_um);
+          seen_at_core(S(m.rho_um * inverse_edge_).chain(v, P(-0.5) * inverse(v)), c, s, m.angle, at_x, at_y);
+        }
         at_x = select(in_core, at_x, S(0.5)), at_y = select(in_core, at_y, S(0.0));
-        S v_core, turn_core;
-        place_on_disc(at_x, at_y, root(S(at_x * at_x + at_y * at_y + 1e-18)), v_core, turn_core);
-        v = select(in_core, v_core, v), turn = select(in_core, turn_core, turn), square = select(in_core, core_map_.find(plain(v_core), plain(turn_core)), square);
+        place_on_disc<S>(at_x, at_y, root(S(at_x * at_x + at_y * at_y + 1e-18)), v_core, turn_core);
+        v = select(in_core, plain(v_core), v), turn = select(in_core, plain(turn_core), turn), square = select(in_core, core_map_.find(plain(v_core), plain(turn_core)), square);
       }
     }
     S result(0.0);
-    if (!table_.empty() && table_.read(square, v, turn, inside, result)) return result;
+    Mask left = inside;
+    if (!table_.empty()) {
+      typename PolarTable<S>::Slopes by;
+      left = table_.read(square, v, turn, inside, result, by);
+      if constexpr (ScalarTraits<S>::derivatives > 0) {
+        if (!birefit::none(in_core)) {
+          const P by_v = select(in_core, by.by_v, P(0.0)), by_turn = select(in_core, by.by_turn, P(0.0));
+          for (std::size_t j = 0; j < result.d.size(); ++j) result.d[j] = result.d[j] + by_v * v_core.d[j] + by_turn * turn_core.d[j];
+          by.by_v = by.by_v - by_v, by.by_turn = by.by_turn - by_turn;
+        }
+        const P by_fraction = P(-0.5) * by.by_v * inverse(v_around), longer = max_of(max_of(c * c, s * s), P(1e-30));
+        view_.add_moves(place, by_fraction * plain(inverse_edge_), by.by_turn * inverse(longer), result);
+        by_inverse_edge_.add(by_fraction * rho_um, result);
+      }
+    }
+    if (birefit::none(left)) return result;
     P mesh;
     if constexpr (kLanesOf<S> == 1) {
       mesh = static_cast<double>(mesh_of_[static_cast<std::size_t>(square)]);
@@ -473,10 +495,7 @@ class BallImage final : public PixelModel<S> {
       for (int k = 0; k < kLanes; ++k) which[k] = static_cast<double>(mesh_of_[static_cast<std::size_t>(lane(square, k))]);
       mesh = Pack::load_unaligned(which);
     }
-    for_each_value(mesh, inside, [&](double m, const auto& here) {
-      result = select(here, by_ray(meshes_[static_cast<std::size_t>(m)]), result);
-      return true;
-    });
+    for_each_value(mesh, left, [&](double m, const auto& here) { result = select(here, by_ray(meshes_[static_cast<std::size_t>(m)]), result); });
     return result;
   }
 
@@ -491,8 +510,11 @@ class BallImage final : public PixelModel<S> {
   std::vector<std::size_t> mesh_of_; ///< which of them, by square of the disc; none: the first
   Symmetry symmetry_ = Symmetry::none;
   Polarizers<S> light_;
-  double pixel_um_;
-  S center_x_, center_y_, edge_um_, inverse_edge_, inverse_radius_, open_;
+  CentredView<S> view_;
+  PassingLight<S> passing_;
+  S edge_um_, inverse_edge_;
+  Sensitivity<S> by_inverse_edge_;
+  S inverse_radius_;
   std::unique_ptr<BallRays<S>> rays_of_table_, rays_;
   bool core_apart_;
   DiscMap map_, core_map_;
@@ -607,7 +629,8 @@ double error_in(const BallImage<Pack>& image, const PolarTable<Pack>& table, con
       for (int k = 0; k < kLanes; ++k) place[k] = disc::v_in(square, 0.01 + 0.98 * std::min(first + k, 7) / 7);
       const Pack v = Pack::load_aligned(place), exact = image.light_at(square, v, Pack(c), Pack(s), mesh);
       Pack read;
-      if (!table.read(Pack(number), v, Pack(turn), v < Pack(2.0), read)) return 1.0;
+      PolarTable<Pack>::Slopes none_asked;
+      if (!none(table.read(Pack(number), v, Pack(turn), v < Pack(2.0), read, none_asked))) return 1.0;
       for (int k = 0; k < kLanes; ++k) {
         const double off = std::abs(lane(exact, k) - lane(read, k));
         if (!std::isfinite(off)) return 1e300;

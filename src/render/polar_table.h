@@ -79,13 +79,11 @@ class DiscMap {
   std::vector<int> at_;
 };
 
-/// f(value, lanes that have it) for every value among the lanes where `here`, from the smallest on, as long as f returns true; whether it always did.
+/// f(value, lanes that have it) for every value among the lanes where `here`, from the smallest on.
 template <class P, class Mask, class F>
-bool for_each_value(const P& values, const Mask& here, const F& f) {
+void for_each_value(const P& values, const Mask& here, const F& f) {
   const P of_interest = select(here, values, P(1e300));
-  for (double next = smallest(of_interest); next < 1e300; next = smallest(select(of_interest > P(next), of_interest, P(1e300))))
-    if (!f(next, of_interest == P(next))) return false;
-  return true;
+  for (double next = smallest(of_interest); next < 1e300; next = smallest(select(of_interest > P(next), of_interest, P(1e300)))) f(next, of_interest == P(next));
 }
 
 /// Polynomials of degree 11 in v and in turn through 12 x 12 Chebyshev points of every smooth square. Derivatives by parameters
@@ -152,55 +150,44 @@ class PolarTable {
   }
 
   bool empty() const { return coefficients_.empty(); }
-  /// The light at v, turn where `here`, square by DiscMap::find; false, where one of these lanes lies in a square that is not smooth.
+  /// What the light changes with its place.
+  struct Slopes {
+    P by_v = P(0.0), by_turn = P(0.0);
+  };
+  /// The light at v, turn where `here`, square by DiscMap::find, with the derivatives it has where it is; those that it owes to a place that
+  /// moves follow from `slopes`, which are left alone where S has no derivatives. Returns those of these lanes that lie in a square that is not smooth.
   template <class Mask>
-  bool read(const P& square, const S& v, const S& turn, const Mask& here, S& out) const {
+  Mask read(const P& square, const P& v, const P& turn, const Mask& here, S& out, Slopes& slopes) const {
     out = S(0.0);
+    Mask left = here;
     // Lanes are neighbours in the picture and mostly lie in one square: its coefficients are single numbers for all of them.
-    return for_each_value(square, here, [&](double number, const auto& in_it) {
+    for_each_value(square, here, [&](double number, const auto& in_it) {
       const int start = start_[static_cast<std::size_t>(number)];
-      if (start < 0) return false;
+      if (start < 0) return;
+      left = left && !in_it;
       const DiscSquare& q = squares_[static_cast<std::size_t>(number)];
+      const double* c = coefficients_.data() + static_cast<std::size_t>(start) * (kPlanes * kRays);
       const double across = 2.0 * disc::panels(q.level), around = 0.25 * disc::sectors(q.level);
-      add(coefficients_.data() + static_cast<std::size_t>(start) * (kPlanes * kRays), plain(v) * P(across) - P(2.0 * q.panel + 1), plain(turn) * P(around) - P(2.0 * q.sector + 1), across, around,
-          v, turn, in_it, out);
-      return true;
+      const P x = v * P(across) - P(2.0 * q.panel + 1), y = turn * P(around) - P(2.0 * q.sector + 1);  // in the square, each from -1 to 1
+      if constexpr (kPlanes == 1) {
+        out = select(in_it, polynomial(c, x, y), out);
+      } else {
+        P by_x, by_y;
+        out.value = select(in_it, polynomial(c, x, y, by_x, by_y), out.value);
+        slopes.by_v = select(in_it, by_x * P(across), slopes.by_v);
+        slopes.by_turn = select(in_it, by_y * P(around), slopes.by_turn);
+        for (int k = 0; k < count_; ++k) {
+          const std::size_t plane = static_cast<std::size_t>(live_[static_cast<std::size_t>(k)]);
+          out.d[plane - 1] = select(in_it, polynomial(c + plane * kRays, x, y), out.d[plane - 1]);
+        }
+      }
     });
+    return left;
   }
 
  private:
   static constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
 
-  /// x, y: the place in the square, each from -1 to 1; across, around: how fast they go with v and turn.
-  template <class Mask>
-  void add(const double* c, const P& x, const P& y, [[maybe_unused]] double across, [[maybe_unused]] double around, [[maybe_unused]] const S& v, [[maybe_unused]] const S& turn, const Mask& in_it, S& out) const {
-    if constexpr (kPlanes == 1) {
-      out = select(in_it, polynomial(c, x, y), out);
-    } else {
-      P value(0.0), by_x(0.0), by_y(0.0);
-      for (int j = kPoints - 1; j >= 0; --j) {
-        const double* row = c + j * kPoints;
-        P f(row[kPoints - 1]), slope(0.0);
-        for (int i = kPoints - 2; i >= 0; --i) {
-          slope = slope * x + f;
-          f = f * x + P(row[i]);
-        }
-        by_y = by_y * y + value;
-        value = value * y + f;
-        by_x = by_x * y + slope;
-      }
-      by_x = by_x * P(across);
-      by_y = by_y * P(around);
-      out.value = select(in_it, value, out.value);
-      std::array<P, static_cast<std::size_t>(kPlanes)> d;
-      for (std::size_t j = 1; j < d.size(); ++j) d[j] = by_x * v.d[j - 1] + by_y * turn.d[j - 1];
-      for (int k = 0; k < count_; ++k) {
-        const int j = live_[static_cast<std::size_t>(k)];
-        d[static_cast<std::size_t>(j)] = d[static_cast<std::size_t>(j)] + polynomial(c + j * kRays, x, y);
-      }
-      for (std::size_t j = 1; j < d.size(); ++j) out.d[j - 1] = select(in_it, d[j], out.d[j - 1]);
-    }
-  }
   static P polynomial(const double* c, const P& x, const P& y) {
     P value(0.0);
     for (int j = kPoints - 1; j >= 0; --j) {
@@ -208,6 +195,22 @@ class PolarTable {
       P f(row[kPoints - 1]);
       for (int i = kPoints - 2; i >= 0; --i) f = f * x + P(row[i]);
       value = value * y + f;
+    }
+    return value;
+  }
+  static P polynomial(const double* c, const P& x, const P& y, P& by_x, P& by_y) {
+    P value(0.0);
+    by_x = by_y = P(0.0);
+    for (int j = kPoints - 1; j >= 0; --j) {
+      const double* row = c + j * kPoints;
+      P f(row[kPoints - 1]), slope(0.0);
+      for (int i = kPoints - 2; i >= 0; --i) {
+        slope = slope * x + f;
+        f = f * x + P(row[i]);
+      }
+      by_y = by_y * y + value;
+      value = value * y + f;
+      by_x = by_x * y + slope;
     }
     return value;
   }

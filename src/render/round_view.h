@@ -36,31 +36,56 @@ class Sensitivity {
   int count_ = 0;
 };
 
-/// Where points lie about the centre. Light is sum_k basis_k f_k(radius), basis = (q^2, q, 1, s, q s) with q, s = cos, sin of (2 azimuth -
-/// analyser - polarizer).
+/// Where points lie about the centre.
 template <class S>
-class RoundView {
+class CentredView {
  public:
   using P = PlainOf<S>;
-  static constexpr int kMostTerms = 5;
-  RoundView(const Scene& scene, const Values<S>& value)
-      : pixel_um_(scene.view.pixel_size_um), center_x_(plain(value(scene.view.center_x_px))), center_y_(plain(value(scene.view.center_y_px))) {
-    const S sum = value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg);
-    sin_cos(plain(sum), sin_sum_, cos_sum_);
-    by_center_x_ = Sensitivity<S>(value(scene.view.center_x_px));
-    by_center_y_ = Sensitivity<S>(value(scene.view.center_y_px));
-    by_sum_ = Sensitivity<S>(sum);
-  }
+  CentredView(const Scene& scene, const Values<S>& value)
+      : pixel_um_(scene.view.pixel_size_um), center_x_(plain(value(scene.view.center_x_px))), center_y_(plain(value(scene.view.center_y_px))), by_center_x_(value(scene.view.center_x_px)),
+        by_center_y_(value(scene.view.center_y_px)) {}
   struct Place {
     P x, y;         ///< right and up from the centre, um
     P inverse_rho;  ///< 1/um
-    P rho_um, q, s;
+    P rho_um;
   };
   Place at(const P& column, const P& row) const {
     Place p;
     p.x = (column - center_x_) * P(pixel_um_), p.y = (center_y_ - row) * P(pixel_um_);
     const P rho2 = p.x * p.x + p.y * p.y + P(1e-18);
     p.inverse_rho = inverse_root(rho2), p.rho_um = rho2 * p.inverse_rho;
+    return p;
+  }
+  /// Adds the derivatives that light has because its place moves, from its slopes by the radius (um) and by the azimuth.
+  void add_moves(const Place& p, const P& by_rho, const P& by_azimuth, S& light) const {
+    const P outwards = by_rho * p.inverse_rho * P(pixel_um_), around = by_azimuth * P(pixel_um_) * p.inverse_rho * p.inverse_rho;
+    by_center_x_.add(around * p.y - outwards * p.x, light);
+    by_center_y_.add(around * p.x + outwards * p.y, light);
+  }
+  double pixel_um() const { return pixel_um_; }
+
+ private:
+  double pixel_um_;
+  P center_x_, center_y_;
+  Sensitivity<S> by_center_x_, by_center_y_;
+};
+
+/// The same of light that is sum_k basis_k f_k(radius), basis = (q^2, q, 1, s, q s) with q, s = cos, sin of (2 azimuth - analyser - polarizer).
+template <class S>
+class RoundView : public CentredView<S> {
+ public:
+  using P = PlainOf<S>;
+  static constexpr int kMostTerms = 5;
+  RoundView(const Scene& scene, const Values<S>& value) : CentredView<S>(scene, value) {
+    const S sum = value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg);
+    sin_cos(plain(sum), sin_sum_, cos_sum_);
+    by_sum_ = Sensitivity<S>(sum);
+  }
+  struct Place : CentredView<S>::Place {
+    P q, s;
+  };
+  Place at(const P& column, const P& row) const {
+    Place p{CentredView<S>::at(column, row), {}, {}};
     const P square = p.inverse_rho * p.inverse_rho, c2 = (p.x * p.x - p.y * p.y) * square, s2 = P(2.0) * p.x * p.y * square;
     p.q = cos_sum_ * c2 + sin_sum_ * s2, p.s = cos_sum_ * s2 - sin_sum_ * c2;
     return p;
@@ -68,19 +93,15 @@ class RoundView {
   static std::array<P, kMostTerms> basis(const Place& p) { return {p.q * p.q, p.q, P(1.0), p.s, p.q * p.s}; }
   /// Its derivative by 2 azimuth: q' = -s, s' = q.
   static std::array<P, kMostTerms> turned(const Place& p) { return {P(-2.0) * p.q * p.s, -p.s, P(0.0), p.q, p.q * p.q - p.s * p.s}; }
-  /// Adds the derivatives that light has because its place moves, from its slopes by the radius (um) and by 2 azimuth.
+  /// by_angle: the slope by 2 azimuth, with which the polarizers turn.
   void add_moves(const Place& p, const P& by_rho, const P& by_angle, S& light) const {
-    const P outwards = by_rho * p.inverse_rho * P(pixel_um_), around = by_angle * P(2 * pixel_um_) * p.inverse_rho * p.inverse_rho;
-    by_center_x_.add(around * p.y - outwards * p.x, light);
-    by_center_y_.add(around * p.x + outwards * p.y, light);
+    CentredView<S>::add_moves(p, by_rho, P(2.0) * by_angle, light);
     by_sum_.add(-by_angle, light);
   }
-  double pixel_um() const { return pixel_um_; }
 
  private:
-  double pixel_um_;
-  P center_x_, center_y_, sin_sum_, cos_sum_;
-  Sensitivity<S> by_center_x_, by_center_y_, by_sum_;
+  P sin_sum_, cos_sum_;
+  Sensitivity<S> by_sum_;
 };
 
 /// Light that passes by a ball, averaged over a pixel along the radius.
@@ -92,7 +113,7 @@ class PassingLight {
   PassingLight(double pixel_um, const S& radius_um, const S& cos_between) : pixel_um_(pixel_um), radius_um_(radius_um), open_(cos_between * cos_between) {
     dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
   }
-  S at(const RoundView<S>& view, const typename RoundView<S>::Place& place) const {
+  S at(const CentredView<S>& view, const typename CentredView<S>::Place& place) const {
     if (dark_ || birefit::all(place.rho_um < plain(radius_um_) - P(pixel_um_))) return S(P(0.0));
     S rho(place.rho_um);
     view.add_moves(place, P(1.0), P(0.0), rho);
