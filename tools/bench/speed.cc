@@ -124,6 +124,13 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
+/// How many times `other` a thing takes: of measurements that were made one after the other, since a machine with neighbours is not as fast all the time.
+double ratio(const std::vector<double>& thing, const std::vector<double>& other) {
+  std::vector<double> each;
+  for (std::size_t i = 0; i < std::min(thing.size(), other.size()); ++i) each.push_back(thing[i] / other[i]);
+  return median(each);
+}
+
 /// Arithmetic operations of the medium, the generators and the exponentials along one ray of the twisted droplet; the ray
 /// itself, its surfaces and the commutators, about a tenth, are left out.
 long operations_of_a_ray(int steps, int samples_a_step) {
@@ -188,14 +195,13 @@ void time_waves(int rounds) {
       four.push_back(seconds_of([&] { render(s.scene, propagated, theta, s.four, 0, derivatives); }));
       four_light.push_back(seconds_of([&] { render(s.scene, propagated, theta, of_light, 0, derivatives); }));
     }
-    const double image = median(by_waves);
     std::printf("500 x 500 radial droplet of %g um, NA 0.8, as waves:\n", diameter);
     std::printf("  exact series                  %8.2f ms   %.2f times rays; with four derivatives %.2f ms, %.2f times\n", 1e3 * median(by_series),
-                median(by_series) / median(by_rays), 1e3 * median(by_series_four), median(by_series_four) / median(by_series));
-    std::printf("  propagation                   %8.2f ms   %.1f times rays; one thread %.2f ms, %.2f times\n", 1e3 * image, image / median(by_rays), 1e3 * median(one),
-                median(one) / image);
-    std::printf("    four derivatives            %8.2f ms   %.2f times the image; all four by what light meets %.2f ms, %.2f times\n", 1e3 * median(four), median(four) / image,
-                1e3 * median(four_light), median(four_light) / image);
+                ratio(by_series, by_rays), 1e3 * median(by_series_four), ratio(by_series_four, by_series));
+    std::printf("  propagation                   %8.2f ms   %.1f times rays; one thread %.2f ms, %.2f times\n", 1e3 * median(by_waves), ratio(by_waves, by_rays), 1e3 * median(one),
+                ratio(one, by_waves));
+    std::printf("    four derivatives            %8.2f ms   %.2f times the image; all four by what light meets %.2f ms, %.2f times\n", 1e3 * median(four), ratio(four, by_waves),
+                1e3 * median(four_light), ratio(four_light, by_waves));
   }
 }
 
@@ -215,9 +221,9 @@ void time_cones(int rounds) {
       by_all.push_back(seconds_of([&] { render(f.scene, p, theta, f.parameters, 0, out_all); }));
     }
     std::printf("500 x 500 %s (%s):\n", f.name.c_str(), p.method.c_str());
-    std::printf("  image, all threads            %8.2f ms   one thread %.2f ms, %.2f times\n", 1e3 * median(both), 1e3 * median(one), median(one) / median(both));
-    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image; %zu: %.2f ms, %.2f times\n", 1e3 * median(by_four), median(by_four) / median(both),
-                f.parameters.size(), 1e3 * median(by_all), median(by_all) / median(both));
+    std::printf("  image, all threads            %8.2f ms   one thread %.2f ms, %.2f times\n", 1e3 * median(both), 1e3 * median(one), ratio(one, both));
+    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image; %zu: %.2f ms, %.2f times\n", 1e3 * median(by_four), ratio(by_four, both),
+                f.parameters.size(), 1e3 * median(by_all), ratio(by_all, both));
   }
 }
 
@@ -262,7 +268,7 @@ void time_curved(int rounds) {
       image.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, out); }));
       four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four, 0, out_four); }));
     }
-    std::printf("128 x 128 by curved rays, %s: %.2f ms   with four derivatives %.2f ms, %.2f times\n", name, 1e3 * median(image), 1e3 * median(four), median(four) / median(image));
+    std::printf("128 x 128 by curved rays, %s: %.2f ms   with four derivatives %.2f ms, %.2f times\n", name, 1e3 * median(image), 1e3 * median(four), ratio(four, image));
   }
 }
 
@@ -295,18 +301,19 @@ void time_unsymmetric(int rounds) {
     for (DiscSquare& square : every.disc) square.smooth = false;
     Rendering image, four, direct, direct_four;
     std::vector<double> table, table_four, rays, rays_four;
-    for (int i = 0; i < std::max(3, rounds / 3); ++i) {
+    for (int i = 0; i < rounds; ++i) {
       table.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, image); }));
       table_four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four, 0, four); }));
+      if (i >= std::max(3, rounds / 3)) continue;
       rays.push_back(seconds_of([&] { render(s.scene, every, theta, {}, 0, direct); }));
       rays_four.push_back(seconds_of([&] { render(s.scene, every, theta, s.four, 0, direct_four); }));
     }
     double error = 0;
     for (std::size_t i = 0; i < image.intensity.values().size(); ++i) error = std::max(error, std::abs(image.intensity.values()[i] - direct.intensity.values()[i]));
     std::printf("500 x 500 droplet, %s (%s, %d steps), planned in %.0f ms:\n", name, p.method.c_str(), p.steps, 1e3 * planned);
-    std::printf("  image                         %8.2f ms   with four derivatives %.2f ms, %.2f times\n", 1e3 * median(table), 1e3 * median(table_four), median(table_four) / median(table));
+    std::printf("  image                         %8.2f ms   with four derivatives %.2f ms, %.2f times\n", 1e3 * median(table), 1e3 * median(table_four), ratio(table_four, table));
     std::printf("  a ray for every point         %8.2f ms   with four derivatives %.2f ms, %.2f times; differs by %.1e\n", 1e3 * median(rays), 1e3 * median(rays_four),
-                median(rays_four) / median(rays), error);
+                ratio(rays_four, rays), error);
   }
 }
 
@@ -432,7 +439,7 @@ void time_fit(int size, int rounds) {
 
 int main(int argc, char** argv) {
   const int rounds = argc > 1 ? std::atoi(argv[1]) : 11;
-  std::printf("%u threads, %d doubles a lane pack, %d rounds, medians\n", std::thread::hardware_concurrency(), kLanes, rounds);
+  std::printf("%u threads, %d doubles a lane pack, %d rounds, medians; ratios are medians of each round's\n", std::thread::hardware_concurrency(), kLanes, rounds);
   for (const bool twisted : {false, true}) {
     const DropletScene s = droplet_scene(twisted, 500, 0.025);
     const Theta theta = s.table.values();
@@ -456,15 +463,15 @@ int main(int argc, char** argv) {
     std::printf("500 x 500 %s droplet (%s, %d steps, accuracy %.0e):\n", twisted ? "twisted" : "radial", p.method.c_str(), p.steps,
                 s.scene.intensity_accuracy);
     std::printf("  image, all threads            %8.2f ms\n", 1e3 * median(both));
-    std::printf("  image, one thread             %8.2f ms   %.2f times all threads\n", 1e3 * median(one), median(one) / median(both));
-    std::printf("  image, one thread, no lanes   %8.2f ms   %.2f times the lanes\n", 1e3 * median(scalar), median(scalar) / median(one));
-    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image\n", 1e3 * median(four), median(four) / median(both));
-    std::printf("  image and eight derivatives   %8.2f ms   %.2f times the image\n", 1e3 * median(eight), median(eight) / median(both));
+    std::printf("  image, one thread             %8.2f ms   %.2f times all threads\n", 1e3 * median(one), ratio(one, both));
+    std::printf("  image, one thread, no lanes   %8.2f ms   %.2f times the lanes\n", 1e3 * median(scalar), ratio(scalar, one));
+    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image\n", 1e3 * median(four), ratio(four, both));
+    std::printf("  image and eight derivatives   %8.2f ms   %.2f times the image\n", 1e3 * median(eight), ratio(eight, both));
     std::printf("  a ray for every point         %8.2f ms   %8.2f ms with four derivatives, %.2f times\n", 1e3 * median(rays),
-                1e3 * median(rays_four), median(rays_four) / median(rays));
-    std::printf("    one thread                  %8.2f ms   %.2f times all threads\n", 1e3 * median(rays_one), median(rays_one) / median(rays));
+                1e3 * median(rays_four), ratio(rays_four, rays));
+    std::printf("    one thread                  %8.2f ms   %.2f times all threads\n", 1e3 * median(rays_one), ratio(rays_one, rays));
     std::printf("    one thread, no lanes        %8.2f ms   %.2f times the lanes\n", 1e3 * median(rays_scalar),
-                median(rays_scalar) / median(rays_one));
+                ratio(rays_scalar, rays_one));
     if (twisted && p.method == "magnus6") {
       // Three samples a step; points beside the droplet have no ray, some pixels several.
       const double rays_traced = rays_in_picture(s.scene, every, 0.5 * theta[static_cast<std::size_t>(s.four[0])], 1.43 / 1.52, 1.43), operations = static_cast<double>(operations_of_a_ray(p.steps, 3)), peak = peak_operations_per_second();
