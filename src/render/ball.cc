@@ -446,15 +446,19 @@ class BallImage final : public PixelModel<S> {
   S through(const typename CentredView<S>::Place& place, const Mask& inside) const {
     const P c = place.x * place.inverse_rho, s = place.y * place.inverse_rho, rho_um = select(inside, place.rho_um, P(0.5) * plain(edge_um_));
     const auto by_ray = [&](const Mesh& mesh) {
-      const Moving m = moving(place, rho_um);
-      return rays_->at_place(m.rho_um * inverse_radius_, c, s, m.angle, mesh);
+      // The middle itself has no azimuth: a place beside it that no picture tells from it.
+      constexpr double kBesideUm = 1e-7;
+      const auto middle = place.rho_um < P(kBesideUm);
+      const auto seen = CentredView<S>::around(select(middle, P(kBesideUm), place.x), place.y);
+      const Moving m = moving(seen, select(middle, seen.rho_um, rho_um));
+      return rays_->at_place(m.rho_um * inverse_radius_, seen.x * seen.inverse_rho, seen.y * seen.inverse_rho, m.angle, mesh);
     };
     if (plan_.disc.empty()) return by_ray(meshes_[0]);
     P v_around, turn_around;
     place_on_disc<P>(place.x, place.y, rho_um * plain(inverse_edge_), v_around, turn_around);
     P v = v_around, turn = turn_around, square = map_.find(v, turn);
     S v_core, turn_core;
-    Mask in_core = inside && !inside;
+    Mask in_core = inside && !inside;  // none
     if (core_apart_) {
       P core_x, core_y;
       seen_at_core(v, c, s, core_x, core_y);

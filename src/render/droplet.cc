@@ -291,14 +291,14 @@ S DropletImage<S>::traced(const P& rho_um, const typename RoundView<S>::Place& p
   } else {
     const auto turned = RoundView<S>::turned(place);
     S rho(rho_um);
-    view_.add_moves(place, P(1.0), P(0.0), rho);
+    view_.add_moves_and_turns(place, P(1.0), P(0.0), rho);
     terms_at(rho, f);
     P by_angle(0.0);
     for (std::size_t k = 0; k < static_cast<std::size_t>(number_of_terms()); ++k) {
       total = total + f[k].chain(f[k].value * basis[k], basis[k]);
       by_angle = by_angle + f[k].value * turned[k];
     }
-    view_.add_moves(place, P(0.0), by_angle, total);
+    view_.add_moves_and_turns(place, P(0.0), by_angle, total);
   }
   return total;
 }
@@ -353,7 +353,7 @@ S DropletImage<S>::read(const P& rho_um, const typename RoundView<S>::Place& pla
     }
   }
   if constexpr (kSlopes) {
-    view_.add_moves(place, by_rho, by_angle, total);
+    view_.add_moves_and_turns(place, by_rho, by_angle, total);
     by_inverse_edge_.add(by_edge, total);
     if (shell_) {
       by_inverse_core_.add(by_core, total);

@@ -149,7 +149,7 @@ S EikonalImage<S>::intensity(const P& column, const P& row) const {
       result = result + share * part.light.template sum<kTerms>(v, basis.data());
     }
   }
-  if constexpr (kSlopes) view_.add_moves(place, by_rho, by_angle, result);
+  if constexpr (kSlopes) view_.add_moves_and_turns(place, by_rho, by_angle, result);
   return result;
 }
 

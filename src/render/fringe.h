@@ -106,8 +106,8 @@ class NineWeights {
 };
 
 /// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact in the
-/// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others their derivatives by
-/// parameters, kMostPlanes with them or fewer; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. averaged: the mean field
+/// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others, of kMostPlanes at most, their
+/// derivatives by parameters; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. averaged: the mean field
 /// is so over pixels already. fields(plane): what of them a parameter moves; the others are not read. What a change of any of the nine points does to the mean is found once,
 /// backwards through the formula, and serves all derivatives.
 template <bool kQuadrature, int kMostPlanes, class P, class Load, class Fields, class Put>

@@ -49,12 +49,10 @@ class CentredView {
     P inverse_rho;  ///< 1/um
     P rho_um;
   };
-  Place at(const P& column, const P& row) const {
-    Place p;
-    p.x = (column - center_x_) * P(pixel_um_), p.y = (center_y_ - row) * P(pixel_um_);
-    const P rho2 = p.x * p.x + p.y * p.y + P(1e-18);
-    p.inverse_rho = inverse_root(rho2), p.rho_um = rho2 * p.inverse_rho;
-    return p;
+  Place at(const P& column, const P& row) const { return around((column - center_x_) * P(pixel_um_), (center_y_ - row) * P(pixel_um_)); }
+  static Place around(const P& x, const P& y) {
+    const P rho2 = x * x + y * y + P(1e-18), over = inverse_root(rho2);
+    return {x, y, over, rho2 * over};
   }
   /// Adds the derivatives that light has because its place moves, from its slopes by the radius (um) and by the azimuth.
   void add_moves(const Place& p, const P& by_rho, const P& by_azimuth, S& light) const {
@@ -94,8 +92,8 @@ class RoundView : public CentredView<S> {
   /// Its derivative by 2 azimuth: q' = -s, s' = q.
   static std::array<P, kMostTerms> turned(const Place& p) { return {P(-2.0) * p.q * p.s, -p.s, P(0.0), p.q, p.q * p.q - p.s * p.s}; }
   /// by_angle: the slope by 2 azimuth, with which the polarizers turn.
-  void add_moves(const Place& p, const P& by_rho, const P& by_angle, S& light) const {
-    CentredView<S>::add_moves(p, by_rho, P(2.0) * by_angle, light);
+  void add_moves_and_turns(const Place& p, const P& by_rho, const P& by_angle, S& light) const {
+    this->add_moves(p, by_rho, P(2.0) * by_angle, light);
     by_sum_.add(-by_angle, light);
   }
 

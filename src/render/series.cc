@@ -98,7 +98,7 @@ class SeriesImage final : public PixelModel<S> {
       typename RadialTable<S>::Slopes slopes;
       const auto turned = RoundView<S>::turned(place);
       S light = table_.template sum<kTerms>(v, basis.data(), turned.data(), &slopes);
-      view_.add_moves(place, slopes.by_v * P(1 / reach_um_), slopes.turned, light);
+      view_.add_moves_and_turns(place, slopes.by_v * P(1 / reach_um_), slopes.turned, light);
       return light;
     }
   }

@@ -301,7 +301,7 @@ void time_unsymmetric(int rounds) {
     for (DiscSquare& square : every.disc) square.smooth = false;
     Rendering image, four, direct, direct_four;
     std::vector<double> table, table_four, rays, rays_four;
-    for (int i = 0; i < rounds; ++i) {
+    for (int i = 0; i < std::max(3, rounds); ++i) {
       table.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, image); }));
       table_four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four, 0, four); }));
       if (i >= std::max(3, rounds / 3)) continue;
