@@ -447,7 +447,7 @@ class BallImage final : public PixelModel<S> {
     const P c = place.x * place.inverse_rho, s = place.y * place.inverse_rho, rho_um = select(inside, place.rho_um, P(0.5) * plain(edge_um_));
     const auto by_ray = [&](const Mesh& mesh) {
       // The middle itself has no azimuth: a place beside it that no picture tells from it.
-      constexpr double kBesideUm = 1e-7;
+      constexpr double kBesideUm = 1e-5;
       const auto middle = place.rho_um < P(kBesideUm);
       const auto seen = CentredView<S>::around(select(middle, P(kBesideUm), place.x), place.y);
       const Moving m = moving(seen, select(middle, seen.rho_um, rho_um));
