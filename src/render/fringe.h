@@ -6,6 +6,7 @@
 // pixels where the functions are interpolated.
 
 #include <array>
+#include <optional>
 
 #include "core/scalar.h"
 
@@ -16,10 +17,17 @@ struct FringePoint {
   S amplitude, phase, mean, quadrature;
 };
 
+/// A parameter that carries all fringes along and changes none: its derivative is the one along
+/// (column, row) + growth (column of the place, row of the place), in pixels.
+struct FringeFlow {
+  double column, row, growth;
+};
+
 /// What a derivative changes of a FringePoint.
 struct FringeFields {
   unsigned own = 15;       ///< the fields with values of their own, bit k the k-th
   double phase_share = 0;  ///< of the phase itself, added to its change: a thickness, a wavelength scale it
+  std::optional<FringeFlow> flow{};  ///< nothing else, then
   bool has(std::size_t field) const { return own >> field & 1; }
 };
 
@@ -35,7 +43,7 @@ struct PixelMoments {
     // s = sum (-q)^k/(2k + 1)!, up to half a turn a pixel; beyond, which no camera resolves, q is large enough to divide by.
     constexpr double kTurn = 2.5;
     if (largest(q) < kTurn) [[likely]] {
-      s0 = sum<0>(q), s1 = sum<1>(q), s2 = sum<2>(q);
+      s1 = sum<1>(q), s2 = sum<2>(q), s0 = P(-6.0) * s1 - P(4.0) * (q * s2);
     } else {
       const CosSinc<P> f = cos_sinc_sq(q);
       const auto small = q < P(0.1);
@@ -51,7 +59,7 @@ struct PixelMoments {
   /// The series' derivative of order kOrder.
   template <int kOrder>
   BIREFIT_INLINE static P sum(const P& q) {
-    constexpr int kTerms = 12;  // the next is below 1e-17 of the first for q < 2.5
+    constexpr int kTerms = 11;  // the next is below 1e-15 of the first for q < 2.5, of the second derivative, too
     static constexpr std::array<double, kTerms> c = [] {
       std::array<double, kTerms> a{};
       double factorial = 1;  // (2k + 1)! with its sign
@@ -80,12 +88,13 @@ struct PixelMoments {
 template <class P>
 struct NinePoints {
   P f, x, y, xx, xy, yy;  ///< value and derivatives in the middle
-  /// at(row, column)
+  /// at(row, column), both 0 in the middle
   template <class At>
   BIREFIT_INLINE static NinePoints of(const At& at) {
-    const P middle = at(1, 1), l = at(1, 0), r = at(1, 2), u = at(0, 1), d = at(2, 1);
-    return {middle, P(0.5) * (r - l), P(0.5) * (d - u), r + l - P(2.0) * middle, P(0.25) * ((at(2, 2) - at(2, 0)) - (at(0, 2) - at(0, 0))), d + u - P(2.0) * middle};
+    const P middle = at(0, 0), l = at(0, -1), r = at(0, 1), u = at(-1, 0), d = at(1, 0);
+    return {middle, P(0.5) * (r - l), P(0.5) * (d - u), r + l - P(2.0) * middle, P(0.25) * ((at(1, 1) - at(1, -1)) - (at(-1, 1) - at(-1, -1))), d + u - P(2.0) * middle};
   }
+  BIREFIT_INLINE P times(const NinePoints& o) const { return (f * o.f + x * o.x + y * o.y) + (xx * o.xx + xy * o.xy + yy * o.yy); }
 };
 
 /// What a change of nine points changes, once its derivatives by the quadratic's six numbers are known.
@@ -98,25 +107,36 @@ class NineWeights {
         corners_(P(0.25) * by.xy) {}
   template <class At>
   BIREFIT_INLINE P times(const At& at) const {
-    return (middle_ * at(1, 1) + left_ * at(1, 0) + right_ * at(1, 2)) + (up_ * at(0, 1) + down_ * at(2, 1) + corners_ * ((at(2, 2) - at(2, 0)) - (at(0, 2) - at(0, 0))));
+    return (middle_ * at(0, 0) + left_ * at(0, -1) + right_ * at(0, 1)) + (up_ * at(-1, 0) + down_ * at(1, 0) + corners_ * ((at(1, 1) - at(1, -1)) - (at(-1, 1) - at(-1, -1))));
   }
 
  private:
   P middle_, left_, right_, up_, down_, corners_;
 };
 
+/// In the middle of nine points, by two pixels more on either axis.
+template <class P>
+struct ThirdDerivatives {
+  P xxx, xxy, xyy, yyy;
+  template <class At>
+  BIREFIT_INLINE static ThirdDerivatives of(const NinePoints<P>& f, const At& at) {
+    const P a = at(-1, -1), b = at(-1, 1), c = at(1, -1), d = at(1, 1), half(0.5), two(2.0);
+    return {half * (at(0, 2) - at(0, -2)) - two * f.x, half * ((c + d) - (a + b)) - two * f.y, half * ((b + d) - (a + c)) - two * f.x, half * (at(2, 0) - at(-2, 0)) - two * f.y};
+  }
+};
+
 /// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact in the
 /// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others, of kMostPlanes at most, their
-/// derivatives by parameters; fields are numbered as in FringePoint. put(plane, mean). kQuadrature = false: it is zero and not read. averaged: the mean field
-/// is so over pixels already. fields(plane): what of them a parameter moves; the others are not read. What a change of any of the nine points does to the mean is found once,
-/// backwards through the formula, and serves all derivatives.
-template <bool kQuadrature, int kMostPlanes, class P, class Load, class Fields, class Put>
-BIREFIT_INLINE void fringe_means(int planes, bool averaged, const Load& load, const Fields& fields, const Put& put) {
-  const auto field = [&load](int plane, int f) BIREFIT_INLINE_LAMBDA { return [&load, plane, f](int row, int column) BIREFIT_INLINE_LAMBDA { return load(plane, f, row, column); }; };
+/// derivatives by parameters; fields are numbered as in FringePoint, row and column from the middle pixel, whose place in the picture is (column, row). put(plane, mean). kQuadrature = false: it
+/// is zero and not read. averaged: the mean field is so over pixels already. fields[plane]: what of them a parameter moves, the others are not read; kFlows = false: none has a flow. What a change of any
+/// of the nine points does to the mean is found once, backwards through the formula, and serves all derivatives; flows read two pixels further.
+template <bool kQuadrature, bool kFlows, int kMostPlanes, class P, class Load, class Put>
+BIREFIT_INLINE void fringe_means(int planes, bool averaged, const P& column, const P& row, const FringeFields* fields, const Load& load, const Put& put) {
+  const auto field = [&load](int plane, int f) BIREFIT_INLINE_LAMBDA { return [&load, plane, f](int j, int i) BIREFIT_INLINE_LAMBDA { return load(plane, f, j, i); }; };
   const auto mean_of = [&](int plane) BIREFIT_INLINE_LAMBDA {
     const auto at = field(plane, 2);
-    if (averaged) return at(1, 1);
-    return P(1 - 4.0 / 24) * at(1, 1) + P(1.0 / 24) * ((at(1, 0) + at(1, 2)) + (at(0, 1) + at(2, 1)));
+    if (averaged) return at(0, 0);
+    return P(1 - 4.0 / 24) * at(0, 0) + P(1.0 / 24) * ((at(0, -1) + at(0, 1)) + (at(-1, 0) + at(1, 0)));
   };
   const NinePoints<P> phase = NinePoints<P>::of(field(0, 1)), amplitude = NinePoints<P>::of(field(0, 0));
   const PixelMoments<P> mx(phase.x), my(phase.y);
@@ -137,8 +157,11 @@ BIREFIT_INLINE void fringe_means(int planes, bool averaged, const Load& load, co
   }
   P s, c;
   sin_cos(phase.f, s, c);
-  put(0, mean_of(0) + re * c - im * s);
-  if (kMostPlanes == 1 || planes <= 1) return;
+  const P value = mean_of(0) + re * c - im * s;
+  if (kMostPlanes == 1 || planes <= 1) {
+    put(0, value);
+    return;
+  }
 
   // Backwards: by_* is the mean's derivative by *.
   const P half_xx = P(0.5) * xx, half_yy = P(0.5) * yy;
@@ -149,31 +172,76 @@ BIREFIT_INLINE void fringe_means(int planes, bool averaged, const Load& load, co
     const P half = P(-0.5) * even;
     return By{even * f.f, -odd * f.x, -odd * f.y, half * f.xx, half * f.yy, -even * f.xy, -odd * f.f};
   };
-  const auto weights = [&](const P& even, const P& odd) BIREFIT_INLINE_LAMBDA {
-    return NineWeights<P>({even * zero - odd * bend, -odd * one_x, -odd * one_y, -even * half_xx, -even * xy, -even * half_yy});
+  const auto points = [&](const P& even, const P& odd) BIREFIT_INLINE_LAMBDA {
+    return NinePoints<P>{even * zero - odd * bend, -odd * one_x, -odd * one_y, -even * half_xx, -even * xy, -even * half_yy};
   };
   By by = back(amplitude, c, -s);
-  const NineWeights<P> by_amplitude = weights(c, -s);
-  [[maybe_unused]] NineWeights<P> by_quadrature;
+  const NinePoints<P> by_amplitude = points(c, -s);
+  [[maybe_unused]] NinePoints<P> by_quadrature;
   if constexpr (kQuadrature) {
     const By more = back(quadrature, -s, -c);
     by = {by.zero + more.zero, by.one_x + more.one_x, by.one_y + more.one_y, by.xx + more.xx, by.yy + more.yy, by.xy + more.xy, by.bend + more.bend};
-    by_quadrature = weights(-s, -c);
+    by_quadrature = points(-s, -c);
   }
   const P half_bend = P(0.5) * by.bend;
   by.xx = by.xx + phase.xx * half_bend, by.yy = by.yy + phase.yy * half_bend, by.xy = by.xy + phase.xy * by.bend;
   const P xxx = mx.third * my.m0, yyy = mx.m0 * my.third, xxy = mx.curvature * my.slope, xyy = mx.slope * my.curvature;
-  const NineWeights<P> by_phase({-(re * s + im * c), by.zero * one_x + by.one_x * xx + by.one_y * xy + by.xx * xxx + by.yy * xyy + by.xy * xxy,
-                                 by.zero * one_y + by.one_x * xy + by.one_y * yy + by.xx * xxy + by.yy * yyy + by.xy * xyy, xx * half_bend, xy * by.bend, yy * half_bend});
+  const NinePoints<P> by_phase{-(re * s + im * c), by.zero * one_x + by.one_x * xx + by.one_y * xy + by.xx * xxx + by.yy * xyy + by.xy * xxy,
+                               by.zero * one_y + by.one_x * xy + by.one_y * yy + by.xx * xxy + by.yy * yyy + by.xy * xyy, xx * half_bend, xy * by.bend, yy * half_bend};
+
+  // Nine points that are carried along change by their quadratic's derivatives and by third ones, of which they take a sixth for slope. Where all of a picture
+  // is so smooth that its mean could be averaged, only the phase's third ones matter: a few parts in a million are the others'.
+  [[maybe_unused]] P by_column(0.0), by_row(0.0), by_growth(0.0);
+  if constexpr (kFlows) {
+    const auto carry = [&](const NinePoints<P>& f, const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
+      by_column = by_column + (mean_by.f * f.x + mean_by.x * f.xx + mean_by.y * f.xy);
+      by_row = by_row + (mean_by.f * f.y + mean_by.x * f.xy + mean_by.y * f.yy);
+      by_growth = by_growth + (mean_by.x * f.x + mean_by.y * f.y) + P(2.0) * (mean_by.xx * f.xx + mean_by.xy * f.xy + mean_by.yy * f.yy);
+    };
+    const auto carry_third = [&](int number, const NinePoints<P>& f, const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
+      const auto third = ThirdDerivatives<P>::of(f, field(0, number));
+      const P sixth = P(-1.0 / 6) * mean_by.f;
+      by_column = by_column + ((mean_by.xx + sixth) * third.xxx + mean_by.xy * third.xxy + mean_by.yy * third.xyy);
+      by_row = by_row + ((mean_by.yy + sixth) * third.yyy + mean_by.xy * third.xyy + mean_by.xx * third.xxy);
+      by_growth = by_growth + P(1.0 / 3) * (mean_by.x * third.xxx + mean_by.y * third.yyy);
+    };
+    carry(phase, by_phase);
+    carry_third(1, phase, by_phase);
+    carry(amplitude, by_amplitude);
+    if constexpr (kQuadrature) carry(quadrature, by_quadrature);
+    const NinePoints<P> mean = NinePoints<P>::of(field(0, 2));
+    if (averaged) {
+      by_column = by_column + mean.x;
+      by_row = by_row + mean.y;
+      by_growth = by_growth + P(1.0 / 12) * (mean.xx + mean.yy);  // of what a pixel sees of the curvature
+    } else {
+      const P none(0.0), share(1.0 / 24);
+      const NinePoints<P> by_mean{P(1.0), none, none, share, none, share};
+      carry(mean, by_mean);
+      carry_third(2, mean, by_mean);
+      carry_third(0, amplitude, by_amplitude);
+      if constexpr (kQuadrature) carry_third(3, quadrature, by_quadrature);
+    }
+  }
+  put(0, value);
+  const NineWeights<P> of_amplitude(by_amplitude), of_phase(by_phase);
+  [[maybe_unused]] NineWeights<P> of_quadrature;
+  if constexpr (kQuadrature) of_quadrature = NineWeights<P>(by_quadrature);
   for (int plane = 1; plane < planes; ++plane) {
-    const FringeFields moved = fields(plane);
+    const FringeFields& moved = fields[plane];
+    if constexpr (kFlows)
+      if (moved.flow) {
+        const P growth(moved.flow->growth);
+        put(plane, (P(moved.flow->column) + growth * column) * by_column + (P(moved.flow->row) + growth * row) * by_row + growth * by_growth);
+        continue;
+      }
     P d(0.0);
-    if (moved.has(0)) d = by_amplitude.times(field(plane, 0));
-    if (moved.has(1)) d = d + by_phase.times(field(plane, 1));
-    if (moved.phase_share != 0) d = d + P(moved.phase_share) * by_phase.times(field(0, 1));
+    if (moved.has(0)) d = of_amplitude.times(field(plane, 0));
+    if (moved.has(1)) d = d + of_phase.times(field(plane, 1));
+    if (moved.phase_share != 0) d = d + P(moved.phase_share) * by_phase.times(phase);
     if (moved.has(2)) d = d + mean_of(plane);
     if constexpr (kQuadrature)
-      if (moved.has(3)) d = d + by_quadrature.times(field(plane, 3));
+      if (moved.has(3)) d = d + of_quadrature.times(field(plane, 3));
     put(plane, d);
   }
 }
@@ -184,7 +252,7 @@ S fringe_mean(const FringePoint<S> (&p)[3][3]) {
   using P = PlainOf<S>;
   S mean(0.0);
   const auto load = [&p](int plane, int field, int row, int column) -> P {
-    const FringePoint<S>& q = p[row][column];
+    const FringePoint<S>& q = p[row + 1][column + 1];
     const S& part = field == 0 ? q.amplitude : field == 1 ? q.phase : field == 2 ? q.mean : q.quadrature;
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       if (plane > 0) return part.d[static_cast<std::size_t>(plane - 1)];
@@ -192,7 +260,8 @@ S fringe_mean(const FringePoint<S> (&p)[3][3]) {
     return plain(part);
   };
   constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
-  fringe_means<kQuadrature, kPlanes, P>(kPlanes, false, load, [](int) { return FringeFields{}; }, [&mean](int plane, const P& value) {
+  static constexpr std::array<FringeFields, kPlanes> kAll{};
+  fringe_means<kQuadrature, false, kPlanes, P>(kPlanes, false, P(0.0), P(0.0), kAll.data(), load, [&mean](int plane, const P& value) {
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       if (plane > 0) {
         mean.d[static_cast<std::size_t>(plane - 1)] = value;

@@ -15,21 +15,13 @@
 
 namespace birefit {
 
-/// Squares of `block_px` pixels side by side from column -1, row -1 on (the picture's rim), row by row.
+/// Squares of `block_px` pixels side by side from the picture's rim on, row by row.
 struct FringeBlocks {
+  static constexpr int kRim = 2;  ///< pixels around the picture whose fringes its edge needs
   int columns = 0, rows = 0, block_px = 0;
   FringeBlocks(int width, int height, int block)
-      : columns((width + 2 + block - 1) / block), rows((height + 2 + block - 1) / block), block_px(block) {}
+      : columns((width + 2 * kRim + block - 1) / block), rows((height + 2 * kRim + block - 1) / block), block_px(block) {}
   int count() const { return columns * rows; }
-};
-
-/// A parameter that moves all fringes, changes none and does nothing else: by the centre's column and row, and by the logarithm of the scale around it.
-struct FringeMove {
-  std::size_t derivative;  ///< of the table's scalar
-  double column, row, log_scale;
-};
-struct FringeCentre {
-  double column, row;
 };
 
 /// What a thread keeps of one row of one picture while it goes along it.
@@ -48,12 +40,11 @@ class FringeTable {
 
   FringeTable() = default;
   /// ray(column, row): the fringe at points of the picture, one a lane, in a scalar whose k-th derivative is the derivatives[k]-th of S.
-  /// Its other derivatives are `moves` about `centre`. `wanted`: one flag a square. What was smooth when it was planned need not be, the image of
+  /// `wanted`: one flag a square. What was smooth when it was planned need not be, the image of
   /// the optic axis may have come in since: squares whose tail (chebyshev.h) would change the intensity by more than `allowed` are left to rays.
   template <class Ray>
-  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, double allowed, int threads, const std::vector<std::size_t>& derivatives,
-              const std::vector<FringeMove>& moves, const FringeCentre& centre, const Ray& ray)
-      : blocks_(blocks), start_(wanted.size(), -1), derivatives_(derivatives), moves_(moves), centre_(centre), planes_(1 + derivatives.size()) {
+  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, double allowed, int threads, const std::vector<std::size_t>& derivatives, const Ray& ray)
+      : blocks_(blocks), start_(wanted.size(), -1), derivatives_(derivatives), planes_(1 + derivatives.size()) {
     std::vector<int> list;
     for (std::size_t b = 0; b < wanted.size(); ++b)
       if (wanted[b]) {
@@ -96,7 +87,6 @@ class FringeTable {
     }
     fields_.fill({.own = 0});
     fields_[0] = {};
-    for (const FringeMove& m : moves_) fields_[m.derivative + 1] = {};
     for (std::size_t plane = 1; plane < planes_; ++plane) fields_[derivatives_[plane - 1] + 1] = fields_of(values, list.size(), plane);
     parallel_for(static_cast<int>(list.size() * kFields * planes_), threads, [&](int plane) {
       const std::size_t at = static_cast<std::size_t>(plane) * kRays;
@@ -111,8 +101,8 @@ class FringeTable {
     const std::size_t fields = quadrature ? kFields : kFields - 1;
     const double* line = line_at(column, row, fields, scratch);
     if (!line) return 0;
-    const int bx = (column + 1) / blocks_.block_px, end = std::min(column + count, (bx + 1) * blocks_.block_px - 1);
-    const double per_px = 2.0 / blocks_.block_px, first = (column + 1 - bx * blocks_.block_px) * per_px - 1;
+    const int bx = (column + kRim) / blocks_.block_px, end = std::min(column + count, (bx + 1) * blocks_.block_px - kRim);
+    const double per_px = 2.0 / blocks_.block_px, first = (column + kRim - bx * blocks_.block_px) * per_px - 1;
     alignas(64) double steps[kLanes];
     for (int k = 0; k < kLanes; ++k) steps[k] = first + k * per_px;
     P x0;
@@ -144,10 +134,8 @@ class FringeTable {
     return end - column;
   }
 
-  /// From now on the mean field is its mean over a pixel, as far as its curvature makes one, for a picture of which none is traced. False, and
-  /// nothing is done: a parameter scales the fringes, and with them what a pixel sees of the curvature.
-  bool average_means() {
-    if (std::any_of(moves_.begin(), moves_.end(), [](const FringeMove& m) { return m.log_scale != 0; })) return false;
+  /// From now on the mean field is its mean over a pixel, as far as its curvature makes one, for a picture of which none is traced.
+  void average_means() {
     const double share = square(2.0 / blocks_.block_px) / 24;
     for (std::size_t i = 0; i < coefficients_.size() / (kFields * planes_ * kRays); ++i)
       for (std::size_t plane = 0; plane < planes_; ++plane) {
@@ -161,7 +149,6 @@ class FringeTable {
             c[j * kPoints + k] += share * bend;
           }
       }
-    return true;
   }
 
   /// What changes with derivative plane - 1 of S, fields left out to which no square owes more than rounding of it: run() does not write them.
@@ -175,7 +162,7 @@ class FringeTable {
   bool read(double column, double row, FringeScratch& scratch, FringePoint<double>& out) const {
     const double* line = line_at(static_cast<int>(std::floor(column)), row, kFields, scratch);
     if (!line) return false;
-    const double at = (column + 1) / blocks_.block_px, x = 2 * (at - std::floor(at)) - 1;
+    const double at = (column + kRim) / blocks_.block_px, x = 2 * (at - std::floor(at)) - 1;
     double* parts[kFields] = {&out.amplitude, &out.phase, &out.mean, &out.quadrature};
     for (double* part : parts) {
       *part = 0;
@@ -186,10 +173,10 @@ class FringeTable {
   }
 
  private:
-  static constexpr int kGone = -2;
+  static constexpr int kGone = -2, kRim = FringeBlocks::kRim;
   static constexpr std::size_t kFields = 4, kOut = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
 
-  double place(int block, double x) const { return (block + 0.5 + 0.5 * x) * blocks_.block_px - 1; }
+  double place(int block, double x) const { return (block + 0.5 + 0.5 * x) * blocks_.block_px - kRim; }
   /// What of a derivative is not negligible: a phase counts as much as the amplitude that it turns.
   FringeFields fields_of(const std::vector<double>& values, std::size_t squares, std::size_t plane) const {
     std::array<double, kFields> value{}, change{};
@@ -220,46 +207,30 @@ class FringeTable {
   }
   const double* line_at(int column, double row, std::size_t fields, FringeScratch& scratch) const {
     if (start_.empty()) return nullptr;
-    const int bx = (column + 1) / blocks_.block_px, by = static_cast<int>(std::floor((row + 1) / blocks_.block_px));
-    if (column < -1 || by < 0 || bx >= blocks_.columns || by >= blocks_.rows || start_[static_cast<std::size_t>(by * blocks_.columns + bx)] < 0) return nullptr;
+    const int bx = (column + kRim) / blocks_.block_px, by = static_cast<int>(std::floor((row + kRim) / blocks_.block_px));
+    if (column < -kRim || by < 0 || bx >= blocks_.columns || by >= blocks_.rows || start_[static_cast<std::size_t>(by * blocks_.columns + bx)] < 0) return nullptr;
     if (scratch.row != row) follow_row(row, by, fields, scratch);
     return scratch.lines.data() + static_cast<std::size_t>(bx) * kFields * kOut * kPoints;
   }
   /// Polynomials of the column alone for one row: [square][field][value and derivatives of S][power], of the first `fields`.
   void follow_row(double row, int by, std::size_t fields, FringeScratch& scratch) const {
-    using Line = std::array<double, kPoints>;
-    const double per_px = 2.0 / blocks_.block_px, y = (row - (by * blocks_.block_px - 1.0)) * per_px - 1;
+    const double per_px = 2.0 / blocks_.block_px, y = (row - (by * blocks_.block_px - kRim)) * per_px - 1;
     scratch.row = row;
     scratch.lines.assign(static_cast<std::size_t>(blocks_.columns) * kFields * kOut * kPoints, 0.0);
     for (int bx = 0; bx < blocks_.columns; ++bx) {
       const int start = start_[static_cast<std::size_t>(by * blocks_.columns + bx)];
       if (start < 0) continue;
-      const double middle = (bx + 0.5) * blocks_.block_px - 1 - centre_.column;  // columns from the centre: middle + x/per_px
       for (std::size_t f = 0; f < fields; ++f) {
         const double* c = coefficients_.data() + (static_cast<std::size_t>(start) * kFields + f) * planes_ * kRays;
         double* line = scratch.lines.data() + (static_cast<std::size_t>(bx) * kFields + f) * kOut * kPoints;
         for (std::size_t plane = 0; plane < planes_; ++plane) {
           if (plane > 0 && !fields_[derivatives_[plane - 1] + 1].has(f)) continue;
           const double* powers = c + plane * kRays;
-          const bool moved = plane == 0 && !moves_.empty();
-          Line value, by_y{};
+          std::array<double, kPoints> value;
           std::copy(powers + kRays - kPoints, powers + kRays, value.begin());
-          for (std::size_t j = kPoints - 1; j-- > 0;) {
-            if (moved)
-              for (std::size_t i = 0; i < kPoints; ++i) by_y[i] = by_y[i] * y + value[i];
+          for (std::size_t j = kPoints - 1; j-- > 0;)
             for (std::size_t i = 0; i < kPoints; ++i) value[i] = value[i] * y + powers[j * kPoints + i];
-          }
           std::copy(value.begin(), value.end(), line + (plane == 0 ? 0 : derivatives_[plane - 1] + 1) * kPoints);
-          if (!moved) continue;
-          // A move's derivative along the row is a polynomial, too: u = a + b x columns and v rows to the point.
-          for (const FringeMove& m : moves_) {
-            const double a = middle * m.log_scale - m.column, b = m.log_scale / per_px, v = (row - centre_.row) * m.log_scale - m.row;
-            double* to = line + (m.derivative + 1) * kPoints;
-            for (std::size_t i = 0; i < kPoints; ++i) {
-              const double slope = i + 1 < kPoints ? static_cast<double>(i + 1) * value[i + 1] : 0.0;  // of power i in d/dx, and x d/dx
-              to[i] = per_px * (a * slope + b * static_cast<double>(i) * value[i] + v * by_y[i]);
-            }
-          }
         }
       }
     }
@@ -270,8 +241,6 @@ class FringeTable {
   std::vector<int> start_;                ///< place among the coefficients, -1 = not asked for, kGone = no longer smooth
   std::array<FringeFields, kOut> fields_{};
   std::vector<std::size_t> derivatives_;  ///< of S, one a plane after the first
-  std::vector<FringeMove> moves_;
-  FringeCentre centre_{0, 0};
   std::size_t planes_ = 1;
   std::vector<double> coefficients_;      ///< [square][field][plane][power of row][power of column]
 };

@@ -491,22 +491,22 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
   constexpr double kLeast = 1e-9;
   if (scene.intensity_accuracy < 10 * kLeast) return;
   const double target = std::max(kSquaresShare * scene.intensity_accuracy, kLeast);
-  constexpr int kColumns = 8;
+  constexpr int kColumns = 8, kRims = 2 * FringeBlocks::kRim;
   const Values<Pack> lanes = value.template as<Pack>();
   const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
   double fewest = 0.5 * w * h;
   for (int parts = 1;; parts *= 2) {
     constexpr int kWhole = 8;  // lanes do not cross from square to square
     static_assert(kWhole % kLanes == 0);
-    const int size = ((std::max(w, h) + 2 + parts - 1) / parts + kWhole - 1) / kWhole * kWhole;
+    const int size = ((std::max(w, h) + kRims + parts - 1) / parts + kWhole - 1) / kWhole * kWhole;
     const FringeBlocks blocks(w, h, size);
     const double least = static_cast<double>(blocks.count()) * FringeTable<Pack>::kRays;
     if (least >= fewest) break;
-    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), kGivenUp * scene.intensity_accuracy, 0, {}, {}, {0, 0},
+    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1), kGivenUp * scene.intensity_accuracy, 0, {},
                                   [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
     std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
     parallel_for(blocks.count(), 0, [&](int b) {
-      const double left = (b % blocks.columns) * size - 1.0, top = (b / blocks.columns) * size - 1.0;
+      const double left = (b % blocks.columns) * size - FringeBlocks::kRim, top = (b / blocks.columns) * size - FringeBlocks::kRim;
       FringeScratch scratch;
       for (const double down : {0.02, 0.31, 0.77, 0.98})  // none a Chebyshev point, the ends among them
         for (int first = 0; first < kColumns; first += kLanes) {
@@ -530,7 +530,7 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
     double left_over = 0;  // pixels
     for (int b = 0; b < blocks.count(); ++b)
       if (!smooth[static_cast<std::size_t>(b)])
-        left_over += static_cast<double>(std::min(size, w + 2 - b % blocks.columns * size)) * std::min(size, h + 2 - b / blocks.columns * size);
+        left_over += static_cast<double>(std::min(size, w + kRims - b % blocks.columns * size)) * std::min(size, h + kRims - b / blocks.columns * size);
     if (least + left_over < fewest) {
       fewest = least + left_over;
       plan.fringe_block_px = size;

@@ -143,7 +143,7 @@ class PlanarModel final : public PixelModel<S> {
       symmetry_ = Symmetry::mirror;
     if (symmetry_ != Symmetry::none && !tabulated_blocks_.empty())  // the lower half of a picture is copied
       for (int b = 0; b < blocks_.count(); ++b)
-        if ((b / blocks_.columns) * blocks_.block_px > scene.view.height / 2 + 2) tabulated_blocks_[static_cast<std::size_t>(b)] = 0;
+        if ((b / blocks_.columns) * blocks_.block_px > scene.view.height / 2 + 2 * FringeBlocks::kRim) tabulated_blocks_[static_cast<std::size_t>(b)] = 0;
   }
   S intensity(const P& column, const P& row) const override {
     if (!cone_) return constant_;
@@ -158,26 +158,29 @@ class PlanarModel final : public PixelModel<S> {
     return table_.run(column, row, count, !in_phase(), scratch, out);
   }
   FringeFields fringe_fields(int plane) const override {
-    return tabulated_blocks_.empty() ? FringeFields{} : table_.fields(static_cast<std::size_t>(plane));
+    const std::size_t p = static_cast<std::size_t>(plane);
+    if (tabulated_blocks_.empty()) return {};
+    return plane > 0 && flows_[p - 1] ? FringeFields{.own = 0, .flow = flows_[p - 1]} : table_.fields(p);
   }
   bool means_are_averaged() const override { return means_are_averaged_; }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
   Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture || tabulated_blocks_.empty()) return;
-    // Where the cone's middle lies and how wide it is moves fringes and changes none. Seen from the side a wider cone moves them by other
+    // Where the cone's middle lies and how wide it is carries fringes along and changes none. Seen from the side a wider cone carries them by other
     // ways than straight away from the middle: its derivative is left to rays.
     const ParameterRef half_angle = scene_.view.camera ? ParameterRef{} : *cone_half_angle(scene_);
     std::vector<std::size_t> places;
     std::vector<int> changing;
-    std::vector<FringeMove> moves;
     if constexpr (ScalarTraits<S>::derivatives > 0)
       for (std::size_t j = 0; j < value_.active().size(); ++j) {
         const int index = value_.active()[j];
         bool moving = false;
         for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle}) moving = moving || (ref && ref.index == index);
         if (moving) {
-          moves.push_back({j, lane(cone_->center_x.d[j], 0), lane(cone_->center_y.d[j], 0), scene_.view.camera ? 0.0 : lane(cone_->tan_per_px.d[j], 0) / lane(plain(cone_->tan_per_px), 0)});
+          const double growth = scene_.view.camera ? 0.0 : lane(cone_->tan_per_px.d[j], 0) / lane(plain(cone_->tan_per_px), 0);
+          const auto along = [&](const S& centre) { return -lane(centre.d[j], 0) - growth * lane(plain(centre), 0); };
+          flows_[j] = {along(cone_->center_x), along(cone_->center_y), growth};
         } else {
           places.push_back(j);
           changing.push_back(index);
@@ -185,7 +188,7 @@ class PlanarModel final : public PixelModel<S> {
       }
     with_scalar_for<S>(changing.size(), [&]<class R>(Type<R>) {
       const std::vector<int> inside = known_inside<R>(changing);
-      with_scalar_for<R>(inside.size(), [&]<class T>(Type<T>) { fill_table<R, T>(changing, inside, places, moves, threads); });
+      with_scalar_for<R>(inside.size(), [&]<class T>(Type<T>) { fill_table<R, T>(changing, inside, places, threads); });
     });
   }
 
@@ -238,7 +241,7 @@ class PlanarModel final : public PixelModel<S> {
   }
   /// With rays that carry the derivatives by `changing` and no others, in T those by `inside`.
   template <class R, class T>
-  void fill_table(const std::vector<int>& changing, const std::vector<int>& inside, const std::vector<std::size_t>& places, const std::vector<FringeMove>& moves, int threads) {
+  void fill_table(const std::vector<int>& changing, const std::vector<int>& inside, const std::vector<std::size_t>& places, int threads) {
     const Values<R> value(value_.theta(), changing);
     const Values<T> value_inside(value_.theta(), std::is_same_v<R, T> ? changing : inside);
     Raise<T, R> raise;
@@ -250,15 +253,15 @@ class PlanarModel final : public PixelModel<S> {
     planar_fringe(optics, coupling_, mesh_, k0, raise, pair, T(0.0), T(0.0));
     optics.column->freeze();
     const ConeView<T> cone(scene_, value_inside);
-    const FringeCentre centre{lane(plain(cone.center_x), 0), lane(plain(cone.center_y), 0)};
-    table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places, moves, centre, [&](const P& column, const P& row) {
+    table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places, [&](const P& column, const P& row) {
       const auto t = cone.at(column, row);
       return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
     });
-    if (left_to_rays_ || !table_.complete())
-      table_.keep_all_fields();
+    means_are_averaged_ = !left_to_rays_ && table_.complete();
+    if (means_are_averaged_)
+      table_.average_means();
     else
-      means_are_averaged_ = table_.average_means();
+      table_.keep_all_fields();
   }
   S intensity_of(const Mat2<S>& sample) const {
     const Mat2<S> j = compensator_ ? *compensator_ * sample : sample;
@@ -281,6 +284,7 @@ class PlanarModel final : public PixelModel<S> {
   bool left_to_rays_;  ///< some of the picture
   bool means_are_averaged_ = false;
   FringeTable<S> table_;
+  std::array<std::optional<FringeFlow>, ScalarTraits<S>::derivatives> flows_{};  ///< of S's derivatives
   S constant_;
 };
 

@@ -66,7 +66,7 @@ P load_lanes(const double* x) {
     return *x;
 }
 
-/// load_lanes(x + shift), shift = 0, 1 or 2 and x at a register's boundary: two loads for all three, none across a cache line's end.
+/// load_lanes(x + shift), shift = 0 to 4 and x at a register's boundary: two loads for all of them, none across a cache line's end.
 template <class P>
 BIREFIT_INLINE P load_shifted(const double* x, int shift) {
 #ifdef __AVX512F__
@@ -74,7 +74,12 @@ BIREFIT_INLINE P load_shifted(const double* x, int shift) {
     const __m512i here = _mm512_load_si512(x);
     if (shift == 0) return _mm512_castsi512_pd(here);
     const __m512i next = _mm512_load_si512(x + kLanes);
-    return _mm512_castsi512_pd(shift == 1 ? _mm512_alignr_epi64(next, here, 1) : _mm512_alignr_epi64(next, here, 2));
+    switch (shift) {
+      case 1: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 1));
+      case 2: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 2));
+      case 3: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 3));
+      default: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 4));
+    }
   }
 #endif
   return load_lanes<P>(x + shift);
@@ -142,8 +147,7 @@ BIREFIT_INLINE void store(const S& value, const std::array<double*, N>& out, int
     for (int j = 1; j < planes; ++j) store_lanes(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)], first, count);
 }
 
-/// samples_at() of one row of the picture with a rim of one pixel around it (row 0 is the rim). Rings of equal samples
-/// are painted from the inside out; a root a ring and row instead of one a pixel.
+/// samples_at() of a part of one row of the picture. Rings of equal samples are painted from the inside out; a root a ring and row instead of one a pixel.
 class SampleRings {
  public:
   explicit SampleRings(const RenderPlan& plan) : center_x_(plan.sampling_center_x_px), center_y_(plan.sampling_center_y_px) {
@@ -152,9 +156,9 @@ class SampleRings {
       if (plan.samples[i] != plan.samples[i - 1])
         rings_.push_back({static_cast<double>(i) * plan.sampling_bin_px, static_cast<std::uint8_t>(plan.samples[i])});
   }
-  void fill(int row, std::uint8_t* out, int width) const {
+  void fill(int row, int first_column, std::uint8_t* out, int width) const {
     std::fill(out, out + width, rings_[0].samples);
-    const double dy = row - 1.0 - center_y_, middle = center_x_ + 1, w = width;
+    const double dy = row - center_y_, middle = center_x_ - first_column, w = width;
     for (std::size_t i = 1; i < rings_.size(); ++i) {
       const double square = rings_[i].radius * rings_[i].radius - dy * dy, half = square > 0 ? std::sqrt(square) : 0;
       const int left = static_cast<int>(std::clamp(std::floor(middle - half) + 1, 0.0, w));
@@ -173,19 +177,25 @@ class SampleRings {
   std::vector<Ring> rings_;
 };
 
-/// Which points of a row are needed: one-sample pixels and their eight neighbours. `row` on a picture with a rim.
+/// Which points of a row are needed: one-sample pixels and their neighbours, `reach` pixels around them.
 class NeededPoints {
  public:
-  /// up, here, down: samples of three rows, w places each.
-  void find(const std::uint8_t* up, const std::uint8_t* here, const std::uint8_t* down, int w) {
+  /// samples(r): those of row r, -reach to reach, w places each.
+  template <class Samples>
+  void find(int reach, const Samples& samples, int w) {
+    const std::uint8_t* here = samples(0);
     all_ = std::all_of(here, here + w, [](std::uint8_t n) { return n == 1; });
     if (all_) return;
-    const std::size_t size = static_cast<std::size_t>(w);
-    near_.assign(size + 2, 0);
-    flags_.resize(size);
+    const std::size_t size = static_cast<std::size_t>(w), margin = static_cast<std::size_t>(reach);
+    near_.assign(size + 2 * margin, 0);
+    flags_.assign(size, 0);
     std::uint8_t *near = near_.data(), *flags = flags_.data();
-    for (std::size_t c = 0; c < size; ++c) near[c + 1] = static_cast<std::uint8_t>((up[c] == 1) | (here[c] == 1) | (down[c] == 1));
-    for (std::size_t c = 0; c < size; ++c) flags[c] = static_cast<std::uint8_t>(near[c] | near[c + 1] | near[c + 2]);
+    for (int r = -reach; r <= reach; ++r) {
+      const std::uint8_t* n = samples(r);
+      for (std::size_t c = 0; c < size; ++c) near[c + margin] |= n[c] == 1;
+    }
+    for (std::size_t shift = 0; shift <= 2 * margin; ++shift)
+      for (std::size_t c = 0; c < size; ++c) flags[c] |= near[c + shift];
   }
   bool any(int first, int count) const {
     if (all_) return true;
@@ -198,24 +208,27 @@ class NeededPoints {
   std::vector<std::uint8_t> near_, flags_;
 };
 
-/// What a thread works on: a band of rows with one more on either side, r = 0 the row above the band. Point values of the last three
-/// rows are at row(field * planes + plane, r), each with width + 2 places and more up to a whole number of lanes; one field, the intensity, or
+/// What a thread works on: a band of rows with kRim more on either side. Rows are counted from the band's first, columns from the picture's rim. Point values of
+/// the last rows are at row(field * planes + plane, r), with room up to a whole number of lanes; one field, the intensity, or
 /// with plan.fringe_means the four of a FringePoint.
+template <int kRim>
 class Band {
  public:
   /// Many rows, so that few are computed twice; few, so that threads end together.
   static constexpr int kRows = 25;
-  void resize(int width, int planes) {
-    wide_ = (static_cast<std::size_t>(width) + 2 + kLanes - 1) / kLanes * kLanes;
-    plane_ = wide_ * 3;
+  void resize(int width, int planes, int reach) {
+    held_ = 2 * reach + 1;
+    wide_ = (static_cast<std::size_t>(width) + 2 * kRim + kLanes - 1) / kLanes * kLanes;
+    plane_ = wide_ * static_cast<std::size_t>(held_);
     points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes) + 2 * kLanes));
-    samples_.resize(wide_ * (kRows + 4));
+    samples_.resize(wide_ * (kRows + 4 * kRim));
   }
-  double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(r % 3) * wide_; }
-  /// Samples of row r, from -1 (two above the band) on, of the picture with its rim.
-  std::uint8_t* samples(int r) { return samples_.data() + static_cast<std::size_t>(r + 1) * wide_; }
+  double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>((r + held_) % held_) * wide_; }
+  /// Samples of row r, from -2 kRim on.
+  std::uint8_t* samples(int r) { return samples_.data() + static_cast<std::size_t>(r + 2 * kRim) * wide_; }
 
  private:
+  int held_ = 0;
   std::size_t wide_ = 0, plane_ = 0;
   std::vector<double, xsimd::aligned_allocator<double, 64>> points_;
   std::vector<std::uint8_t> samples_;
@@ -228,13 +241,16 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
                    int threads, const std::vector<Image*>& images) {
   const Values<S> value(theta, active);
   std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
-  const int w = scene.view.width, h = scene.view.height, wide = w + 2, planes = static_cast<int>(active.size()) + 1;
-  constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives;
+  // Flows read two pixels beyond (fringe.h).
+  constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives, kRim = kPlanes > 1 ? FringeBlocks::kRim : 1;
+  using Band = Band<kRim>;
+  const int w = scene.view.width, h = scene.view.height, wide = w + 2 * kRim, planes = static_cast<int>(active.size()) + 1;
   using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
   model->tabulate(PixelModel<S>::Wanted::picture, threads);
   const bool in_phase = model->in_phase(), averaged = model->means_are_averaged();
   std::array<FringeFields, static_cast<std::size_t>(kPlanes)> fields_of{};
   for (int p = 0; p < kPlanes; ++p) fields_of[static_cast<std::size_t>(p)] = model->fringe_fields(p);
+  const int reach = std::any_of(fields_of.begin(), fields_of.end(), [](const FringeFields& f) { return f.flow.has_value(); }) ? kRim : 1;
   const SampleRings rings(plan);
   parallel_for(planes, threads, [&](int p) {
     Image& image = *images[static_cast<std::size_t>(p)];
@@ -252,27 +268,27 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
     thread_local NeededPoints needed;
     const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
-    band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes);
-    for (int r = -1; r <= rows + 2; ++r) rings.fill(std::clamp(top + r, 0, h + 1), band.samples(r), wide);
+    band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes, reach);
+    for (int r = -2 * reach; r < rows + 2 * reach; ++r) rings.fill(std::clamp(top + r, -reach, h - 1 + reach), -kRim, band.samples(r), wide);
     if (model->has_edge()) {
       thread_local EdgeMarks marks;
-      marks.look(*model, top - 2, rows + 4, -1, wide);
-      for (int r = -1; r <= rows + 2; ++r) marks.mark(r + 1, band.samples(r));
+      marks.look(*model, top - 2 * reach, rows + 4 * reach, -kRim, wide);
+      for (int r = -2 * reach; r < rows + 2 * reach; ++r) marks.mark(r + 2 * reach, band.samples(r));
     }
     FringeScratch scratch;
     const auto compute = [&](int r) {
-      needed.find(band.samples(r - 1), band.samples(r), band.samples(r + 1), wide);
+      needed.find(reach, [&](int k) { return band.samples(r + k); }, wide);
       std::array<double*, static_cast<std::size_t>(4 * kPlanes)> fields;
       for (int c0 = 0; c0 < wide; c0 += kStep) {
         if (plan.fringe_means) {
           for (int p = 0; p < 4 * kPlanes; ++p) fields[static_cast<std::size_t>(p)] = band.row(p, r) + c0;
-          if (const int run = model->fringe_run(c0 - 1, top + r - 1.0, wide - c0, scratch, fields.data()); run > 0) {
+          if (const int run = model->fringe_run(c0 - kRim, top + r, wide - c0, scratch, fields.data()); run > 0) {
             c0 += run - kStep;
             continue;
           }
         }
         if (!needed.any(c0, std::min(kStep, wide - c0))) continue;
-        const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0), row(top + r - 1.0);
+        const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0 * kRim), row(static_cast<double>(top + r));
         const auto put = [&](const S& v, int field) {
           Targets out;
           for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
@@ -295,23 +311,35 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       };
       if (plan.fringe_means) {
         // Where rows begin is asked for once: a pack reads dozens of them.
-        std::array<std::array<const double*, 3>, static_cast<std::size_t>(4 * kPlanes)> from;
+        std::array<std::array<const double*, 2 * kRim + 1>, static_cast<std::size_t>(4 * kPlanes)> from;
         for (std::size_t p = 0; p < from.size(); ++p)
-          for (int j = 0; j < 3; ++j) from[p][static_cast<std::size_t>(j)] = band.row(static_cast<int>(p), r + j);
+          for (int j = -kRim; j <= kRim; ++j) from[p][static_cast<std::size_t>(j + kRim)] = band.row(static_cast<int>(p), r + j);
+        const PlainOf<S> row(static_cast<double>(top + r));
         const Targets to = targets(0);
         for (int c0 = 0; c0 < w; c0 += kStep) {
           using P = PlainOf<S>;
-          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_shifted<P>(from[static_cast<std::size_t>(field * kPlanes + plane)][static_cast<std::size_t>(j)] + c0, i); };
+          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_shifted<P>(from[static_cast<std::size_t>(field * kPlanes + plane)][static_cast<std::size_t>(j + kRim)] + c0, i + kRim); };
           const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, to[static_cast<std::size_t>(plane)] + c0, 0, std::min(kStep, w - c0)); };
-          const auto fields = [&](int plane) BIREFIT_INLINE_LAMBDA { return fields_of[static_cast<std::size_t>(plane)]; };
+          const P column = load_lanes<P>(kCount.data()) + P(static_cast<double>(c0));
+          const auto means = [&]<bool kQuadrature, bool kFlows>() BIREFIT_INLINE_LAMBDA {
+            fringe_means<kQuadrature, kFlows, kPlanes, P>(planes, averaged, column, row, fields_of.data(), load, put);
+          };
+          if constexpr (kRim > 1)
+            if (reach > 1) {
+              if (in_phase)
+                means.template operator()<false, true>();
+              else
+                means.template operator()<true, true>();
+              continue;
+            }
           if (in_phase)
-            fringe_means<false, kPlanes, P>(planes, averaged, load, fields, put);
+            means.template operator()<false, false>();
           else
-            fringe_means<true, kPlanes, P>(planes, averaged, load, fields, put);
+            means.template operator()<true, false>();
         }
       } else {
         for (int p = 0; p < planes; ++p) {
-          const double *up = band.row(p, r) + 1, *here = band.row(p, r + 1) + 1, *down = band.row(p, r + 2) + 1;
+          const double *up = band.row(p, r - 1) + kRim, *here = band.row(p, r) + kRim, *down = band.row(p, r + 1) + kRim;
           double* out = images[static_cast<std::size_t>(p)]->row(top + r);
           // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
           for (int c = 0; c < w; ++c)
@@ -319,7 +347,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
         }
       }
       // Pixels of several samples, packed into lanes by their number.
-      const std::uint8_t* n = band.samples(r + 1) + 1;
+      const std::uint8_t* n = band.samples(r) + kRim;
       if (std::all_of(n, n + w, [](std::uint8_t k) { return k == 1; })) return;
       std::array<std::array<int, kLanes>, 9> waiting;
       std::array<int, 9> count{};
@@ -347,9 +375,9 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       for (std::size_t most = 2; most < 9; ++most)
         if (count[most] > 0) flush(most);
     };
-    for (int r = 0; r < rows + 2; ++r) {
+    for (int r = -reach; r < rows + reach; ++r) {
       compute(r);
-      if (r >= 2) finish(r - 2);
+      if (r >= reach) finish(r - reach);
     }
     if (symmetry == Symmetry::none) return;
     for (int row = top; row < top + rows; ++row)

