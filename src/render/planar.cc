@@ -196,8 +196,10 @@ class PlanarModel final : public PixelModel<S> {
   /// With the medium's samples remembered, from the first ray on: a picture that is all tabulated has none.
   const PlanarOptics<S>& optics() const {
     std::call_once(first_ray_, [&] {
-      planar_jones(optics_, method_, mesh_, S(0.0), S(0.0));
-      if (has_fringes_) planar_fringe(optics_, coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, S(0.0), S(0.0));
+      if (has_fringes_)
+        planar_fringe(optics_, coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, S(0.0), S(0.0));
+      else
+        planar_jones(optics_, method_, mesh_, S(0.0), S(0.0));
       optics_.column->freeze();
     });
     return optics_;
@@ -247,11 +249,19 @@ class PlanarModel final : public PixelModel<S> {
     Raise<T, R> raise;
     if constexpr (!std::is_same_v<R, T>)
       for (std::size_t j = 0; j < inside.size(); ++j) raise.to[j] = static_cast<std::size_t>(std::find(changing.begin(), changing.end(), inside[j]) - changing.begin());
-    const PlanarOptics<T> optics = planar_optics(scene_, value_inside);
     const Polarizers<R> pair = polarizers(scene_, value);
     const R k0 = wavenumber_per_um(scene_, value);
-    planar_fringe(optics, coupling_, mesh_, k0, raise, pair, T(0.0), T(0.0));
-    optics.column->freeze();
+    std::optional<PlanarOptics<T>> own;
+    const PlanarOptics<T>& optics = [&]() -> const PlanarOptics<T>& {
+      if constexpr (std::is_same_v<T, S> && ScalarTraits<S>::derivatives == 0) {
+        return this->optics();
+      } else {
+        own = planar_optics(scene_, value_inside);
+        planar_fringe(*own, coupling_, mesh_, k0, raise, pair, T(0.0), T(0.0));
+        own->column->freeze();
+        return *own;
+      }
+    }();
     const ConeView<T> cone(scene_, value_inside);
     table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places, [&](const P& column, const P& row) {
       const auto t = cone.at(column, row);
