@@ -189,7 +189,9 @@ class Propagation {
       for (Plane& plane : field.work) plane.resize(n_);
     const std::size_t blocks = blocks_ * static_cast<std::size_t>(grid.ny) * kFields * kLanes;
     screen_.resize(blocks * kScreens);
-    for (auto& table : oblique_) table.assign(blocks * kObliques, 0.0);
+    for (Table& table : oblique_) table.resize(blocks * kObliques);
+    screen_is_hosts_.resize(blocks_ * static_cast<std::size_t>(grid.ny));
+    for (auto& halves : hosts_halves_) halves.assign(blocks_ * static_cast<std::size_t>(grid.ny), 0);
     const auto wavenumbers = [&](int n, double tilt) {
       std::vector<double> k(static_cast<std::size_t>(n));
       for (int m = 0; m < n; ++m) k[static_cast<std::size_t>(m)] = tilt + (n == 1 ? 0.0 : 2 * std::numbers::pi / (n * g_.step_um) * (m < n - m ? m : m - n));
@@ -221,6 +223,14 @@ class Propagation {
     host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
     host_slab_ = slab_point(g_.layers, h_, light.k0_per_um, g_.n_ref, [&](int) { return host_; });
     felt_.assign(static_cast<std::size_t>(g_.ny) * kFields, 0);
+    put_screen(host_slab_, host_screen_.data(), felt_.data());
+    for (int halves = 0; halves < 4; ++halves) {
+      double* to = host_oblique_[static_cast<std::size_t>(halves)].data();
+      std::fill_n(to, kObliques * kFields * kLanes, 0.0);
+      for (int half = 0; half < 2; ++half)
+        if (halves >> half & 1) put_oblique(host_slab_.half[half], to, to, felt_.data());
+    }
+    for (int f = 0; f < kFields; ++f) host_feels_[static_cast<std::size_t>(f)] = f == 0 || felt_[static_cast<std::size_t>(f)];
     awake_[0] = 1;
     for (int f = 1; f < kFields; ++f)
       awake_[static_cast<std::size_t>(f)] = part(light.k0_per_um, f) != 0 || part(incident_[0], f) != Z(0) || part(incident_[1], f) != Z(0);
@@ -236,11 +246,10 @@ class Propagation {
     run_together(threads, [&](int t) {
       const Crew crew{barrier, t, threads};
       for (int slab = 0; slab <= g_.slabs; ++slab) {
-        const Table& table = oblique_[slab % 2];
         if (slab < g_.slabs) crew.each(g_.ny, [&](int row) { sample_row(slab, row); });
         if (t == 0) wake();
         crew.barrier.arrive_and_wait();
-        for (int order = 1; order <= g_.order; ++order) oblique(crew, table, order);
+        for (int order = 1; order <= g_.order; ++order) oblique(crew, slab, order);
         if (t == 0) incident_oblique(slab);
         if (slab < g_.slabs) pass_screen(crew);
         if (t == 0 && slab < g_.slabs) pass_incident();
@@ -303,14 +312,13 @@ class Propagation {
     for (std::size_t k = 0; k < felt_.size(); ++k) awake_[k % kFields] |= felt_[k];
   }
   bool asleep(int f) const { return !awake_[static_cast<std::size_t>(f)]; }
+  bool host_feels(int f) const { return host_feels_[static_cast<std::size_t>(f)]; }
 
   /// Of one piece.
   static Pack entry(const double* piece, int quantity, int field) {
     return Pack::load_aligned(piece + (quantity * kFields + field) * kLanes);
   }
-  std::size_t piece(int row, std::size_t first, int quantities) const {
-    return (static_cast<std::size_t>(row) * blocks_ + first / kLanes) * static_cast<std::size_t>(quantities * kFields * kLanes);
-  }
+  std::size_t piece(int row, std::size_t first) const { return static_cast<std::size_t>(row) * blocks_ + first / kLanes; }
 
   void sample_row(int slab, int row) {
     alignas(64) double x[kLanes];
@@ -322,36 +330,63 @@ class Propagation {
       const Pack place = Pack::load_aligned(x);
       bool host = true;
       for (int l = 0; l < g_.layers && host; ++l) host = !medium_.reaches(place, y, depth(l));
+      const std::size_t n = static_cast<std::size_t>(row) * blocks_ + static_cast<std::size_t>(i / kLanes);
+      screen_is_hosts_[n] = host;
       if (host)
-        keep(host_slab_, slab, row, i);
+        keep_host(slab, n);
       else
-        keep(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref, [&](int l) { return medium_.at(place, y, depth(l)); }), slab, row, i);
+        keep(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref, [&](int l) { return medium_.at(place, y, depth(l)); }), slab, row, n);
     }
   }
-  void keep(const SlabPoint<S>& p, int slab, int row, int first) {
+  /// Most of the box is host, the same at all points: what is kept of it is that it is host, lest tables be read that no cache holds.
+  void keep_host(int slab, std::size_t n) {
+    for (int half = 0; half < 2; ++half) {
+      char& halves = hosts_halves_[(slab + half) % 2][n];
+      if (half == 1)
+        halves = 2;
+      else if (halves != kOwn)
+        halves |= 1;
+      else
+        put_oblique(host_slab_.half[0], oblique_piece(slab, n), oblique_piece(slab, n), nullptr);
+    }
+  }
+  void keep(const SlabPoint<S>& p, int slab, int row, std::size_t n) {
     char* felt = felt_.data() + row * kFields;
-    const auto put = [&](double* to, int quantity, const S& x, bool add) {
-      for (int f = 0; f < kFields; ++f) {
-        if (f > 0 && !felt[f]) felt[f] = xsimd::any(lanes(x, f) != Pack(0.0));
-        double* out = to + (quantity * kFields + f) * kLanes;
-        const Pack all = add ? Pack::load_aligned(out) + lanes(x, f) : lanes(x, f);
-        all.store_aligned(out);
-      }
-    };
-    double* screen = screen_.data() + piece(row, static_cast<std::size_t>(first), kScreens);
+    put_screen(p, screen_.data() + n * kScreens * kPiece, felt);
+    for (int half = 0; half < 2; ++half) {
+      char& halves = hosts_halves_[(slab + half) % 2][n];
+      double* to = oblique_piece(slab + half, n);
+      put_oblique(p.half[half], half == 0 ? oblique_at_piece(slab, n) : host_oblique_[0].data(), to, felt);
+      halves = kOwn;
+    }
+  }
+  /// What is known of V' about a slab's entry there.
+  const double* oblique_at_piece(int slab, std::size_t n) const {
+    const char halves = hosts_halves_[slab % 2][n];
+    return halves == kOwn ? oblique_[slab % 2].data() + n * kObliques * kPiece : host_oblique_[static_cast<std::size_t>(halves)].data();
+  }
+  double* oblique_piece(int slab, std::size_t n) { return oblique_[slab % 2].data() + n * kObliques * kPiece; }
+
+  void put(double* to, const S& x, const double* before, char* felt) const {
+    for (int f = 0; f < kFields; ++f) {
+      if (f > 0 && felt && !felt[f]) felt[f] = xsimd::any(lanes(x, f) != Pack(0.0));
+      const Pack all = before ? Pack::load_aligned(before + f * kLanes) + lanes(x, f) : lanes(x, f);
+      all.store_aligned(to + f * kLanes);
+    }
+  }
+  void put_screen(const SlabPoint<S>& p, double* to, char* felt) const {
     for (int a = 0; a < 2; ++a)
       for (int b = 0; b < 2; ++b) {
-        put(screen, 4 * a + 2 * b, p.screen[a][b].re, false);
-        put(screen, 4 * a + 2 * b + 1, p.screen[a][b].im, false);
+        put(to + (4 * a + 2 * b) * kPiece, p.screen[a][b].re, nullptr, felt);
+        put(to + (4 * a + 2 * b + 1) * kPiece, p.screen[a][b].im, nullptr, felt);
       }
-    for (int half = 0; half < 2; ++half) {
-      double* table = oblique_[(slab + half) % 2].data() + piece(row, static_cast<std::size_t>(first), kObliques);
-      const ObliquePoint<S>& o = p.half[half];
-      const auto set = [&](int quantity, const S& x) { put(table, quantity, x, half == 0); };
-      set(kWalk, o.v[0]), set(kWalk + 1, o.v[1]), set(kSd, o.sd), set(kSc, o.sc);
-      for (int ij = 0; ij < 3; ++ij)
-        for (int ab = 0; ab < 3; ++ab) set(kD + 3 * ij + ab, o.d[ij][ab]);
-    }
+  }
+  /// to <- before + o
+  void put_oblique(const ObliquePoint<S>& o, const double* before, double* to, char* felt) const {
+    const auto set = [&](int quantity, const S& x) { put(to + quantity * kPiece, x, before + quantity * kPiece, felt); };
+    set(kWalk, o.v[0]), set(kWalk + 1, o.v[1]), set(kSd, o.sd), set(kSc, o.sc);
+    for (int ij = 0; ij < 3; ++ij)
+      for (int ab = 0; ab < 3; ++ab) set(kD + 3 * ij + ab, o.d[ij][ab]);
   }
 
   /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the f-th coefficients: adds what
@@ -373,7 +408,7 @@ class Propagation {
   }
 
   /// term <- (i / order) V' term (of order 1: of a itself), a <- a + term.
-  void oblique(const Crew& crew, const Table& table, int order) {
+  void oblique(const Crew& crew, int slab, int order) {
     const std::size_t nx = static_cast<std::size_t>(g_.nx);
     crew.each(6 * kFields, [&](int job) {
       if (asleep(job / 6)) return;
@@ -396,7 +431,9 @@ class Propagation {
     });
     crew.each(g_.ny, [&](int row) {
       in_packs(nx, [&](std::size_t first, int count) {
-        const double* c = table.data() + piece(row, first, kObliques);
+        const std::size_t n = piece(row, first);
+        const double* c = oblique_at_piece(slab, n);
+        const bool own_point = hosts_halves_[slab % 2][n] == kOwn;
         const std::size_t i = static_cast<std::size_t>(row) * nx + first;
         Lanes in[6];
         for (int q = 0; q < 6; ++q) in[q] = load(fields_[0].work[q].data() + i, count);
@@ -406,7 +443,7 @@ class Propagation {
           Lanes own[6], out[6];
           for (int q = 0; q < 6; ++q) own[q] = load(field.work[q].data() + i, count), out[q] = {Pack(0.0), Pack(0.0)};
           oblique_at(c, 0, own, out);
-          if (f > 0) oblique_at(c, f, in, out);
+          if (f > 0 && (own_point || host_feels(f))) oblique_at(c, f, in, out);
           for (int q = 0; q < 6; ++q) store(out[q], field.work[q].data() + i, count);
         }
       });
@@ -476,7 +513,9 @@ class Propagation {
     const double over = 1.0 / static_cast<double>(n_);  // of the transform there and back
     crew.each(g_.ny, [&](int row) {
       in_packs(nx, [&](std::size_t first, int count) {
-        const double* c = screen_.data() + piece(row, first, kScreens);
+        const std::size_t n = piece(row, first);
+        const bool own_point = !screen_is_hosts_[n];
+        const double* c = own_point ? screen_.data() + n * kScreens * kPiece : host_screen_.data();
         const std::size_t i = static_cast<std::size_t>(row) * nx + first;
         const Pack frame = frame_y_[static_cast<std::size_t>(row)] * Pack::load_unaligned(frame_x_.data() + first);
         const auto at_point = [&](int f, int a) { return Pack(over) * load(fields_[static_cast<std::size_t>(f)].a[a].data() + i, count); };
@@ -487,7 +526,7 @@ class Propagation {
           const Lanes own_x = at_point(f, 0), own_y = at_point(f, 1);
           for (int a = 0; a < 2; ++a) {
             Lanes r = screen(a, 0, 0) * own_x + screen(a, 1, 0) * own_y;
-            if (f > 0) r = r + screen(a, 0, f) * x + screen(a, 1, f) * y;
+            if (f > 0 && (own_point || host_feels(f))) r = r + screen(a, 0, f) * x + screen(a, 1, f) * y;
             const Lanes incident{Pack(inc[f][a].real()), Pack(inc[f][a].imag())};
             store(incident + frame * (r - incident), fields_[static_cast<std::size_t>(f)].a[a].data() + i, count);
           }
@@ -561,8 +600,15 @@ class Propagation {
   std::array<Field, static_cast<std::size_t>(kFields)> fields_;
   std::vector<char> felt_;  ///< [row][field]: some point of the row depends on the parameter
   std::array<char, static_cast<std::size_t>(kFields)> awake_{};
+  static constexpr std::size_t kPiece = kFields * kLanes;  ///< numbers of a quantity
+  static constexpr char kOwn = 4;
   Table screen_;      ///< of the slab
   Table oblique_[2];  ///< of V' about the slab's entry and exit, by turns
+  std::vector<char> screen_is_hosts_, hosts_halves_[2];  ///< [row][piece]: a piece is host_screen_; which halves of host_oblique_ it is, or kOwn
+  alignas(64) std::array<double, kScreens * kPiece> host_screen_;
+  struct alignas(64) HostPiece : std::array<double, kObliques * kPiece> {};
+  std::array<HostPiece, 4> host_oblique_;  ///< no half, that behind an interface (1), that before it (2), both
+  std::array<char, static_cast<std::size_t>(kFields)> host_feels_{};
   std::vector<double> kx_, ky_, kept_;
   Plane half_step_;
   std::vector<double> half_step_slope_;
