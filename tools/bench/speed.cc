@@ -61,14 +61,18 @@ using namespace birefit;
 
 namespace {
 
-/// Of one call, in a row of them that lasts some ten milliseconds: a fit makes pictures one after the other, and threads that slept
-/// take a tenth of the shortest picture to wake.
+/// Of one call, in a row of them that lasts some ten milliseconds and follows another one: a fit makes pictures one after the other, and a core that
+/// had nothing to do takes as long to wake as the shortest picture.
 double seconds_of(const std::function<void()>& work) {
+  const auto since = [](auto start) { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  const auto first = std::chrono::steady_clock::now();
+  work();
+  if (const double seconds = since(first); seconds >= 0.01) return seconds;
   int calls = 0;
   double seconds = 0;
   for (const auto start = std::chrono::steady_clock::now(); seconds < 0.01; ++calls) {
     work();
-    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    seconds = since(start);
   }
   return seconds / calls;
 }
