@@ -64,6 +64,35 @@ double tail(const double* values) {
     }
   return worst;
 }
+/// Largest derivative of this order along either coordinate at the points, of values there.
+template <int kPoints>
+double largest_derivative(const double* values, int order) {
+  constexpr std::size_t n = static_cast<std::size_t>(kPoints);
+  using Weights = std::array<std::array<double, n>, n>;  // [at][point]
+  static const std::array<Weights, 4> weights = [] {
+    const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();
+    std::array<Weights, 4> w{};
+    for (std::size_t m = 0; m < 4; ++m)
+      for (std::size_t at = 0; at < n; ++at)
+        for (std::size_t k = 0; k < n; ++k)
+          for (std::size_t power = m; power < n; ++power) {
+            double term = rule.to_powers[power][k] * std::pow(rule.x[at], static_cast<double>(power - m));
+            for (std::size_t fall = 0; fall < m; ++fall) term *= static_cast<double>(power - fall);
+            w[m][at][k] += term;
+          }
+    return w;
+  }();
+  const Weights& w = weights[static_cast<std::size_t>(order)];
+  double largest = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (const auto& [start, stride] : {std::pair{i * n, std::size_t{1}}, {i, n}})
+      for (std::size_t at = 0; at < n; ++at) {
+        double sum = 0;
+        for (std::size_t k = 0; k < n; ++k) sum += w[at][k] * values[start + k * stride];
+        largest = std::max(largest, std::abs(sum));
+      }
+  return largest;
+}
 /// Values at kPoints x kPoints Chebyshev points, [second coordinate][first], to the coefficients of their powers, in the same order.
 template <int kPoints>
 void to_powers(const double* values, double* powers) {

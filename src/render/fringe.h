@@ -31,6 +31,12 @@ struct FringeFields {
   bool has(std::size_t field) const { return own >> field & 1; }
 };
 
+/// What a table makes known of a picture's fringes.
+struct FringeTraits {
+  bool averaged = false;  ///< the mean field is its mean over pixels already
+  bool even = false;      ///< amplitude, mean and quadrature have differences over three pixels for slopes
+};
+
 /// Moments of e^{i g x} over x in [-1/2, 1/2]: m0 = int e^{igx} = sinc(g/2), int x e^{igx} = -i m0', int x^2 e^{igx} =
 /// -m0''. With s(q) = sin(sqrt q)/sqrt q, q = g^2/4: m0' = (g/2) s', and 4 q s'' + 6 s' + s = 0 gives m0'' = -s' - s/4,
 /// m0''' = -(g/2) (s'' + s'/4).
@@ -128,14 +134,14 @@ struct ThirdDerivatives {
 /// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact in the
 /// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others, of kMostPlanes at most, their
 /// derivatives by parameters; fields are numbered as in FringePoint, row and column from the middle pixel, whose place in the picture is (column, row). put(plane, mean). kQuadrature = false: it
-/// is zero and not read. averaged: the mean field is so over pixels already. fields[plane]: what of them a parameter moves, the others are not read; kFlows = false: none has a flow. What a change of any
+/// is zero and not read. fields[plane]: what of them a parameter moves, the others are not read; kFlows = false: none has a flow. What a change of any
 /// of the nine points does to the mean is found once, backwards through the formula, and serves all derivatives; flows read two pixels further.
 template <bool kQuadrature, bool kFlows, int kMostPlanes, class P, class Load, class Put>
-BIREFIT_INLINE void fringe_means(int planes, bool averaged, const P& column, const P& row, const FringeFields* fields, const Load& load, const Put& put) {
+BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P& column, const P& row, const FringeFields* fields, const Load& load, const Put& put) {
   const auto field = [&load](int plane, int f) BIREFIT_INLINE_LAMBDA { return [&load, plane, f](int j, int i) BIREFIT_INLINE_LAMBDA { return load(plane, f, j, i); }; };
   const auto mean_of = [&](int plane) BIREFIT_INLINE_LAMBDA {
     const auto at = field(plane, 2);
-    if (averaged) return at(0, 0);
+    if (traits.averaged) return at(0, 0);
     return P(1 - 4.0 / 24) * at(0, 0) + P(1.0 / 24) * ((at(0, -1) + at(0, 1)) + (at(-1, 0) + at(1, 0)));
   };
   const NinePoints<P> phase = NinePoints<P>::of(field(0, 1)), amplitude = NinePoints<P>::of(field(0, 0));
@@ -189,8 +195,7 @@ BIREFIT_INLINE void fringe_means(int planes, bool averaged, const P& column, con
   const NinePoints<P> by_phase{-(re * s + im * c), by.zero * one_x + by.one_x * xx + by.one_y * xy + by.xx * xxx + by.yy * xyy + by.xy * xxy,
                                by.zero * one_y + by.one_x * xy + by.one_y * yy + by.xx * xxy + by.yy * yyy + by.xy * xyy, xx * half_bend, xy * by.bend, yy * half_bend};
 
-  // Nine points that are carried along change by their quadratic's derivatives and by third ones, of which they take a sixth for slope. Where all of a picture
-  // is so smooth that its mean could be averaged, only the phase's third ones matter: a few parts in a million are the others'.
+  // Nine points that are carried along change by their quadratic's derivatives and by third ones, of which they take a sixth for slope.
   [[maybe_unused]] P by_column(0.0), by_row(0.0), by_growth(0.0);
   if constexpr (kFlows) {
     const auto carry = [&](const NinePoints<P>& f, const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
@@ -210,15 +215,12 @@ BIREFIT_INLINE void fringe_means(int planes, bool averaged, const P& column, con
     carry(amplitude, by_amplitude);
     if constexpr (kQuadrature) carry(quadrature, by_quadrature);
     const NinePoints<P> mean = NinePoints<P>::of(field(0, 2));
-    if (averaged) {
-      by_column = by_column + mean.x;
-      by_row = by_row + mean.y;
-      by_growth = by_growth + P(1.0 / 12) * (mean.xx + mean.yy);  // of what a pixel sees of the curvature
-    } else {
-      const P none(0.0), share(1.0 / 24);
-      const NinePoints<P> by_mean{P(1.0), none, none, share, none, share};
-      carry(mean, by_mean);
-      carry_third(2, mean, by_mean);
+    by_column = by_column + mean.x;
+    by_row = by_row + mean.y;
+    by_growth = by_growth + P(1.0 / 12) * (mean.xx + mean.yy);  // what a pixel sees of the curvature
+    if (!traits.even) {
+      const P none(0.0), share(traits.averaged ? 0.0 : 1.0 / 24);
+      carry_third(2, mean, {P(1.0), none, none, share, none, share});
       carry_third(0, amplitude, by_amplitude);
       if constexpr (kQuadrature) carry_third(3, quadrature, by_quadrature);
     }
@@ -261,7 +263,7 @@ S fringe_mean(const FringePoint<S> (&p)[3][3]) {
   };
   constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
   static constexpr std::array<FringeFields, kPlanes> kAll{};
-  fringe_means<kQuadrature, false, kPlanes, P>(kPlanes, false, P(0.0), P(0.0), kAll.data(), load, [&mean](int plane, const P& value) {
+  fringe_means<kQuadrature, false, kPlanes, P>(kPlanes, {}, P(0.0), P(0.0), kAll.data(), load, [&mean](int plane, const P& value) {
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       if (plane > 0) {
         mean.d[static_cast<std::size_t>(plane - 1)] = value;

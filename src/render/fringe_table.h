@@ -84,6 +84,9 @@ class FringeTable {
       const auto largest_of = [&](std::size_t f) { return std::abs(*std::max_element(field(f), field(f) + kRays, [](double a, double b) { return std::abs(a) < std::abs(b); })); };
       const double left = tail<kPoints>(field(0)) + tail<kPoints>(field(2)) + tail<kPoints>(field(3)) + (largest_of(0) + largest_of(3)) * tail<kPoints>(field(1));
       if (!(left <= allowed)) start_[static_cast<std::size_t>(list[i])] = kGone;
+      const auto largest_slope = [&](std::size_t f, int order) { return largest_derivative<kPoints>(field(f), order); };
+      steepest_ = std::max(steepest_, largest_slope(0, 1) + largest_slope(2, 1) + (largest_of(0) + largest_of(3)) * largest_slope(1, 1));
+      most_third_ = std::max(most_third_, largest_slope(0, 3) + largest_slope(2, 3) + largest_slope(3, 3));
     }
     fields_.fill({.own = 0});
     fields_[0] = {};
@@ -154,7 +157,11 @@ class FringeTable {
   /// What changes with derivative plane - 1 of S, fields left out to which no square owes more than rounding of it: run() does not write them.
   FringeFields fields(std::size_t plane) const { return fields_[plane]; }
   /// None is left out, for a picture of which a part is traced.
-  void keep_all_fields() { fields_.fill({}); }
+  void keep_all_fields() {
+    for (const std::size_t d : derivatives_) fields_[d + 1] = {};
+  }
+  /// Of three points in a row, differences give the slope of amplitude and mean to this part of the fringes' largest slope.
+  double slope_error() const { return steepest_ > 0 ? square(2.0 / blocks_.block_px) * most_third_ / (6 * steepest_) : 0; }
   /// All squares that were asked for are there.
   bool complete() const { return std::none_of(start_.begin(), start_.end(), [](int s) { return s == kGone; }); }
 
@@ -242,6 +249,7 @@ class FringeTable {
   std::array<FringeFields, kOut> fields_{};
   std::vector<std::size_t> derivatives_;  ///< of S, one a plane after the first
   std::size_t planes_ = 1;
+  double steepest_ = 0, most_third_ = 0;  ///< first derivative of the fringes, third of amplitude, mean and quadrature, by half a square
   std::vector<double> coefficients_;      ///< [square][field][plane][power of row][power of column]
 };
 

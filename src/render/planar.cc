@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "medium/build.h"
+#include "medium/references.h"
 #include "render/cone_view.h"
 #include "render/fringe_table.h"
 #include "render/planar.h"
@@ -162,7 +163,7 @@ class PlanarModel final : public PixelModel<S> {
     if (tabulated_blocks_.empty()) return {};
     return plane > 0 && flows_[p - 1] ? FringeFields{.own = 0, .flow = flows_[p - 1]} : table_.fields(p);
   }
-  bool means_are_averaged() const override { return means_are_averaged_; }
+  FringeTraits fringe_traits() const override { return traits_; }
   bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
   Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
@@ -175,9 +176,10 @@ class PlanarModel final : public PixelModel<S> {
     if constexpr (ScalarTraits<S>::derivatives > 0)
       for (std::size_t j = 0; j < value_.active().size(); ++j) {
         const int index = value_.active()[j];
-        bool moving = false;
-        for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle}) moving = moving || (ref && ref.index == index);
-        if (moving) {
+        int carries = 0, uses = 0;
+        for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle}) carries += ref && ref.index == index;
+        for_each_ref(scene_, [&](const ParameterRef& ref) { uses += ref.index == index; });
+        if (carries > 0 && carries == uses) {
           const double growth = scene_.view.camera ? 0.0 : lane(cone_->tan_per_px.d[j], 0) / lane(plain(cone_->tan_per_px), 0);
           const auto along = [&](const S& centre) { return -lane(centre.d[j], 0) - growth * lane(plain(centre), 0); };
           flows_[j] = {along(cone_->center_x), along(cone_->center_y), growth};
@@ -267,8 +269,10 @@ class PlanarModel final : public PixelModel<S> {
       const auto t = cone.at(column, row);
       return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
     });
-    means_are_averaged_ = !left_to_rays_ && table_.complete();
-    if (means_are_averaged_)
+    constexpr double kSlopeError = 1e-5;
+    traits_.averaged = !left_to_rays_ && table_.complete();
+    traits_.even = traits_.averaged && table_.slope_error() < kSlopeError;
+    if (traits_.averaged)
       table_.average_means();
     else
       table_.keep_all_fields();
@@ -292,7 +296,7 @@ class PlanarModel final : public PixelModel<S> {
   FringeBlocks blocks_;
   std::vector<std::uint8_t> tabulated_blocks_;
   bool left_to_rays_;  ///< some of the picture
-  bool means_are_averaged_ = false;
+  FringeTraits traits_;
   FringeTable<S> table_;
   std::array<std::optional<FringeFlow>, ScalarTraits<S>::derivatives> flows_{};  ///< of S's derivatives
   S constant_;

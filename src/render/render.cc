@@ -197,6 +197,7 @@ class NeededPoints {
     for (std::size_t shift = 0; shift <= 2 * margin; ++shift)
       for (std::size_t c = 0; c < size; ++c) flags[c] |= near[c + shift];
   }
+  bool all() const { return all_; }
   bool any(int first, int count) const {
     if (all_) return true;
     const auto from = flags_.begin() + first;
@@ -208,28 +209,33 @@ class NeededPoints {
   std::vector<std::uint8_t> near_, flags_;
 };
 
-/// What a thread works on: a band of rows with kRim more on either side. Rows are counted from the band's first, columns from the picture's rim. Point values of
-/// the last rows are at row(field * planes + plane, r), with room up to a whole number of lanes; one field, the intensity, or
-/// with plan.fringe_means the four of a FringePoint.
-template <int kRim>
+/// What a thread works on: a band of rows with `reach` more on either side. Rows are counted from the band's first, columns from the picture's rim, which is as wide as
+/// that of the squares of a table: their runs begin at a register's boundary. Point values of
+/// the last rows are at row(field * planes + plane, r); one field, the intensity, or with plan.fringe_means the four of a FringePoint.
 class Band {
  public:
+  static constexpr int kRim = FringeBlocks::kRim;
   /// Many rows, so that few are computed twice; few, so that threads end together.
   static constexpr int kRows = 25;
   void resize(int width, int planes, int reach) {
     held_ = 2 * reach + 1;
-    wide_ = (static_cast<std::size_t>(width) + 2 * kRim + kLanes - 1) / kLanes * kLanes;
+    used_ = (static_cast<std::size_t>(width) + 2 * kRim + kLanes - 1) / kLanes * kLanes;
+    // A register more, and an odd number of cache lines: rows that begin at the same place of a page push each other out of the cache.
+    constexpr std::size_t kLine = 8;
+    wide_ = ((used_ + kLanes + kLine - 1) / kLine | 1) * kLine;
     plane_ = wide_ * static_cast<std::size_t>(held_);
-    points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes) + 2 * kLanes));
+    points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes)));
     samples_.resize(wide_ * (kRows + 4 * kRim));
   }
   double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>((r + held_) % held_) * wide_; }
+  /// Makes zeros of all of a row that is not computed: what is left of another picture would steer whole registers (PixelMoments). Without `gaps` that is what lies beyond its end.
+  void clear(int plane, int r, bool gaps) { std::fill(row(plane, r) + (gaps ? 0 : used_), row(plane, r) + wide_, 0.0); }
   /// Samples of row r, from -2 kRim on.
   std::uint8_t* samples(int r) { return samples_.data() + static_cast<std::size_t>(r + 2 * kRim) * wide_; }
 
  private:
   int held_ = 0;
-  std::size_t wide_ = 0, plane_ = 0;
+  std::size_t used_ = 0, wide_ = 0, plane_ = 0;
   std::vector<double, xsimd::aligned_allocator<double, 64>> points_;
   std::vector<std::uint8_t> samples_;
 };
@@ -241,15 +247,15 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
                    int threads, const std::vector<Image*>& images) {
   const Values<S> value(theta, active);
   std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
-  // Flows read two pixels beyond (fringe.h).
-  constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives, kRim = kPlanes > 1 ? FringeBlocks::kRim : 1;
-  using Band = Band<kRim>;
+  constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives, kRim = Band::kRim;
   const int w = scene.view.width, h = scene.view.height, wide = w + 2 * kRim, planes = static_cast<int>(active.size()) + 1;
   using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
   model->tabulate(PixelModel<S>::Wanted::picture, threads);
-  const bool in_phase = model->in_phase(), averaged = model->means_are_averaged();
+  const bool in_phase = model->in_phase();
+  const FringeTraits traits = model->fringe_traits();
   std::array<FringeFields, static_cast<std::size_t>(kPlanes)> fields_of{};
   for (int p = 0; p < kPlanes; ++p) fields_of[static_cast<std::size_t>(p)] = model->fringe_fields(p);
+  // Flows read two pixels beyond (fringe.h).
   const int reach = std::any_of(fields_of.begin(), fields_of.end(), [](const FringeFields& f) { return f.flow.has_value(); }) ? kRim : 1;
   const SampleRings rings(plan);
   parallel_for(planes, threads, [&](int p) {
@@ -279,6 +285,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     const auto compute = [&](int r) {
       needed.find(reach, [&](int k) { return band.samples(r + k); }, wide);
       std::array<double*, static_cast<std::size_t>(4 * kPlanes)> fields;
+      if (plan.fringe_means)
+        for (int f = 0; f < 4; ++f) band.clear(f * kPlanes, r, !needed.all());
       for (int c0 = 0; c0 < wide; c0 += kStep) {
         if (plan.fringe_means) {
           for (int p = 0; p < 4 * kPlanes; ++p) fields[static_cast<std::size_t>(p)] = band.row(p, r) + c0;
@@ -292,7 +300,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
         const auto put = [&](const S& v, int field) {
           Targets out;
           for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
-          store(v, out, kPlanes, 0, kStep);  // rows have room: what is left over from another picture would steer whole registers
+          store(v, out, kPlanes, 0, kStep);
         };
         if (plan.fringe_means) {
           const FringePoint<S> v = model->fringe(column, row);
@@ -322,9 +330,9 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
           const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, to[static_cast<std::size_t>(plane)] + c0, 0, std::min(kStep, w - c0)); };
           const P column = load_lanes<P>(kCount.data()) + P(static_cast<double>(c0));
           const auto means = [&]<bool kQuadrature, bool kFlows>() BIREFIT_INLINE_LAMBDA {
-            fringe_means<kQuadrature, kFlows, kPlanes, P>(planes, averaged, column, row, fields_of.data(), load, put);
+            fringe_means<kQuadrature, kFlows, kPlanes, P>(planes, traits, column, row, fields_of.data(), load, put);
           };
-          if constexpr (kRim > 1)
+          if constexpr (kPlanes > 1)
             if (reach > 1) {
               if (in_phase)
                 means.template operator()<false, true>();

@@ -340,15 +340,11 @@ class Propagation {
   }
   /// Most of the box is host, the same at all points: what is kept of it is that it is host, lest tables be read that no cache holds.
   void keep_host(int slab, std::size_t n) {
-    for (int half = 0; half < 2; ++half) {
-      char& halves = hosts_halves_[(slab + half) % 2][n];
-      if (half == 1)
-        halves = 2;
-      else if (halves != kOwn)
-        halves |= 1;
-      else
-        put_oblique(host_slab_.half[0], oblique_piece(slab, n), oblique_piece(slab, n), nullptr);
-    }
+    if (char& halves = hosts_halves_[slab % 2][n]; halves != kOwn)
+      halves |= 1;
+    else
+      put_oblique(host_slab_.half[0], oblique_piece(slab, n), oblique_piece(slab, n), nullptr);
+    hosts_halves_[(slab + 1) % 2][n] = 2;
   }
   void keep(const SlabPoint<S>& p, int slab, int row, std::size_t n) {
     char* felt = felt_.data() + row * kFields;

@@ -271,11 +271,83 @@ TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
   EXPECT_LT(worst, scene.intensity_accuracy);
 }
 
+/// `planned` with squares of 24 pixels, these of them interpolated.
+RenderPlan in_squares(const RenderPlan& planned, const Scene& scene, bool (*interpolated)(int)) {
+  RenderPlan plan = planned;
+  plan.fringe_block_px = 24;
+  plan.fringe_blocks.clear();
+  for (int square = 0; square < FringeBlocks(scene.view.width, scene.view.height, plan.fringe_block_px).count(); ++square) plan.fringe_blocks.push_back(interpolated(square));
+  return plan;
+}
+
+// Wherever squares and registers end, with derivatives or without, a picture is that of all rays.
+TEST(FringeTable, AnyWidthWillDo) {
+  for (int width = 56; width <= 72; ++width) {
+    TableBuilder table;
+    Scene scene;
+    scene.view.width = width, scene.view.height = 40;
+    scene.view.center_x_px = table.fixed("center_x", 0.45 * width);
+    scene.view.center_y_px = table.fixed("center_y", 18.2);
+    scene.microscope.polarizer_deg = table.fixed("polarizer_deg", 10);
+    scene.microscope.analyzer_deg = table.fixed("analyzer_deg", 95);
+    put_tilted_plate(table, scene);
+    const Theta theta = table.table.values();
+    const RenderPlan planned = plan(scene, theta);
+    ASSERT_TRUE(planned.fringe_means);
+    const Image rays = render(scene, in_squares(planned, scene, [](int) { return false; }), theta).intensity;
+    for (const RenderPlan& p : {in_squares(planned, scene, [](int) { return true; }), in_squares(planned, scene, [](int square) { return square % 2 == 0; })})
+      for (const std::vector<int>& by : {std::vector<int>{}, {scene.view.center_x_px.index}}) {
+        const Image picture = render(scene, p, theta, by).intensity;
+        double worst = 0;
+        for (std::size_t i = 0; i < rays.size(); ++i) worst = std::max(worst, std::abs(picture.values()[i] - rays.values()[i]));
+        EXPECT_LT(worst, 0.01 * scene.intensity_accuracy) << width << " wide, derivatives: " << by.size();
+      }
+  }
+}
+
+// A thin plate in a wide cone has few fringes, so that amplitude and mean change as fast as the phase.
+TEST(FringeTable, FringesOfThinPlatesAreCarriedAlongToo) {
+  for (const int size : {24, 48, 192}) {
+    TableBuilder table;
+    Scene scene;
+    scene.view.width = scene.view.height = size;
+    scene.view.center_x_px = table.fixed("center_x", 0.45 * size);
+    scene.view.center_y_px = table.fixed("center_y", 0.53 * size);
+    scene.microscope.polarizer_deg = table.fixed("polarizer_deg", 10);
+    scene.microscope.analyzer_deg = table.fixed("analyzer_deg", 95);
+    put_tilted_plate(table, scene);
+    table.table[std::get<Plate>(scene.sample).thickness_um].value = 4;
+    table.table[std::get<Plate>(scene.sample).half_angle_deg].value = 35;
+    const Theta theta = table.table.values();
+    const RenderPlan planned = plan(scene, theta);
+    ASSERT_TRUE(planned.fringe_means);
+    RenderPlan whole = planned, all = planned;
+    whole.fringe_block_px = (size + 2 * FringeBlocks::kRim + 7) / 8 * 8;
+    whole.fringe_blocks = {1};
+    all.fringe_block_px = 0;
+    all.fringe_blocks.clear();
+    const std::vector<int> active{scene.view.center_x_px.index, scene.view.center_y_px.index, std::get<Plate>(scene.sample).half_angle_deg.index};
+    const Rendering few = render(scene, whole, theta, active), rays = render(scene, all, theta, active);
+    for (std::size_t j = 0; j < active.size(); ++j) {
+      double error = 0, largest = 0;
+      for (std::size_t i = 0; i < rays.intensity.size(); ++i) {
+        error = std::max(error, std::abs(few.derivatives[j].values()[i] - rays.derivatives[j].values()[i]));
+        largest = std::max(largest, std::abs(rays.derivatives[j].values()[i]));
+      }
+      // Of fourth order in the pixel, or to 1e-5 where differences over three pixels do (planar.cc).
+      EXPECT_LT(error, (3e-4 * std::pow(24.0 / size, 4) + 1e-5) * largest) << size << " pixels, derivative " << j;
+      EXPECT_GT(largest, 0) << j;
+    }
+  }
+}
+
 // The same bits whatever was rendered before, at widths that are no multiple of the lanes, by the same thread.
 TEST(FringeTable, PicturesDoNotDependOnTheOnesBefore) {
   TableBuilder table;
   Scene scene;
   scene.view.width = 101, scene.view.height = 40;
+  scene.view.center_x_px = table.fixed("center_x", 47);
+  scene.view.center_y_px = table.fixed("center_y", 18.2);
   scene.microscope.polarizer_deg = table.fixed("polarizer_deg", 10);
   scene.microscope.analyzer_deg = table.fixed("analyzer_deg", 95);
   put_tilted_plate(table, scene);
@@ -291,6 +363,20 @@ TEST(FringeTable, PicturesDoNotDependOnTheOnesBefore) {
   steep[static_cast<std::size_t>(std::get<Plate>(scene.sample).half_angle_deg.index)] = 30;
   render(other, rays, steep, {}, 1);
   EXPECT_EQ(render(scene, rays, theta, {}, 1).intensity.values(), before.values());
+
+  // From a table and with derivatives, at a width that leaves no register free beyond the picture, after one whose derivatives are steep.
+  const RenderPlan table_of = plan(scene, theta);
+  ASSERT_GT(table_of.fringe_block_px, 0);
+  const std::vector<int> by{scene.view.center_x_px.index, scene.microscope.polarizer_deg.index}, others{scene.surround_index.index, scene.view.center_y_px.index};
+  for (const int width : {100, 101}) {
+    scene.view.width = width;
+    render(scene, table_of, theta, others, 1);
+    const Rendering one = render(scene, table_of, theta, by, 1);
+    render(other, rays, steep, others, 1);
+    const Rendering two = render(scene, table_of, theta, by, 1);
+    EXPECT_EQ(one.intensity.values(), two.intensity.values());
+    for (std::size_t j = 0; j < by.size(); ++j) EXPECT_EQ(one.derivatives[j].values(), two.derivatives[j].values());
+  }
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ TEST(PixelMeans, DerivativesOfAMeanAreThoseOfDifferences) {
                    0.1 + 0.02 * slope * double(i)};
     return fringe_mean<true>(p);
   };
-  for (double slope : {0.0, 1e-4, 0.17, 0.346, 1.0, 3.0}) {  // q = 0.03, where a series takes over, is slope 0.346
+  for (double slope : {0.0, 1e-4, 0.17, 1.0, 2.8, 3.1, 3.2, 4.0}) {  // q = 2.5, up to which a series serves, are slopes of 3.16 and, down the rows, 2.81
     D x(slope);
     x.d[0] = 1;
     const double h = 1e-3;
