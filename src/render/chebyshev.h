@@ -64,7 +64,7 @@ double tail(const double* values) {
     }
   return worst;
 }
-/// Largest derivative of this order along either coordinate at the points, of values there.
+/// Largest derivative of this order, 0 to 3, along either coordinate at kPoints x kPoints points, of values there.
 template <int kPoints>
 double largest_derivative(const double* values, int order) {
   constexpr std::size_t n = static_cast<std::size_t>(kPoints);

@@ -18,7 +18,7 @@ struct FringePoint {
 };
 
 /// A parameter that carries all fringes along and changes none: its derivative is the one along
-/// (column, row) + growth (column of the place, row of the place), in pixels.
+/// (column, row) + growth (column of the place, row of the place), in pixels for one unit of the parameter; growth is that of the logarithm of the scale.
 struct FringeFlow {
   double column, row, growth;
 };
@@ -31,7 +31,7 @@ struct FringeFields {
   bool has(std::size_t field) const { return own >> field & 1; }
 };
 
-/// What a table makes known of a picture's fringes.
+/// What a table makes known of a whole picture's fringes.
 struct FringeTraits {
   bool averaged = false;  ///< the mean field is its mean over pixels already
   bool even = false;      ///< amplitude, mean and quadrature have differences over three pixels for slopes
@@ -65,7 +65,7 @@ struct PixelMoments {
   /// The series' derivative of order kOrder.
   template <int kOrder>
   BIREFIT_INLINE static P sum(const P& q) {
-    constexpr int kTerms = 11;  // the next is below 1e-15 of the first for q < 2.5, of the second derivative, too
+    constexpr int kTerms = 11;  // for q < 2.5 the next is below 1e-15, in the second derivative, too
     static constexpr std::array<double, kTerms> c = [] {
       std::array<double, kTerms> a{};
       double factorial = 1;  // (2k + 1)! with its sign

@@ -160,7 +160,7 @@ class FringeTable {
   void keep_all_fields() {
     for (const std::size_t d : derivatives_) fields_[d + 1] = {};
   }
-  /// Of three points in a row, differences give the slope of amplitude and mean to this part of the fringes' largest slope.
+  /// By which part of the fringes' largest slope differences over three pixels miss that of amplitude, mean and quadrature: a sixth of the third derivative.
   double slope_error() const { return steepest_ > 0 ? square(2.0 / blocks_.block_px) * most_third_ / (6 * steepest_) : 0; }
   /// All squares that were asked for are there.
   bool complete() const { return std::none_of(start_.begin(), start_.end(), [](int s) { return s == kGone; }); }

@@ -66,6 +66,7 @@ class PixelModel {
   virtual int fringe_run(int /*column*/, double /*row*/, int /*count*/, FringeScratch&, double* const* /*out*/) const { return 0; }
   /// Which fields the derivative of number plane - 1 changes; plane 0 has all.
   virtual FringeFields fringe_fields(int /*plane*/) const { return {}; }
+  /// Once tabulated.
   virtual FringeTraits fringe_traits() const { return {}; }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }

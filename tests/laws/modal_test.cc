@@ -93,8 +93,22 @@ std::pair<ParameterRef, ParameterRef> put_tilted_plate(TableBuilder& table, Scen
   return {material.birefringence, plate.director.tilt_deg};
 }
 
+/// `planned` with squares of 24 pixels, of them interpolated those for which interpolated(column, row) of the square.
+RenderPlan in_squares(const RenderPlan& planned, const Scene& scene, bool (*interpolated)(int, int)) {
+  RenderPlan plan = planned;
+  plan.fringe_block_px = 24;
+  plan.fringe_blocks.clear();
+  const FringeBlocks blocks(scene.view.width, scene.view.height, plan.fringe_block_px);
+  for (int row = 0; row < blocks.rows; ++row)
+    for (int column = 0; column < blocks.columns; ++column) plan.fringe_blocks.push_back(interpolated(column, row));
+  return plan;
+}
+bool every(int, int) { return true; }
+bool none(int, int) { return false; }
+bool every_other(int column, int row) { return (column + row) % 2 == 1; }
+
 // A picture interpolated from a few rays is the picture of all rays: within a hundredth of the accuracy asked, derivatives
-// with it, by what carries the fringes along to a few parts in a million: there amplitude and mean are quadratics over three pixels, the sixth of their third derivative is left out.
+// with it; by what carries the fringes along to the 1e-5 to which three pixels give slopes (planar.cc).
 TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
   for (const auto& [absorbing_slab, from_side] : {std::pair{false, false}, {true, false}, {false, true}}) {
     TableBuilder table;
@@ -159,17 +173,13 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
         size = std::max(size, std::abs(b.derivatives[j].values()[i]));
       }
       const bool carried = std::find(carrying.begin(), carrying.end(), active[j]) != carrying.end();
-      EXPECT_LT(error, (carried ? 4e-6 : 1e-6) * size) << absorbing_slab << " " << j;
+      EXPECT_LT(error, (carried ? 1e-5 : 1e-6) * size) << absorbing_slab << " " << j;
       EXPECT_GT(size, 0) << j;
     };
     for (std::size_t j = 0; j < active.size(); ++j) compare(a, j, j);
     // Some at a time, in any order: what the medium knows, what comes after it (polarizers, wavelength) and what moves the picture take different ways.
     // Once from the table alone, once with every other square traced: what is left out of a table's derivatives is not what rays leave out.
-    RenderPlan mixed = few;
-    mixed.fringe_block_px = 24;
-    const FringeBlocks blocks(scene.view.width, scene.view.height, mixed.fringe_block_px);
-    mixed.fringe_blocks.clear();
-    for (int square = 0; square < blocks.count(); ++square) mixed.fringe_blocks.push_back(static_cast<std::uint8_t>((square + square / blocks.columns) % 2));
+    const RenderPlan mixed = in_squares(few, scene, every_other);
     const std::size_t wave = active.size() - 1;
     for (const std::vector<std::size_t>& some : std::vector<std::vector<std::size_t>>{
              {wave}, {3}, {wave, 0}, {2, wave}, {3, 2}, {wave, 1, 0}, {wave, 2, 0}, {4, 0, 5, 2}, {0, wave, 2, 1, 3}, {wave, 0, 1, 2, 5}}) {
@@ -182,8 +192,8 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
     }
     for (const RenderPlan& p : {few, mixed}) {
       const Rendering part = render(scene, p, theta, {unused, active[wave]});
-      const auto& none = part.derivatives[0].values();
-      EXPECT_TRUE(std::all_of(none.begin(), none.end(), [](double x) { return x == 0; }));
+      const auto& by_unused = part.derivatives[0].values();
+      EXPECT_TRUE(std::all_of(by_unused.begin(), by_unused.end(), [](double x) { return x == 0; }));
     }
   }
 }
@@ -271,15 +281,6 @@ TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
   EXPECT_LT(worst, scene.intensity_accuracy);
 }
 
-/// `planned` with squares of 24 pixels, these of them interpolated.
-RenderPlan in_squares(const RenderPlan& planned, const Scene& scene, bool (*interpolated)(int)) {
-  RenderPlan plan = planned;
-  plan.fringe_block_px = 24;
-  plan.fringe_blocks.clear();
-  for (int square = 0; square < FringeBlocks(scene.view.width, scene.view.height, plan.fringe_block_px).count(); ++square) plan.fringe_blocks.push_back(interpolated(square));
-  return plan;
-}
-
 // Wherever squares and registers end, with derivatives or without, a picture is that of all rays.
 TEST(FringeTable, AnyWidthWillDo) {
   for (int width = 56; width <= 72; ++width) {
@@ -294,8 +295,8 @@ TEST(FringeTable, AnyWidthWillDo) {
     const Theta theta = table.table.values();
     const RenderPlan planned = plan(scene, theta);
     ASSERT_TRUE(planned.fringe_means);
-    const Image rays = render(scene, in_squares(planned, scene, [](int) { return false; }), theta).intensity;
-    for (const RenderPlan& p : {in_squares(planned, scene, [](int) { return true; }), in_squares(planned, scene, [](int square) { return square % 2 == 0; })})
+    const Image rays = render(scene, in_squares(planned, scene, none), theta).intensity;
+    for (const RenderPlan& p : {in_squares(planned, scene, every), in_squares(planned, scene, every_other)})
       for (const std::vector<int>& by : {std::vector<int>{}, {scene.view.center_x_px.index}}) {
         const Image picture = render(scene, p, theta, by).intensity;
         double worst = 0;

@@ -132,9 +132,6 @@ TEST(PolarTable, PicturesAreThoseOfRays) {
   }
 }
 
-// A core towards the light, in a host of much lower index: rays near the sphere's rim turn back into it, so that places in the core are seen twice and
-// its disc cannot be told from the way a ray passes its middle. Such a picture is planned without, and a picture that was planned with a disc of its
-// own does without when a fit has moved the core there.
 // A pixel's middle may be the droplet's own, which has no azimuth: the picture there is the one a hair beside it, and so is how it moves.
 TEST(PolarTable, TheMiddleIsAPlaceLikeAnyOther) {
   for (const Case& c : kCases) {
@@ -160,6 +157,9 @@ TEST(PolarTable, TheMiddleIsAPlaceLikeAnyOther) {
   }
 }
 
+// A core towards the light, in a host of much lower index: rays near the sphere's rim turn back into it, so that places in the core are seen twice and
+// its disc cannot be told from the way a ray passes its middle. Such a picture is planned without, and a picture that was planned with a disc of its
+// own does without when a fit has moved the core there.
 TEST(PolarTable, ACoreThatIsSeenTwiceHasNoDisc) {
   Job j = job_of({"shell", [](TableBuilder& b, Droplet& d, std::vector<int>& by) {
                     ShellDirector shell;
