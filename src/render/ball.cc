@@ -92,13 +92,12 @@ Su2<R> retarder_of(const Column<S>& column, Continuity continuity, const BallMed
       if (!magnus) return method.retarder(column, Ray<S>{medium.inside.k0, S(0.0), S(0.0), continuity}, mesh);
     const Su2<V> u = magnus_retarder<V>(method.info().order, column, continuity, {plain(medium.inside.k0), plain(medium.inside.ordinary), plain(medium.inside.extraordinary)}, mesh);
     Directions<V, R> all;
-    const P over = inverse(plain(medium.inside.k0));
+    const P twice = 2.0 * inverse(plain(medium.inside.k0)), ordinary = twice * plain(medium.inside.ordinary), extraordinary = twice * plain(medium.inside.extraordinary);
     constexpr std::size_t n = Directions<S, R>::kFrom;
     for (std::size_t j = 0; j < all.by.size(); ++j) {
       for (std::size_t i = 0; i < n; ++i) all.by[j][i] = up.by[j][i];
-      all.by[j][n] = medium.inside.k0.d[j] * over;
-      all.by[j][n + 1] = medium.inside.ordinary.d[j];
-      all.by[j][n + 2] = medium.inside.extraordinary.d[j];
+      all.by[j][n] = medium.inside.ordinary.d[j] + ordinary * medium.inside.k0.d[j];
+      all.by[j][n + 1] = medium.inside.extraordinary.d[j] + extraordinary * medium.inside.k0.d[j];
     }
     return {all(u.w), all(u.x), all(u.y), all(u.z)};
   }

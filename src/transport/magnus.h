@@ -129,9 +129,10 @@ template <class R>
 struct UniformMedium {
   R k0, ordinary, extraordinary;
 };
-/// S with three more derivatives behind its own: by log k0, by the ordinary, by the extraordinary permittivity.
+/// S with two more derivatives behind its own: by the ordinary and by the extraordinary permittivity. None is needed by k0: light knows k0 times the
+/// refractive indices, so that k0 d/dk0 = 2 (eps_o d/d eps_o + eps_e d/d eps_e).
 template <class S>
-using WithMedium = Dual<PlainOf<S>, ScalarTraits<S>::derivatives + 3>;
+using WithMedium = Dual<PlainOf<S>, ScalarTraits<S>::derivatives + 2>;
 
 /// What retarder() of the Magnus method of that order returns for a column in a uniform medium, whose own permittivities are not read. V = S, or
 /// WithMedium<S>: what moves the ray or turns the director costs a derivative of the whole column, what changes the medium next to nothing.

@@ -1,4 +1,4 @@
-// Retarders of a medium with the same permittivities everywhere, whose derivatives by permittivities and wavenumber need no other sample.
+// Retarders of a medium with the same permittivities everywhere, whose derivatives by permittivities need no other sample.
 
 #include "transport/magnus.h"
 
@@ -41,10 +41,9 @@ BIREFIT_INLINE Vec3<V> generator(const Vec3<S>& a, const S& cross, const S& dept
     Vec3<V> r{V(plain(v.x)), V(plain(v.y)), V(plain(v.z))};
     if constexpr (n > 0)
       for (std::size_t j = 0; j < n; ++j) r.x.d[j] = v.x.d[j], r.y.d[j] = v.y.d[j], r.z.d[j] = v.z.d[j];
-    r.x.d[n] = plain(v.x), r.z.d[n] = plain(v.z);
     const P one(1.0), pz = plain(z), po = plain(over), pn = plain(n_eff), ps = plain(inverse_sum), pg = plain(g), pr = plain(reach);
-    for (std::size_t j = 1; j <= 2; ++j) {
-      const bool ordinary = j == 1;
+    for (std::size_t j = 0; j < 2; ++j) {
+      const bool ordinary = j == 0;
       const P by = (ordinary ? one - pz : pz) * po;  // of the logarithm of the denominator
       const P sum = 0.5 * pn * (inverse(ordinary ? m.eo : m.ee) - by) + (ordinary ? P(0.5) * inverse(m.n_o) : P(0.0));
       const P dg = (ordinary ? m.de - m.eo : m.eo) * po * ps - pg * (by + sum * ps), dhalf = pr * dg;
