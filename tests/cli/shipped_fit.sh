@@ -31,7 +31,7 @@ fit_and_compare() {
   # The report opens without network.
   if grep -qiE '(src|href)="(https?:)?//' "out_$config/report.html"; then echo "FAILED: the report loads something from the network"; exit 1; fi
 }
-for config in e12_droplet bipolar_droplet eccentric_shell e44_plate twisted_cell axial_droplet disc freedericksz_sweep volume; do fit_and_compare $config; done
+for config in e12_droplet wave_droplet bipolar_droplet eccentric_shell e44_plate twisted_cell axial_droplet disc freedericksz_sweep volume; do fit_and_compare $config; done
 for file in fitted.tif residual.tif; do
   [[ -s out_e12_droplet/$file ]] || { echo "FAILED: no $file"; exit 1; }
 done
