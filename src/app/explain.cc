@@ -160,7 +160,7 @@ int run_explain(const Arguments& arguments) {
     }
     std::cout << fmt::format("Check      {:.2g} of the image's RMS (worst pixel {:.2g}) from Maxwell's equations marched through the sample, which leave out light reflected twice{}\n",
                              std::sqrt(difference / size), worst,
-                             radial_twin(config.scene) ? fmt::format(": {:.2g} of a radial twin's exact picture", march_error(config.scene, theta)) : "");
+                             radial_twin(config.scene, theta) ? fmt::format(": {:.2g} of a radial twin's exact picture", march_error(config.scene, theta)) : "");
   }
   return kExitDone;
 }

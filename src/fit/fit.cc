@@ -1384,17 +1384,15 @@ Eigen::VectorXd Fit::propagation_error() {
   if (stopped_ || std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) return shift;
   std::vector<PixelSet> sets;
   for (int g = 0; g < frames_; ++g) {
-    std::optional<Scene> with_series = radial_twin(job_.micrographs[g].scene);
-    if (!with_series) return shift;
-    Scene& twin = *with_series;
+    const std::optional<RadialTwin> twin = radial_twin(job_.micrographs[g].scene, theta_);
+    if (!twin) return shift;
     PixelSet set = pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]);
     const Image fitted = fitted_image(g);
     Image exact, propagated;
     try {
-      twin.method = "series";
-      exact = lit(job_.micrographs[g], theta_, render(twin, plan(twin, theta_), theta_, {}, job_.options.threads).intensity);
-      twin.method = "split_step";
-      propagated = lit(job_.micrographs[g], theta_, render(twin, plan(twin, theta_), theta_, {}, job_.options.threads).intensity);
+      const auto picture = [&](const Scene& scene) { return lit(job_.micrographs[g], theta_, render(scene, plan(scene, twin->theta), twin->theta, {}, job_.options.threads).intensity); };
+      exact = picture(twin->exact);
+      propagated = picture(twin->propagated);
     } catch (const UserError&) {  // too large for the series
       return shift;
     }

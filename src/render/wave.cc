@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
+#include "birefit/volume.h"
 #include "medium/build.h"
 #include "render/ball.h"
 #include "render/series.h"
@@ -114,15 +116,57 @@ WaveImaging imaging_of(const Scene& scene, const Values<double>& value, const Wa
 
 }  // namespace
 
-std::optional<Scene> radial_twin(const Scene& scene) {
-  if (!std::holds_alternative<Droplet>(scene.sample)) return std::nullopt;
-  Scene twin = scene;
-  Droplet& droplet = std::get<Droplet>(twin.sample);
-  if (auto* shell = std::get_if<ShellDirector>(&droplet.director))
-    shell->offset_um = {};
-  else
-    droplet.director = RadialDirector{};
-  return twin;
+namespace {
+
+int add_constant(Theta& theta, double value) {
+  theta.push_back(value);
+  return static_cast<int>(theta.size()) - 1;
+}
+
+/// Radius of a ball of as much liquid crystal as there is in a box, in its units; none where that is all of the box, or the ball does not fit in.
+std::optional<double> radius_of_ball(const VolumeGrid& g) {
+  const auto crystal = std::count_if(g.nodes.begin(), g.nodes.end(), [](const auto& t) { return t[0] + t[1] + t[2] > 0; });
+  const double radius = std::cbrt(static_cast<double>(crystal) * g.spacing_um[0] * g.spacing_um[1] * g.spacing_um[2] * 0.75 / std::numbers::pi);
+  const auto fits = [&](int nodes, std::size_t i) { return radius < 0.5 * (nodes - 1) * g.spacing_um[i]; };
+  if (crystal == 0 || crystal == std::ssize(g.nodes) || !fits(g.nx, 0) || !fits(g.ny, 1) || !fits(g.nz, 2)) return std::nullopt;
+  return radius;
+}
+
+std::shared_ptr<const VolumeGrid> sampled_ball(const VolumeGrid& like, double radius) {
+  auto ball = std::make_shared<VolumeGrid>(like);
+  for (int k = 0; k < ball->nz; ++k)
+    for (int j = 0; j < ball->ny; ++j)
+      for (int i = 0; i < ball->nx; ++i) {
+        const double x = (i - 0.5 * (ball->nx - 1)) * ball->spacing_um[0], y = (j - 0.5 * (ball->ny - 1)) * ball->spacing_um[1], z = (k - 0.5 * (ball->nz - 1)) * ball->spacing_um[2];
+        const double r = std::sqrt(x * x + y * y + z * z);
+        ball->nodes[ball->at(i, j, k)] = r > radius ? std::array<double, 6>{} : r > 0 ? director_tensor(x / r, y / r, z / r) : director_tensor(0, 0, 1);
+      }
+  return ball;
+}
+
+}  // namespace
+
+std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta) {
+  RadialTwin twin{scene, scene, theta};
+  twin.exact.method = "series";
+  twin.propagated.method = "split_step";
+  if (std::holds_alternative<Droplet>(scene.sample)) {
+    Droplet& droplet = std::get<Droplet>(twin.exact.sample);
+    if (auto* shell = std::get_if<ShellDirector>(&droplet.director))
+      shell->offset_um = {};
+    else
+      droplet.director = RadialDirector{};
+    twin.propagated.sample = droplet;
+    return twin;
+  }
+  if (const auto* volume = std::get_if<SampledVolume>(&scene.sample))
+    if (const std::optional<double> radius = radius_of_ball(*volume->grid)) {
+      const double scale = Values<double>(theta, {}).get(volume->scale, 1.0);
+      twin.exact.sample = Droplet{{add_constant(twin.theta, 2 * scale * *radius)}, RadialDirector{}};
+      twin.propagated.sample = SampledVolume{sampled_ball(*volume->grid, *radius), volume->scale};
+      return twin;
+    }
+  return std::nullopt;
 }
 
 double picture_error(const Image& image, const Image& exact) {
@@ -136,29 +180,34 @@ double picture_error(const Image& image, const Image& exact) {
 
 namespace {
 
-/// picture_error of a model on the radial twin, all lengths of which are `scale` times the scene's; in a view of its own.
+/// picture_error of a model of the radial twin, all lengths of which are `scale` times the scene's; in a view of its own.
 template <class Model>
-double error_on_twin(const Scene& scene, const Values<double>& value, double scale, const Model& model) {
-  Scene twin = *radial_twin(scene);
-  Theta theta = value.theta();
-  const auto constant = [&](ParameterRef& ref, double x) {
-    theta.push_back(x);
-    ref.index = static_cast<int>(theta.size()) - 1;
-  };
-  Droplet& droplet = std::get<Droplet>(twin.sample);
-  const double diameter = scale * value(droplet.diameter_um);
-  constant(droplet.diameter_um, diameter);
-  if (auto* shell = std::get_if<ShellDirector>(&droplet.director)) constant(shell->wall_um, scale * value(shell->wall_um));
-  if (twin.microscope.focus_um) constant(twin.microscope.focus_um, scale * value(twin.microscope.focus_um));
-  // Pixels as large as the scene's, where 64 of them suffice: what is left out need not have the sign of what is seen, and large pixels average.
-  const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * scene.view.pixel_size_um)), 2, 64);
-  twin.view.width = twin.view.height = pixels;
-  twin.view.pixel_size_um = (diameter + 4) / pixels;
-  constant(twin.view.center_x_px, 0.5 * (pixels - 1));
-  constant(twin.view.center_y_px, 0.5 * (pixels - 1));
-  twin.intensity_accuracy = 1e-8;  // nearly dark pictures, too
-  const Values<double> values(theta, {});
-  return picture_error(model(twin, theta), render(twin, plan_series(twin, values), theta, {}, 1).intensity);
+double error_on_twin(RadialTwin twin, double scale, const Model& model) {
+  const auto resize = [&](ParameterRef& length, double from) { length.index = add_constant(twin.theta, scale * from); };
+  for (Scene* scene : {&twin.exact, &twin.propagated}) {
+    const Theta before = twin.theta;
+    const Values<double> value(before, {});
+    if (auto* droplet = std::get_if<Droplet>(&scene->sample)) {
+      resize(droplet->diameter_um, value(droplet->diameter_um));
+      if (auto* shell = std::get_if<ShellDirector>(&droplet->director)) resize(shell->wall_um, value(shell->wall_um));
+    } else {
+      auto& volume = std::get<SampledVolume>(scene->sample);
+      resize(volume.scale, value.get(volume.scale, 1.0));
+    }
+    if (scene->microscope.focus_um) resize(scene->microscope.focus_um, value(scene->microscope.focus_um));
+  }
+  const double diameter = Values<double>(twin.theta, {})(std::get<Droplet>(twin.exact.sample).diameter_um);
+  for (Scene* scene : {&twin.exact, &twin.propagated}) {
+    // Pixels as large as the scene's, where 64 of them suffice: what is left out need not have the sign of what is seen, and large pixels average.
+    View& view = scene->view;
+    const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * view.pixel_size_um)), 2, 64);
+    view.width = view.height = pixels;
+    view.pixel_size_um = (diameter + 4) / pixels;
+    view.center_x_px.index = view.center_y_px.index = add_constant(twin.theta, 0.5 * (pixels - 1));
+    scene->intensity_accuracy = 1e-8;  // nearly dark pictures, too
+  }
+  const Values<double> values(twin.theta, {});
+  return picture_error(model(twin.propagated, twin.theta), render(twin.exact, plan_series(twin.exact, values), twin.theta, {}, 1).intensity);
 }
 
 std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {
@@ -174,9 +223,9 @@ std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<doub
   return wave;
 }
 
-/// picture_error of propagation on the radial twin; of spheres that take longer than half a second, on a smaller one.
-double propagation_error_on_twin(const Scene& scene, const Values<double>& value, double seconds) {
-  return error_on_twin(scene, value, std::min(1.0, std::cbrt(0.5 / seconds)), [](const Scene& twin, const Theta& theta) {
+/// picture_error of propagation on the radial twin; where that takes longer than half a second, on a smaller one.
+double propagation_error_on_twin(const RadialTwin& of, double seconds) {
+  return error_on_twin(of, std::min(1.0, std::cbrt(0.5 / seconds)), [](const Scene& twin, const Theta& theta) {
     const Values<double> values(theta, {});
     Rendering rendering;
     render_wave(twin, *plan_grids(twin, values, wave_object(twin, values)), theta, {}, 1, rendering);
@@ -209,15 +258,16 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
   plan.numerical_error = 0.01;
   plan.model_error = (0.018 + 0.068 * na * na) * std::clamp(contrast / 0.4, 0.15, 1.6) + 0.15 * na * step_out;
   plan.reasons.push_back("what is left out are reflections and the third order in the wave's slope");
-  if (!radial_twin(scene)) {
+  const std::optional<RadialTwin> twin = radial_twin(scene, value.theta());
+  if (!twin) {
     plan.warnings.push_back(fmt::format(
-        "That wave propagation errs by {:.2g} of the picture's RMS was measured on spheres with bright pictures. Of a sampled field it is not, nor is the field's own sampling "
-        "in it: a surface between nodes is known to half their spacing.",
+        "That wave propagation errs by {:.2g} of the picture's RMS was measured on spheres with bright pictures. Of a sampled field without host around it, or with a ball's worth of "
+        "liquid crystal that its box would not hold as a ball, it is not, nor is the field's own sampling in it: a surface between nodes is known to half their spacing.",
         plan.numerical_error + plan.model_error));
     return plan;
   }
   // A picture may be nearly dark, and what is left out is not: then the twin knows.
-  const double on_twin = propagation_error_on_twin(scene, value, plan.cost_seconds);
+  const double on_twin = propagation_error_on_twin(*twin, plan.cost_seconds);
   const double more = std::max(1.0, 1.5 * on_twin / (plan.numerical_error + plan.model_error));
   plan.numerical_error *= more;
   plan.model_error *= more;
@@ -364,8 +414,9 @@ Image image_by_march(const Scene& scene, const Theta& theta, int threads) {
 }
 
 double march_error(const Scene& scene, const Theta& theta, int threads) {
-  if (!radial_twin(scene)) throw UserError(Where{}, "only a sphere has a radial twin to measure the march on", "");
-  return error_on_twin(scene, Values<double>(theta, {}), 1, [&](const Scene& twin, const Theta& values) { return image_by_march(twin, values, threads); });
+  const std::optional<RadialTwin> twin = radial_twin(scene, theta);
+  if (!twin) throw UserError(Where{}, "there is no radial twin of this sample to measure the march on", "");
+  return error_on_twin(*twin, 1, [&](const Scene& twin, const Theta& values) { return image_by_march(twin, values, threads); });
 }
 
 }  // namespace birefit

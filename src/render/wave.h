@@ -18,15 +18,20 @@ struct WavePlan {
 /// Throws UserError where wave optics has no aperture to work with: none given, or one above the host's index.
 void check_objective(const Scene& scene, double n_host);
 
-/// The same scene with a sphere of the same size and indices whose axis is radial (shells: concentric): its picture is exact by the series.
-/// None where the sample is no sphere.
-std::optional<Scene> radial_twin(const Scene& scene);
+/// A sphere whose picture is exact by the series, and the same sphere as propagation computes it.
+struct RadialTwin {
+  Scene exact, propagated;
+  Theta theta;  ///< of both: the scene's, constants of the twin behind it
+};
+/// Of a sphere, one of the same size and indices whose axis is radial (shells: concentric). Of a sampled field with host in its box, a ball of as much
+/// liquid crystal of full order in the box's middle, sampled at the same nodes. None of anything else.
+std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta);
 
 /// RMS of the difference from the exact picture over the RMS of that; where it is darker than 1e-12 of the incident light, which nothing tells from
 /// darkness, over 1e-12.
 double picture_error(const Image& image, const Image& exact);
 
-/// What image_by_march errs by on the scene's radial twin (picture_error); it leaves out light reflected twice.
+/// What image_by_march errs by on the scene's radial twin, which it must have (picture_error); it leaves out light reflected twice.
 double march_error(const Scene& scene, const Theta& theta, int threads = 0);
 
 /// The plan of one picture. Throws UserError when the scene is neither sphere nor sampled field, the numerical aperture is missing or above the host's index,

@@ -233,7 +233,7 @@ TEST(Volume, RadialBallByWavesIsItsSeries) {
     const double error = error_against_droplet(s, p, 2, [](Sampled&, Droplet&) {});
     std::printf("radial ball on 64^3 nodes in %g: %.4f of the picture's RMS from the series\n", host, error);
     EXPECT_LT(error, 0.03) << host;
-    EXPECT_FALSE(p.warnings.empty());  // its error is not measured
+    EXPECT_LT(error, p.numerical_error + p.model_error) << host;
   }
 }
 
@@ -275,7 +275,9 @@ TEST(Volume, BoxByWavesAgreesWithTheMarch) {
   });
   const Sampled s = sampled_waves(grid, 1.6, 1.5);
   const Theta theta = s.theta();
-  const double apart = picture_error(render(s.scene, plan(s.scene, theta), theta).intensity, image_by_march(s.scene, theta));
+  const RenderPlan p = plan(s.scene, theta);
+  EXPECT_FALSE(p.warnings.empty());  // no ball is like it: its error is not measured
+  const double apart = picture_error(render(s.scene, p, theta).intensity, image_by_march(s.scene, theta));
   std::printf("box: propagation and march %.4f of the picture's RMS apart\n", apart);
   EXPECT_LT(apart, 0.04);  // 0.02 of propagation at NA 0.5, 0.01 of the march, and the corners of a box
 }
