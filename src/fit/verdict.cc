@@ -225,8 +225,9 @@ std::string verdict(const FitResult& result, bool signal) {
     if (most < 0 || inputs.size() == 3) continue;
     const ParameterEstimate& p = result.parameters[most];
     const double shift = input.shift[static_cast<std::size_t>(most)];
+    const bool of_value = p.unit != "deg" && std::abs(p.value) > 10 * p.stderr_;  // what may be zero has no per cent
     inputs.push_back(fmt::format("{} more of {} makes {} {}", input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %", input.name,
-                                 name_of(result, most), p.unit == "deg" || p.value == 0 ? fmt::format("{:+.2g}{}", shift, unit_suffix(p)) : fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value))));
+                                 name_of(result, most), of_value ? fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value)) : fmt::format("{:+.2g}{}", shift, unit_suffix(p))));
   }
   if (signal && !inputs.empty()) sentences.push_back("Taken as exact: " + joined(inputs) + ".");
   std::string text;

@@ -511,6 +511,7 @@ Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item&
     if (spec->second.linear && !std::isfinite(reader.table[own].value))
       reader.table[own].value = reader.table[shared_refs.at(path)].value;
     if (path == "micrograph.gain") keep_positive(reader.table[own]);
+    reader.replaced.insert(shared_refs.at(path).index);
     replace_ref(micrograph, shared_refs.at(path), own);
   }
   // The names of this image's parameters are no paths for the next image's `set:`.
@@ -818,7 +819,13 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       own.set = signals[i].set;
       own.set_where = signals[i].set_where;
       const Micrograph base = apply_set(reader, shared, own, i, "signal");
-      append_signal(reader, signals[i], i, base, replace_ref, config, micrographs);
+      append_signal(
+          reader, signals[i], i, base,
+          [&](Micrograph& micrograph, ParameterRef from, ParameterRef to) {
+            reader.replaced.insert(from.index);
+            replace_ref(micrograph, from, to);
+          },
+          config, micrographs);
     }
     items.clear();
   }
@@ -836,8 +843,11 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       used.insert({micrograph.gain.index, micrograph.offset.index});
       for (const UnevenLight& uneven : micrograph.uneven) used.insert(uneven.coefficient.index);
     }
-    for (int i = 0; i < reader.table.size(); ++i)
-      if (!used.count(i)) reader.table[i].free = false;
+    for (int i = 0; i < reader.table.size(); ++i) {
+      if (used.count(i) || !reader.table[i].free) continue;
+      if (!reader.replaced.count(i)) reader.problems.add(reader.table[i].where, reader.table[i].name + " is fitted, but nothing here depends on it", "give it as a number, or leave it out");
+      reader.table[i].free = false;
+    }
   }
 
   const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample) || std::holds_alternative<StressedDisc>(shared.scene.sample) || std::holds_alternative<SampledVolume>(shared.scene.sample);

@@ -62,6 +62,7 @@ class ConfigReader {
   /// Range of every number of the config by path, given or defaulted: what `set:` of a micrograph may name.
   std::map<std::string, NumberSpec> specs;
   std::map<std::string, ParameterRef> refs;
+  std::set<int> replaced;  ///< parameters instead of which an image has one of its own
   /// Every file that was asked for.
   std::set<std::filesystem::path> inputs;
   /// Paths that an unknown key was probably meant for: not also reported as missing.

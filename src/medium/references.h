@@ -71,19 +71,22 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
   } else if (auto* volume = std::get_if<SampledVolume>(&scene.sample)) {
     f(volume->scale);
   }
+  const auto constant_indices = [&](auto& constant) {
+    for (auto* ref : {&constant.ordinary, &constant.birefringence, &constant.resonance_nm}) f(*ref);
+  };
+  const auto dispersion = [&](auto& formula) {
+    for (auto& ref : formula.refs) f(ref);
+  };
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material)) {
-    f(constant->ordinary);
-    f(constant->birefringence);
-    f(constant->resonance_nm);
+    constant_indices(*constant);
   } else if (auto* e44 = std::get_if<E44Steinberg2020>(&scene.material)) {
     f(e44->temperature_k);
   } else if (auto* law = std::get_if<LawIndices>(&scene.material)) {
     if (auto* constant = std::get_if<ConstantIndices>(&law->indices)) {
-      f(constant->ordinary);
-      f(constant->birefringence);
+      constant_indices(*constant);
     } else if (auto* dispersive = std::get_if<DispersiveIndices>(&law->indices)) {
-      for (auto& ref : dispersive->ordinary.refs) f(ref);
-      for (auto& ref : dispersive->extraordinary.refs) f(ref);
+      dispersion(dispersive->ordinary);
+      dispersion(dispersive->extraordinary);
     } else {
       for (auto& set : std::get<FourParameterIndices>(law->indices).sets)
         for (auto* ref : {&set.mean_index, &set.mean_slope_per_k, &set.birefringence_0k, &set.exponent, &set.clearing_k}) f(*ref);
@@ -95,11 +98,13 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
     f(law->birefringence_factor);
   }
   f(scene.surround_index);
+  if (scene.surround_dispersion) dispersion(*scene.surround_dispersion);
   f(scene.microscope.wavelength_nm);
   f(scene.microscope.polarizer_deg);
   f(scene.microscope.analyzer_deg);
   f(scene.microscope.compensator_phase_deg);
   f(scene.microscope.compensator_azimuth_deg);
+  f(scene.microscope.focus_um);
   f(scene.view.center_x_px);
   f(scene.view.center_y_px);
   f(scene.view.rotation_deg);
