@@ -185,7 +185,7 @@ class Fit {
   Shift largest_shift(const Theta& there) const;
   void foretell_curved_rays();
   void foretell_waves();
-  Eigen::VectorXd propagation_error();
+  Eigen::MatrixXd propagation_errors();
   double pay_for_misfit(const Inverse& of_noise, Inverse& inverse) const;
   std::string covariance_words() const;
 
@@ -1377,42 +1377,47 @@ void Fit::foretell_waves() {
       shift.of->name, shift.change, 100 * shift.change / shift.of->value, by_waves_));
 }
 
-/// Propagation is itself a hundredth to a twentieth of the image away from Maxwell's equations. A radial twin of the sphere has an exact
-/// image, too: what its difference from the propagated one does to the estimates, searched unknowns first, then linear ones. Zero without waves.
-Eigen::VectorXd Fit::propagation_error() {
-  Eigen::VectorXd shift = Eigen::VectorXd::Zero(unknowns_.size());
-  if (stopped_ || std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) return shift;
-  std::vector<PixelSet> sets;
-  for (int g = 0; g < frames_; ++g) {
-    const std::optional<RadialTwin> twin = radial_twin(job_.micrographs[g].scene, theta_);
-    if (!twin) return shift;
-    PixelSet set = pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]);
-    const Image fitted = fitted_image(g);
-    Image exact, propagated;
+/// Propagation is itself a hundredth to a twentieth of the image away from Maxwell's equations, and samples are not the field. A radial twin has an exact
+/// image, too: what the others' differences from it do to the estimates, searched unknowns first, then linear ones; a column for each cause, none without waves.
+Eigen::MatrixXd Fit::propagation_errors() {
+  Eigen::MatrixXd shifts(unknowns_.size(), 0);
+  if (stopped_ || std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& p) { return p.wave != nullptr; })) return shifts;
+  std::vector<std::vector<Image>> pictures;  // of each frame, each scene of its twin
+  for (const Micrograph& m : job_.micrographs) {
+    const std::optional<RadialTwin> twin = radial_twin(m.scene, theta_);
+    if (!twin) return shifts;
     try {
-      const auto picture = [&](const Scene& scene) { return lit(job_.micrographs[g], theta_, render(scene, plan(scene, twin->theta), twin->theta, {}, job_.options.threads).intensity); };
-      exact = picture(twin->exact);
-      propagated = picture(twin->propagated);
+      pictures.emplace_back();
+      for (const Scene& scene : twin->scenes) pictures.back().push_back(lit(m, theta_, render(scene, plan(scene, twin->theta), twin->theta, {}, job_.options.threads).intensity));
     } catch (const UserError&) {  // too large for the series
-      return shift;
+      return shifts;
     }
-    for (std::size_t i = 0; i < set.pixels.size(); ++i) {
-      const auto [x, y] = set.pixels[i];
-      set.value[static_cast<Eigen::Index>(i)] = fitted(x, y) + exact(x, y) - propagated(x, y);
-    }
-    sets.push_back(std::move(set));
   }
-  LeastSquares problem(job_, unknowns_, plans_, std::move(sets));
-  problem.set_misfit(problem_->misfit());
-  SolveOptions few;
-  few.max_iterations = 2;  // next to linear
-  few.interrupted = job_.options.interrupted;
-  Eigen::VectorXd searched = best_;
-  problem.solve(searched, few);
-  Eigen::Index at = 0;
-  for (const std::vector<int>* part : {&unknowns_.searched, &unknowns_.linear})
-    for (const int index : *part) shift[at++] = problem.theta()[static_cast<std::size_t>(index)] - theta_[static_cast<std::size_t>(index)];
-  return shift;
+  const auto causes = std::max_element(pictures.begin(), pictures.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); })->size() - 1;
+  for (std::size_t cause = 0; cause < causes; ++cause) {
+    std::vector<PixelSet> sets;
+    for (int g = 0; g < frames_; ++g) {
+      const std::vector<Image>& seen = pictures[static_cast<std::size_t>(g)];
+      sets.push_back(pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]));
+      const Image fitted = fitted_image(g);
+      for (std::size_t i = 0; i < sets.back().pixels.size(); ++i) {
+        const auto [x, y] = sets.back().pixels[i];
+        sets.back().value[static_cast<Eigen::Index>(i)] = fitted(x, y) + (cause + 1 < seen.size() ? seen[cause](x, y) - seen[cause + 1](x, y) : 0.0);
+      }
+    }
+    LeastSquares problem(job_, unknowns_, plans_, std::move(sets));
+    problem.set_misfit(problem_->misfit());
+    SolveOptions few;
+    few.max_iterations = 2;  // next to linear
+    few.interrupted = job_.options.interrupted;
+    Eigen::VectorXd searched = best_;
+    problem.solve(searched, few);
+    shifts.conservativeResize(Eigen::NoChange, shifts.cols() + 1);
+    Eigen::Index at = 0;
+    for (const std::vector<int>* part : {&unknowns_.searched, &unknowns_.linear})
+      for (const int index : *part) shifts(at++, shifts.cols() - 1) = problem.theta()[static_cast<std::size_t>(index)] - theta_[static_cast<std::size_t>(index)];
+  }
+  return shifts;
 }
 
 /// A slow misfit, like that of uneven light, may be far below the noise of a pixel and still shift a parameter by many standard errors: what
@@ -1432,8 +1437,8 @@ void Fit::report() {
   const Eigen::MatrixXd factor = problem_->factor();
   const Inverse of_noise = invert_normal_equations(factor);
   Inverse inverse = of_noise;
-  const Eigen::VectorXd shift = propagation_error();
-  inverse.covariance += shift * shift.transpose();
+  const Eigen::MatrixXd shifts = propagation_errors();
+  inverse.covariance += shifts * shifts.transpose();
   const double along = pay_for_misfit(of_noise, inverse);
   result_.theta = theta_;
   result_.interrupted = (stopped_ && !beaten_) || interrupted();
@@ -1465,7 +1470,7 @@ void Fit::report() {
   result_.correlation.diagonal().setOnes();
   result_.covariance_kind = covariance_words();
   if (along > 1) result_.covariance_kind += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters", along);
-  if (!shift.isZero(0)) result_.covariance_kind += ", and the error of wave propagation by the exact image of a radial twin";
+  if (!shifts.isZero(0)) result_.covariance_kind += ", and the error of wave propagation by the exact image of a radial twin";
   report_parameters(inverse, of_noise);
   judge_identifiability(result_, job_, unknowns_, factor, inverse);
   weigh_inputs(of_noise);

@@ -845,7 +845,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     }
     for (int i = 0; i < reader.table.size(); ++i) {
       if (used.count(i) || !reader.table[i].free) continue;
-      if (!reader.replaced.count(i)) reader.problems.add(reader.table[i].where, reader.table[i].name + " is fitted, but nothing here depends on it", "give it as a number, or leave it out");
+      if (!reader.replaced.count(i) && reader.problems.empty()) reader.problems.add(reader.table[i].where, reader.table[i].name + " is fitted, but nothing here depends on it", "give it as a number, or leave it out");
       reader.table[i].free = false;
     }
   }

@@ -409,16 +409,21 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   const int n = static_cast<int>(pixels.size());
   constexpr int kStep = kLanesOf<S>;
   // All lanes take as many samples as the one that needs most: pixels that need as many go together, the dearest first.
-  std::vector<std::uint8_t> samples;
-  for (const auto& [x, y] : pixels) samples.push_back(static_cast<std::uint8_t>(samples_at(plan, x, y)));
-  if (model->has_edge())
-    parallel_for(n, threads, [&](int i) {
+  std::vector<std::uint8_t> samples(pixels.size());
+  constexpr int kTogether = 1024;
+  parallel_for((n + kTogether - 1) / kTogether, threads, [&](int block) {
+    for (int i = kTogether * block; i < std::min(n, kTogether * (block + 1)); ++i) {
       const auto& [x, y] = pixels[static_cast<std::size_t>(i)];
-      if (is_edge_pixel(*model, x, y)) samples[static_cast<std::size_t>(i)] |= kEdgePixel;
-    });
+      std::uint8_t& k = samples[static_cast<std::size_t>(i)];
+      k = static_cast<std::uint8_t>(samples_at(plan, x, y));
+      if (model->has_edge() && is_edge_pixel(*model, x, y)) k |= kEdgePixel;
+    }
+  });
+  std::array<std::size_t, 257> place{};  // where those of 255, 254, .. samples begin
+  for (const std::uint8_t k : samples) ++place[static_cast<std::size_t>(256 - k)];
+  std::partial_sum(place.begin(), place.end(), place.begin());
   std::vector<std::size_t> order(pixels.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return samples[a] > samples[b]; });
+  for (std::size_t i = 0; i < order.size(); ++i) order[place[static_cast<std::size_t>(255 - samples[i])]++] = i;
   const auto put = [&](std::size_t pixel, const S& v, int k) {
     out.intensity(static_cast<Eigen::Index>(pixel)) = lane(plain(v), k);
     if constexpr (ScalarTraits<S>::derivatives > 0)

@@ -147,23 +147,25 @@ std::shared_ptr<const VolumeGrid> sampled_ball(const VolumeGrid& like, double ra
 }  // namespace
 
 std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta) {
-  RadialTwin twin{scene, scene, theta};
-  twin.exact.method = "series";
-  twin.propagated.method = "split_step";
+  RadialTwin twin{{scene, scene}, theta};
+  Scene &exact = twin.scenes[0], &propagated = twin.scenes[1];
+  exact.method = "series";
+  propagated.method = "split_step";
   if (std::holds_alternative<Droplet>(scene.sample)) {
-    Droplet& droplet = std::get<Droplet>(twin.exact.sample);
+    Droplet& droplet = std::get<Droplet>(exact.sample);
     if (auto* shell = std::get_if<ShellDirector>(&droplet.director))
       shell->offset_um = {};
     else
       droplet.director = RadialDirector{};
-    twin.propagated.sample = droplet;
+    propagated.sample = droplet;
     return twin;
   }
   if (const auto* volume = std::get_if<SampledVolume>(&scene.sample))
     if (const std::optional<double> radius = radius_of_ball(*volume->grid)) {
       const double scale = Values<double>(theta, {}).get(volume->scale, 1.0);
-      twin.exact.sample = Droplet{{add_constant(twin.theta, 2 * scale * *radius)}, RadialDirector{}};
-      twin.propagated.sample = SampledVolume{sampled_ball(*volume->grid, *radius), volume->scale};
+      exact.sample = propagated.sample = Droplet{{add_constant(twin.theta, 2 * scale * *radius)}, RadialDirector{}};
+      twin.scenes.push_back(propagated);
+      twin.scenes.back().sample = SampledVolume{sampled_ball(*volume->grid, *radius), volume->scale};
       return twin;
     }
   return std::nullopt;
@@ -180,34 +182,34 @@ double picture_error(const Image& image, const Image& exact) {
 
 namespace {
 
-/// picture_error of a model of the radial twin, all lengths of which are `scale` times the scene's; in a view of its own.
+/// picture_error of a model of the radial twin's last scene, all lengths of which are `scale` times the scene's; in a view of its own.
 template <class Model>
 double error_on_twin(RadialTwin twin, double scale, const Model& model) {
   const auto resize = [&](ParameterRef& length, double from) { length.index = add_constant(twin.theta, scale * from); };
-  for (Scene* scene : {&twin.exact, &twin.propagated}) {
+  for (Scene& scene : twin.scenes) {
     const Theta before = twin.theta;
     const Values<double> value(before, {});
-    if (auto* droplet = std::get_if<Droplet>(&scene->sample)) {
+    if (auto* droplet = std::get_if<Droplet>(&scene.sample)) {
       resize(droplet->diameter_um, value(droplet->diameter_um));
       if (auto* shell = std::get_if<ShellDirector>(&droplet->director)) resize(shell->wall_um, value(shell->wall_um));
     } else {
-      auto& volume = std::get<SampledVolume>(scene->sample);
+      auto& volume = std::get<SampledVolume>(scene.sample);
       resize(volume.scale, value.get(volume.scale, 1.0));
     }
-    if (scene->microscope.focus_um) resize(scene->microscope.focus_um, value(scene->microscope.focus_um));
+    if (scene.microscope.focus_um) resize(scene.microscope.focus_um, value(scene.microscope.focus_um));
   }
-  const double diameter = Values<double>(twin.theta, {})(std::get<Droplet>(twin.exact.sample).diameter_um);
-  for (Scene* scene : {&twin.exact, &twin.propagated}) {
+  const double diameter = Values<double>(twin.theta, {})(std::get<Droplet>(twin.scenes.front().sample).diameter_um);
+  for (Scene& scene : twin.scenes) {
     // Pixels as large as the scene's, where 64 of them suffice: what is left out need not have the sign of what is seen, and large pixels average.
-    View& view = scene->view;
+    View& view = scene.view;
     const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * view.pixel_size_um)), 2, 64);
     view.width = view.height = pixels;
     view.pixel_size_um = (diameter + 4) / pixels;
     view.center_x_px.index = view.center_y_px.index = add_constant(twin.theta, 0.5 * (pixels - 1));
-    scene->intensity_accuracy = 1e-8;  // nearly dark pictures, too
+    scene.intensity_accuracy = 1e-8;  // nearly dark pictures, too
   }
   const Values<double> values(twin.theta, {});
-  return picture_error(model(twin.propagated, twin.theta), render(twin.exact, plan_series(twin.exact, values), twin.theta, {}, 1).intensity);
+  return picture_error(model(twin.scenes.back(), twin.theta), render(twin.scenes.front(), plan_series(twin.scenes.front(), values), twin.theta, {}, 1).intensity);
 }
 
 std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {

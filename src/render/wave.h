@@ -2,6 +2,7 @@
 // Pictures by wave optics: droplets, shells and sampled fields, Ceiling::wave.
 
 #include <optional>
+#include <vector>
 
 #include "render/pixel_model.h"
 #include "wave/imaging.h"
@@ -18,10 +19,10 @@ struct WavePlan {
 /// Throws UserError where wave optics has no aperture to work with: none given, or one above the host's index.
 void check_objective(const Scene& scene, double n_host);
 
-/// A sphere whose picture is exact by the series, and the same sphere as propagation computes it.
+/// A sphere as it is seen: exactly, by the series; by propagation; and, of sampled fields, by propagation through samples.
 struct RadialTwin {
-  Scene exact, propagated;
-  Theta theta;  ///< of both: the scene's, constants of the twin behind it
+  std::vector<Scene> scenes;  ///< in that order
+  Theta theta;                ///< of all of them: the scene's, constants of the twin behind it
 };
 /// Of a sphere, one of the same size and indices whose axis is radial (shells: concentric). Of a sampled field with host in its box, a ball of as much
 /// liquid crystal of full order in the box's middle, sampled at the same nodes. None of anything else.
