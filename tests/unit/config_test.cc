@@ -283,6 +283,22 @@ TEST_F(Config, SharesWhatNoMicrographSets) {
   EXPECT_EQ(a.outside_roi, 32 * 32 - 28 * 24);
 }
 
+// Two pictures of one droplet, each with a focus of its own: what a scene reads is an unknown where it is to be fitted, and may be set for an image.
+TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
+  save("a.tif", counts(100, 1));
+  save("b.tif", counts(200, 2));
+  const std::string one = replaced(kRender, "image_size_px: [64, 48]\n", ""), fitted = replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: {value: 0.5, fit: [-2, 2]}");
+  const auto alone = load(replaced(fitted, "{pixel_size_um", "{image: a.tif, pixel_size_um"), ConfigUse::fit);
+  EXPECT_TRUE(alone.job.parameters[alone.job.micrographs[0].scene.microscope.focus_um].free);
+  const auto two = load("micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" + fitted, ConfigUse::fit);
+  const ParameterTable& table = two.job.parameters;
+  const ParameterRef a = two.job.micrographs[0].scene.microscope.focus_um, b = two.job.micrographs[1].scene.microscope.focus_um;
+  EXPECT_TRUE(table[a].free);
+  EXPECT_EQ(table[a].value, 0.5);
+  EXPECT_FALSE(table[b].free);
+  EXPECT_EQ(table[b].value, -1);
+}
+
 TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
