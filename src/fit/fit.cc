@@ -1389,7 +1389,8 @@ Eigen::MatrixXd Fit::propagation_errors() {
     try {
       pictures.emplace_back();
       for (const Scene& scene : twin->scenes) pictures.back().push_back(lit(m, theta_, render(scene, plan(scene, twin->theta), twin->theta, {}, job_.options.threads).intensity));
-    } catch (const UserError&) {  // too large for the series
+    } catch (const UserError& error) {  // too large for the series
+      result_.warnings.push_back(std::string("What wave propagation errs by could not be measured on a ball of this size; the error bars do not contain it. ") + error.what());
       return shifts;
     }
   }
@@ -1470,7 +1471,7 @@ void Fit::report() {
   result_.correlation.diagonal().setOnes();
   result_.covariance_kind = covariance_words();
   if (along > 1) result_.covariance_kind += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters", along);
-  if (!shifts.isZero(0)) result_.covariance_kind += ", and the error of wave propagation by the exact image of a radial twin";
+  if (!shifts.isZero(0)) result_.covariance_kind += ", and the error of wave propagation" + std::string(shifts.cols() > 1 ? " and of sampling" : "") + " by the exact image of a radial twin";
   report_parameters(inverse, of_noise);
   judge_identifiability(result_, job_, unknowns_, factor, inverse);
   weigh_inputs(of_noise);

@@ -831,6 +831,18 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   }
   for (std::size_t i = 0; i < items.size(); ++i) micrographs.push_back(apply_set(reader, shared, items[i], i));
 
+  // An image may have a focus of its own, which only waves know.
+  for (const Micrograph& own : micrographs) {
+    const ParameterRef focus = own.scene.microscope.focus_um;
+    if (!focus || focus == shared.scene.microscope.focus_um || own.scene.ceiling == Ceiling::wave || !is_defocused(reader, own.scene)) continue;
+    if (!reader.choose_waves) {
+      add_defocus_problem(reader, own.scene);
+      continue;
+    }
+    reader.choose_waves = false;
+    for (Micrograph& micrograph : micrographs) micrograph.scene.ceiling = Ceiling::wave;
+  }
+
   // Without an image to look at there is only the view.
   const bool view_only = use == ConfigUse::render || (use == ConfigUse::plan && !image && signals.empty() && std::none_of(items.begin(), items.end(), [&](const Item& i) {
     return i.image && (!size || std::filesystem::exists(reader.resolve(*i.image)));  // named, but not yet taken
@@ -843,9 +855,10 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       used.insert({micrograph.gain.index, micrograph.offset.index});
       for (const UnevenLight& uneven : micrograph.uneven) used.insert(uneven.coefficient.index);
     }
+    const bool sound = reader.problems.empty();  // else images may be missing
     for (int i = 0; i < reader.table.size(); ++i) {
       if (used.count(i) || !reader.table[i].free) continue;
-      if (!reader.replaced.count(i) && reader.problems.empty()) reader.problems.add(reader.table[i].where, reader.table[i].name + " is fitted, but nothing here depends on it", "give it as a number, or leave it out");
+      if (!reader.replaced.count(i) && sound) reader.problems.add(reader.table[i].where, reader.table[i].name + " is fitted, but nothing here depends on it", "give it as a number, or leave it out");
       reader.table[i].free = false;
     }
   }

@@ -731,8 +731,7 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   methods.insert(methods.end(), {"series", "split_step"});
   scene.method = reader.choice(transport, "method", methods).value_or("auto");
   const bool wave_method = scene.method == "series" || scene.method == "split_step";
-  const Parameter* focus = scene.microscope.focus_um ? &reader.table[scene.microscope.focus_um] : nullptr;
-  const bool defocused = focus && (focus->free || focus->value != 0);
+  const bool defocused = is_defocused(reader, scene);
   // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays. Only waves know defocus.
   if (name == "auto" && sphere && scene.microscope.objective_na > 0 && !physics.find("rays") && (scene.method == "auto" || wave_method)) {
     if (defocused || wave_method)
@@ -740,11 +739,20 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
     else
       reader.choose_waves = true;
   }
-  if (defocused && scene.ceiling != Ceiling::wave)
-    reader.problems.add(focus->where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics", "ceiling: wave, with objective_na, for droplets, shells and sampled fields");
+  if (defocused && scene.ceiling != Ceiling::wave) add_defocus_problem(reader, scene);
 }
 
 }  // namespace
+
+bool is_defocused(const ConfigReader& reader, const Scene& scene) {
+  const ParameterRef focus = scene.microscope.focus_um;
+  return focus && (reader.table[focus].free || reader.table[focus].value != 0);
+}
+
+void add_defocus_problem(ConfigReader& reader, const Scene& scene) {
+  reader.problems.add(reader.table[scene.microscope.focus_um].where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics",
+                      "ceiling: wave, with objective_na, for droplets, shells and sampled fields");
+}
 
 Scene read_scene(ConfigReader& reader, const Block& root) {
   Scene scene;

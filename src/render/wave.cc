@@ -125,15 +125,20 @@ int add_constant(Theta& theta, double value) {
 
 /// Radius of a ball of as much liquid crystal as there is in a box, in its units; none where that is all of the box, or the ball does not fit in.
 std::optional<double> radius_of_ball(const VolumeGrid& g) {
-  const auto crystal = std::count_if(g.nodes.begin(), g.nodes.end(), [](const auto& t) { return t[0] + t[1] + t[2] > 0; });
+  const auto crystal = std::count_if(g.nodes.begin(), g.nodes.end(), is_crystal);
   const double radius = std::cbrt(static_cast<double>(crystal) * g.spacing_um[0] * g.spacing_um[1] * g.spacing_um[2] * 0.75 / std::numbers::pi);
   const auto fits = [&](int nodes, std::size_t i) { return radius < 0.5 * (nodes - 1) * g.spacing_um[i]; };
   if (crystal == 0 || crystal == std::ssize(g.nodes) || !fits(g.nx, 0) || !fits(g.ny, 1) || !fits(g.nz, 2)) return std::nullopt;
   return radius;
 }
 
-std::shared_ptr<const VolumeGrid> sampled_ball(const VolumeGrid& like, double radius) {
-  auto ball = std::make_shared<VolumeGrid>(like);
+/// Of that radius, in a box `share` times as wide as another, its nodes as far apart.
+std::shared_ptr<const VolumeGrid> sampled_ball(const VolumeGrid& like, double radius, double share = 1) {
+  auto ball = std::make_shared<VolumeGrid>();
+  const auto nodes = [&](int n) { return std::max(2, static_cast<int>(std::ceil(share * (n - 1))) + 1); };
+  ball->nx = nodes(like.nx), ball->ny = nodes(like.ny), ball->nz = nodes(like.nz);
+  ball->spacing_um = like.spacing_um;
+  ball->nodes.resize(static_cast<std::size_t>(ball->nx) * static_cast<std::size_t>(ball->ny) * static_cast<std::size_t>(ball->nz));
   for (int k = 0; k < ball->nz; ++k)
     for (int j = 0; j < ball->ny; ++j)
       for (int i = 0; i < ball->nx; ++i) {
@@ -164,8 +169,9 @@ std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta) {
     if (const std::optional<double> radius = radius_of_ball(*volume->grid)) {
       const double scale = Values<double>(theta, {}).get(volume->scale, 1.0);
       exact.sample = propagated.sample = Droplet{{add_constant(twin.theta, 2 * scale * *radius)}, RadialDirector{}};
-      twin.scenes.push_back(propagated);
-      twin.scenes.back().sample = SampledVolume{sampled_ball(*volume->grid, *radius), volume->scale};
+      Scene sampled = propagated;
+      sampled.sample = SampledVolume{sampled_ball(*volume->grid, *radius), volume->scale};
+      twin.scenes.push_back(std::move(sampled));
       return twin;
     }
   return std::nullopt;
@@ -193,8 +199,10 @@ double error_on_twin(RadialTwin twin, double scale, const Model& model) {
       resize(droplet->diameter_um, value(droplet->diameter_um));
       if (auto* shell = std::get_if<ShellDirector>(&droplet->director)) resize(shell->wall_um, value(shell->wall_um));
     } else {
+      // Fewer nodes as far apart: what sampling errs by goes with their distance.
       auto& volume = std::get<SampledVolume>(scene.sample);
-      resize(volume.scale, value.get(volume.scale, 1.0));
+      const double diameter = value(std::get<Droplet>(twin.scenes.front().sample).diameter_um) / value.get(volume.scale, 1.0);  // of the front one, which is resized already
+      if (scale < 1) volume.grid = sampled_ball(*volume.grid, 0.5 * diameter, scale);
     }
     if (scene.microscope.focus_um) resize(scene.microscope.focus_um, value(scene.microscope.focus_um));
   }

@@ -2,12 +2,16 @@
 // A director field sampled on a box (birefit/volume.h) in its host as a medium on the grid of wave optics.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "medium/families/volume.h"
 #include "wave/object.h"
 
 namespace birefit {
+
+/// A node of liquid crystal, not of the host.
+inline bool is_crystal(const std::array<double, 6>& tensor) { return tensor[0] != 0 || tensor[1] != 0 || tensor[2] != 0; }
 
 template <class S>
 struct SampledOptics {
@@ -53,7 +57,7 @@ class SampledMedium final : public WaveMedium<S> {
     corners.find(g_);
     const auto value = [&](std::size_t component) { return corners.value([&](std::size_t node) { return g_.nodes[node][component]; }); };
     const SymmetricTensor<S> a{value(0), value(1), value(2), value(3), value(4), value(5)};
-    const auto crystal = [&](std::size_t node) { return g_.nodes[node][0] != 0 || g_.nodes[node][1] != 0 || g_.nodes[node][2] != 0 ? 1.0 : 0.0; };
+    const auto crystal = [&](std::size_t node) { return is_crystal(g_.nodes[node]) ? 1.0 : 0.0; };
     Vec3<S> slope;
     const S share = corners.value_and_slope(crystal, slope);
     slope = {slope.x * (1 / g_.spacing_um[0]), slope.y * (1 / g_.spacing_um[1]), slope.z * (1 / g_.spacing_um[2])};

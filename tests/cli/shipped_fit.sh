@@ -5,8 +5,8 @@ program=$1 source=$2
 rm -rf out_*
 
 # Every estimate within 5 standard errors of truth.csv, by the names of the fit's parameters.
-fit_and_compare() {
-  local config=$1 summary
+fit_and_compare() {  # CONFIG [DATA]
+  local config=$1 data=${2:-$1} summary
   summary=$("$program" fit "$source/fit_configs/$config.yaml" --out "out_$config") || { echo "FAILED: $config, exit code $?"; exit 1; }
   # "name = value +/- stderr ..."
   awk -F, -v summary="$summary" '
@@ -24,7 +24,7 @@ fit_and_compare() {
       }
       if (!($1 in seen)) { print "FAILED: no estimate of " $1; bad = 1 }
     }
-    END { exit bad }' "$source/data/$config/truth.csv" || exit 1
+    END { exit bad }' "$source/data/$data/truth.csv" || exit 1
   for file in fit.json report.html config.yaml log.txt; do
     [[ -s out_$config/$file ]] || { echo "FAILED: $config leaves no $file"; exit 1; }
   done
@@ -32,6 +32,7 @@ fit_and_compare() {
   if grep -qiE '(src|href)="(https?:)?//' "out_$config/report.html"; then echo "FAILED: the report loads something from the network"; exit 1; fi
 }
 for config in e12_droplet wave_droplet bipolar_droplet eccentric_shell e44_plate twisted_cell axial_droplet disc freedericksz_sweep volume; do fit_and_compare $config; done
+fit_and_compare e12_polarizers e12_droplet
 for file in fitted.tif residual.tif; do
   [[ -s out_e12_droplet/$file ]] || { echo "FAILED: no $file"; exit 1; }
 done

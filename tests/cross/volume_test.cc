@@ -233,7 +233,6 @@ TEST(Volume, RadialBallByWavesIsItsSeries) {
     const double error = error_against_droplet(s, p, 2, [](Sampled&, Droplet&) {});
     std::printf("radial ball on 64^3 nodes in %g: %.4f of the picture's RMS from the series\n", host, error);
     EXPECT_LT(error, 0.03) << host;
-    EXPECT_LT(error, p.numerical_error + p.model_error) << host;
   }
 }
 
@@ -264,6 +263,7 @@ TEST(Volume, TurnedBipolarBallByWavesIsTheDroplet) {
   const double same = bipolar(30), mirrored = bipolar(-30);
   std::printf("bipolar on 64^3 nodes: %.4f of the picture's RMS from the droplet, %.4f from its mirror image\n", same, mirrored);
   EXPECT_LT(same, 0.03);  // as the radial ball's
+  EXPECT_LT(same, p.numerical_error + p.model_error);
   EXPECT_GT(mirrored, 5 * same);
 }
 

@@ -297,6 +297,10 @@ TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
   EXPECT_EQ(table[a].value, 0.5);
   EXPECT_FALSE(table[b].free);
   EXPECT_EQ(table[b].value, -1);
+  // The shared one on the mid plane, one image's not: waves, or an error.
+  const std::string own = "micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" + replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: 0");
+  EXPECT_EQ(load(own + "physics: {max_seconds: 0}\n", ConfigUse::fit).job.micrographs[0].scene.ceiling, Ceiling::wave);
+  EXPECT_NE(mistakes(own + "physics: {ceiling: one_way}\n", ConfigUse::fit).find("defocus needs wave optics"), std::string::npos);
 }
 
 TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
