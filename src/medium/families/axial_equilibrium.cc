@@ -310,7 +310,8 @@ std::shared_ptr<const Rung> rung_near(double e, double ring) {
   fresh->slopes = slopes_of(rung_e, rung_ring, grid, fresh->change, [&](const Field& right) { return solve(fresh->factors, right); });
   const std::lock_guard lock(guard);
   known.push_front(fresh);
-  if (known.size() > 32) known.pop_back();
+  constexpr std::size_t kMost = 48;  // reduced fields up to 100 with a hedgehog: a scan that goes through more than are kept would find none. 20 MB
+  if (known.size() > kMost) known.pop_back();
   return fresh;
 }
 
@@ -359,7 +360,8 @@ std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double
   auto fresh = std::make_shared<const AxialEquilibrium>(from_rung(e, ring, slopes));
   const std::lock_guard lock(guard);
   known.push_front(fresh);
-  if (known.size() > 64) known.pop_back();
+  constexpr std::size_t kMost = 1024;  // what a scan of bounds several orders wide asks for, place after place. 10 MB
+  if (known.size() > kMost) known.pop_back();
   return fresh;
 }
 
