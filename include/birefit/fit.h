@@ -180,6 +180,8 @@ struct FitResult {
   bool ambiguous = false;
   bool identifiable = true;
   bool pinned = false;   ///< at a bound that is no physical limit
+  bool described = true; ///< false: the model leaves more than half of what the images show beyond their noise
+  double left_over = 0;  ///< that share: 0 a perfect model, 1 no better than a constant image (below 0 by chance; 0 too where there is nothing to compare with)
   std::vector<ParameterEstimate> parameters;  ///< free ones in table order: searched first, then linear
   std::vector<std::string> names;             ///< order of correlation and covariance
   Eigen::MatrixXd covariance, correlation;    ///< parameters' own units
@@ -206,7 +208,7 @@ struct FitResult {
   Theta theta;                         ///< full table at the optimum
 
   /// True when the run deserves exit code 0.
-  bool has_answer() const { return converged && !ambiguous && identifiable && !pinned && !interrupted; }
+  bool has_answer() const { return converged && !ambiguous && identifiable && !pinned && described && !interrupted; }
 };
 
 /// Estimates every free parameter; of several branches, those of the one with the best odds, and `ambiguous` when another

@@ -171,7 +171,8 @@ class Fit {
   double row_correlation(const std::vector<LeastSquares::FrameMisfit>& frames) const;
   Image fitted_image(int g) const;
   Outliers outliers_of(int g) const;
-  bool shows_signal(double chi_square) const;
+  std::optional<double> chi_square_of_a_constant() const;
+  bool judge_description(double chi_square);
   void report_parameters(const Inverse& inverse, const Inverse& of_noise);
   std::optional<double> upper_limit(int unknown, const Inverse& inverse);
   void settle_interval(ParameterEstimate& estimate, int unknown, const Inverse& of_noise);
@@ -179,12 +180,13 @@ class Fit {
   void report_micrographs();
   void collect_warnings();
   struct Shift {
-    const ParameterEstimate* of = nullptr;
+    int index = 0;  ///< in the table
     double change = 0, standard_errors = 0;
   };
-  Shift largest_shift(const Theta& there) const;
-  void foretell_curved_rays();
-  void foretell_waves();
+  Shift largest_shift(const Eigen::VectorXd& shift, const Eigen::VectorXd& sd) const;
+  Eigen::VectorXd change_of_unknowns(const Theta& from, const Theta& to) const;
+  std::optional<Eigen::VectorXd> foretell_curved_rays(const Eigen::VectorXd& sd);
+  std::optional<Eigen::VectorXd> foretell_waves(const Eigen::VectorXd& sd);
   Eigen::MatrixXd propagation_errors();
   double pay_for_misfit(const Inverse& of_noise, Inverse& inverse) const;
   std::string covariance_words() const;
@@ -455,26 +457,7 @@ double Fit::look_for_minima(double hopeless_above) {
     scan_points_ = found_.points;
     return found_.candidates.front().objective / std::max(1.0, sample_rows_);
   }
-  std::vector<double> phase(unknowns_.searched.size(), 0.0);
-  for (std::size_t j = 0; j < phase.size(); ++j) {
-    const int index = unknowns_.searched[j];
-    const Parameter& parameter = job_.parameters[index];
-    // The rate may change across the bounds, and be largest between them (a voltage around its threshold): take the fastest of
-    // the start, both ends and the quarters.
-    const double width = parameter.upper - parameter.lower;
-    // Of hundreds of rows of a table a few dozen show it.
-    const int stride = (frames_ + 31) / 32;
-    for (const double at : {theta_[index], parameter.lower, parameter.lower + 0.25 * width, parameter.lower + 0.5 * width,
-                            parameter.lower + 0.75 * width, parameter.upper}) {
-      if (!std::isfinite(at)) continue;
-      Theta probe = theta_;
-      probe[index] = at;
-      for (int g = 0; g < frames_; g += stride) {
-        const double rate = fringe_phase_per_unit(job_.micrographs[g].scene, probe, index);
-        if (std::isfinite(rate)) phase[j] = std::max(phase[j], std::abs(rate));
-      }
-    }
-  }
+  const std::vector<FringePhase> fringes = fringe_phases(job_, unknowns_, theta_);
   const auto sampled = [&] {
     std::vector<PixelSet> part;
     for (int g = 0; g < frames_; ++g) part.push_back(pixel_set(job_.micrographs[g], sigma_[g], subsample(pixels_[g], scanned_pixels(g))));
@@ -486,13 +469,13 @@ double Fit::look_for_minima(double hopeless_above) {
   // The picture's own middle, where fringes fit better around it: the grid takes the centre as known.
   if (const std::optional<Eigen::VectorXd> centred = start_at_symmetry()) {
     const std::vector<RenderPlan> given = plans_;
-    const double by_given = lowest_of_few(*sampled_pixels, job_, unknowns_, start_, phase);
+    const double by_given = lowest_of_few(*sampled_pixels, job_, unknowns_, start_, fringes);
     Theta theta = theta_;
     for (std::size_t j = 0; j < unknowns_.searched.size(); ++j) theta[unknowns_.searched[j]] = (*centred)[static_cast<Eigen::Index>(j)];
     for (int g = 0; g < frames_; ++g) plans_[g] = plan(job_.micrographs[g].scene, theta);
     std::unique_ptr<LeastSquares> around_centre = sampled();
     evaluations_ += sampled_pixels->evaluations();
-    if (lowest_of_few(*around_centre, job_, unknowns_, *centred, phase) < by_given) {
+    if (lowest_of_few(*around_centre, job_, unknowns_, *centred, fringes) < by_given) {
       start_ = *centred, theta_ = theta;
       sampled_pixels = std::move(around_centre);
     } else {
@@ -502,7 +485,7 @@ double Fit::look_for_minima(double hopeless_above) {
   }
   LeastSquares& sample = *sampled_pixels;
   sample_rows_ = static_cast<double>(sample.pixel_rows());
-  found_ = scan(sample, job_, unknowns_, start_, phase, hopeless_above * std::max(1.0, sample_rows_));
+  found_ = scan(sample, job_, unknowns_, start_, fringes, hopeless_above * std::max(1.0, sample_rows_));
   evaluations_ += sample.evaluations();
   stopped_ = stopped_ || found_.interrupted;
   result_.scans = std::move(found_.traces);
@@ -912,9 +895,8 @@ void Fit::weigh_rivals() {
   theta_ = problem_->theta();
 }
 
-/// Is an image without structure as good? Compared in units of the misfit (an F test), with what the freedom of the model and
-/// the number of places the scan looked at gain by chance.
-bool Fit::shows_signal(double chi_square) const {
+/// Of images without structure but that of uneven light; nothing where the model is one itself.
+std::optional<double> Fit::chi_square_of_a_constant() const {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (int g = 0; g < frames_; ++g) {
     const auto [l, h] = problem_->intensity_range(g);
@@ -922,7 +904,7 @@ bool Fit::shows_signal(double chi_square) const {
     high = std::max(high, h);
   }
   constexpr double kUniform = 1e-9;
-  if (!(high - low > kUniform)) return true;  // a uniform model is a constant image: nothing to compare
+  if (!(high - low > kUniform)) return std::nullopt;
   // Frames that share an offset share the constant; an uneven background is part of it.
   double null_chi_square = 0;
   std::set<int> done;
@@ -950,9 +932,23 @@ bool Fit::shows_signal(double chi_square) const {
     }
     null_chi_square += std::max(0.0, squares - right.dot(gram.completeOrthogonalDecomposition().solve(right)));
   }
-  const double reduced = std::max(1.0, chi_square / static_cast<double>(problem_->pixel_rows()));
+  return null_chi_square;
+}
+
+/// Does the model describe the images at all? False: an image without structure is as good, compared in units of the misfit (an F test), with what the
+/// freedom of the model and the number of places the scan looked at gain by chance. A model that is better than that and yet leaves most of what there
+/// is to see is not the sample's, whatever its parameters' errors.
+bool Fit::judge_description(double chi_square) {
+  const std::optional<double> constant = chi_square_of_a_constant();
+  if (!constant) return true;
+  const double rows = static_cast<double>(problem_->pixel_rows()), reduced = std::max(1.0, chi_square / rows);
+  // More than half: measured images of crystals with an uneven field leave up to 0.37 and return the right voltage, a bipolar droplet taken for a radial one
+  // leaves 0.77 and returns a birefringence 6 standard errors off.
+  constexpr double kMisfit = 2, kMostLeft = 0.5;
+  result_.left_over = *constant > rows ? (chi_square - rows) / (*constant - rows) : 0;
+  result_.described = !(reduced > kMisfit && result_.left_over > kMostLeft);
   const double by_chance = 25 + 2 * unknowns_.size() + 2 * std::log(std::max(1, scan_points_));
-  return (null_chi_square - chi_square) / reduced > by_chance;
+  return (*constant - chi_square) / reduced > by_chance;
 }
 
 std::string Fit::covariance_words() const {
@@ -1271,25 +1267,34 @@ void Fit::collect_warnings() {
       warn(fmt::format("The image adds nothing to the prior on {}.", estimate.name));
 }
 
-/// Of the parameters searched for but the centre, the one that another model moves most.
-Fit::Shift Fit::largest_shift(const Theta& there) const {
-  Shift most;
-  for (const int index : unknowns_.searched)
-    for (const ParameterEstimate& p : result_.parameters) {
-      if (p.name != job_.parameters[index].name || p.name.find("center_px") != std::string::npos || !(p.stderr_ > 0)) continue;
-      const double change = there[static_cast<std::size_t>(index)] - p.value;
-      if (std::abs(change) > most.standard_errors * p.stderr_) most = {&p, change, std::abs(change) / p.stderr_};
-    }
+/// Of the parameters searched for but the centre, the one that another model moves most, in the standard errors `sd`.
+Fit::Shift Fit::largest_shift(const Eigen::VectorXd& shift, const Eigen::VectorXd& sd) const {
+  Shift most{unknowns_.searched.front()};
+  for (int j = 0; j < std::ssize(unknowns_.searched); ++j) {
+    const int index = unknowns_.table_index(j);
+    if (job_.parameters[index].name.find("center_px") != std::string::npos || !(sd[j] > 0)) continue;
+    if (std::abs(shift[j]) > most.standard_errors * sd[j]) most = {index, shift[j], std::abs(shift[j]) / sd[j]};
+  }
   return most;
 }
 
+Eigen::VectorXd Fit::change_of_unknowns(const Theta& from, const Theta& to) const {
+  Eigen::VectorXd change(unknowns_.size());
+  for (int j = 0; j < unknowns_.size(); ++j) {
+    const auto index = static_cast<std::size_t>(unknowns_.table_index(j));
+    change[j] = to[index] - from[index];
+  }
+  return change;
+}
+
 /// Straight chords shift a birefringence by percents and the residual need not show it (docs/methods.md, "Curved rays"): a short fit
-/// with curved rays from where this one ended says by how much.
-void Fit::foretell_curved_rays() {
+/// with curved rays from where this one ended says by how much. Returns what they change, searched unknowns first, then linear ones, where it is more than
+/// the standard errors `sd` and the image does not contradict it.
+std::optional<Eigen::VectorXd> Fit::foretell_curved_rays(const Eigen::VectorXd& sd) {
   const auto has_curved = [](const Micrograph& m) {
     return has_curved_rays(m.scene) && m.scene.rays == Rays::straight && m.scene.ceiling != Ceiling::wave;
   };
-  if (stopped_ || unknowns_.searched.empty() || !std::all_of(job_.micrographs.begin(), job_.micrographs.end(), has_curved)) return;
+  if (stopped_ || unknowns_.searched.empty() || !std::all_of(job_.micrographs.begin(), job_.micrographs.end(), has_curved)) return std::nullopt;
   FitJob curved = job_;
   std::vector<RenderPlan> plans;
   std::vector<PixelSet> sets;
@@ -1325,27 +1330,29 @@ void Fit::foretell_curved_rays() {
   problem.set_misfit(problem_->misfit());
   Eigen::VectorXd searched = best_;
   problem.solve(searched, few);
-  Theta there = theta_;
-  for (const int index : unknowns_.searched) there[static_cast<std::size_t>(index)] += problem.theta()[static_cast<std::size_t>(index)] - straight[static_cast<std::size_t>(index)];
-  const Shift shift = largest_shift(there);
+  const Eigen::VectorXd change = change_of_unknowns(straight, problem.theta());
+  const Shift shift = largest_shift(change, sd);
   by_curved_rays_ = shift.standard_errors;
   const double ratio = problem.objective() / straight_objective, reduced = std::max(1.0, result_.reduced_chi_square);
   const double worse = (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used);
   if (!(worse < 9 * reduced)) by_curved_rays_ = 0;
-  if (by_curved_rays_ < 1) return;
+  if (by_curved_rays_ < 1) return std::nullopt;
+  const double value = theta_[static_cast<std::size_t>(shift.index)];
   result_.warnings.push_back(fmt::format(
       "Rays are taken as straight. Curved ones (physics.rays: eikonal or auto) would put {} at {:.4g} ({:+.2g} %, {:.3g} standard errors), with a chi-square {:.3g} times this one. "
-      "The error bars do not contain this.",
-      shift.of->name, shift.of->value + shift.change, 100 * shift.change / shift.of->value, by_curved_rays_, ratio));
+      "The error bars contain this as the error of the model.",
+      job_.parameters[shift.index].name, value + shift.change, 100 * shift.change / value, by_curved_rays_, ratio));
+  return change;
 }
 
 /// Rays of any kind shift what they estimate in droplets of a few wavelengths, and with a free gain the residual need not show it: fitted
-/// to a wave image of the parameters found, they return something else. The difference is the bias to expect.
-void Fit::foretell_waves() {
+/// to a wave image of the parameters found, they return something else. The difference is the bias to expect: returned, searched unknowns first, where
+/// it matters beside the standard errors `sd`.
+std::optional<Eigen::VectorXd> Fit::foretell_waves(const Eigen::VectorXd& sd) {
   const auto has_waves = [](const Micrograph& m) {
     return std::holds_alternative<Droplet>(m.scene.sample) && m.scene.ceiling == Ceiling::one_way && m.scene.microscope.objective_na > 0;
   };
-  if (stopped_ || unknowns_.searched.empty() || !std::all_of(job_.micrographs.begin(), job_.micrographs.end(), has_waves)) return;
+  if (stopped_ || unknowns_.searched.empty() || !std::all_of(job_.micrographs.begin(), job_.micrographs.end(), has_waves)) return std::nullopt;
   constexpr double kMostSeconds = 10;  // for a warning
   std::vector<PixelSet> sets;
   for (int g = 0; g < frames_; ++g) {
@@ -1354,7 +1361,7 @@ void Fit::foretell_waves() {
     waves.method = "auto";
     waves.rays = Rays::straight;
     const WaveChoice choice = wave_choice(waves, theta_);
-    if (choice.seconds_an_image > (job_.options.choose_waves ? job_.options.max_seconds : kMostSeconds)) return;
+    if (choice.seconds_an_image > (job_.options.choose_waves ? job_.options.max_seconds : kMostSeconds)) return std::nullopt;
     const Image image = lit(job_.micrographs[g], theta_, render(waves, plan(waves, theta_), theta_, {}, job_.options.threads).intensity);
     PixelSet set = pixel_set(job_.micrographs[g], sigma_[g], pixels_[g]);
     for (std::size_t i = 0; i < set.pixels.size(); ++i)
@@ -1368,13 +1375,15 @@ void Fit::foretell_waves() {
   few.interrupted = job_.options.interrupted;
   Eigen::VectorXd searched = best_;
   problem.solve(searched, few);
-  const Shift shift = largest_shift(problem.theta());
+  const Eigen::VectorXd change = change_of_unknowns(theta_, problem.theta());
+  const Shift shift = largest_shift(change, sd);
   by_waves_ = shift.standard_errors;
-  if (by_waves_ < kShiftThatMatters) return;
+  if (by_waves_ < kShiftThatMatters) return std::nullopt;
   result_.warnings.push_back(fmt::format(
       "Rays are not the image of this sample: fitted to a wave-optical image of the parameters found here, rays return {} off by {:+.2g} ({:+.2g} %, "
-      "{:.3g} standard errors). The error bars do not contain this; physics.ceiling: wave does away with it.",
-      shift.of->name, shift.change, 100 * shift.change / shift.of->value, by_waves_));
+      "{:.3g} standard errors). The error bars contain this as the error of the model; physics.ceiling: wave does away with it.",
+      job_.parameters[shift.index].name, shift.change, 100 * shift.change / theta_[static_cast<std::size_t>(shift.index)], by_waves_));
+  return change;
 }
 
 /// Propagation is itself a hundredth to a twentieth of the image away from Maxwell's equations, and samples are not the field. A radial twin has an exact
@@ -1463,6 +1472,10 @@ void Fit::report() {
   }
   result_.interval_degrees_of_freedom = dof;
 
+  const Eigen::VectorXd sd = inverse.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const std::optional<Eigen::VectorXd> by_curved = foretell_curved_rays(sd), by_waves = foretell_waves(sd);
+  for (const auto& left_out : {by_curved, by_waves})
+    if (left_out) inverse.covariance += *left_out * left_out->transpose();
   result_.log_share = log_share(projected_information(*problem_), job_, unknowns_);
   result_.covariance = inverse.covariance;
   const Eigen::VectorXd inverse_sd =
@@ -1472,15 +1485,15 @@ void Fit::report() {
   result_.covariance_kind = covariance_words();
   if (along > 1) result_.covariance_kind += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters", along);
   if (!shifts.isZero(0)) result_.covariance_kind += ", and the error of wave propagation" + std::string(shifts.cols() > 1 ? " and of sampling" : "") + " by the exact image of a radial twin";
+  if (by_curved) result_.covariance_kind += ", and what curved rays would change";
+  if (by_waves) result_.covariance_kind += ", and what rays lose of a wave-optical image";
   report_parameters(inverse, of_noise);
-  judge_identifiability(result_, job_, unknowns_, factor, inverse);
+  judge_identifiability(result_, job_, unknowns_, factor, of_noise);
   weigh_inputs(of_noise);
-  const bool signal = shows_signal(data_chi_square);
+  const bool signal = judge_description(data_chi_square);
   if (!signal) result_.identifiable = false;
   report_micrographs();
   collect_warnings();
-  foretell_curved_rays();
-  foretell_waves();
   if (unknowns_.size() == 0) result_.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
   result_.evaluations = evaluations_ + problem_->evaluations();
   // Since then, too: profiles and warnings may be half done.

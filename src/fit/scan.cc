@@ -32,24 +32,39 @@ constexpr int kFirstSteps = 2;
 
 struct Axis {
   int searched = 0;
-  std::vector<double> values;
+  std::vector<double> values;  ///< of the grid, ascending
 };
 
-std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std::vector<double>& phase_per_unit) {
+/// Where the line through (x, y), both ascending, has `y`; beyond its ends, there.
+double inverse_of(const std::vector<double>& x, const std::vector<double>& y, double wanted) {
+  const std::size_t above = static_cast<std::size_t>(std::lower_bound(y.begin(), y.end(), wanted) - y.begin());
+  if (above == 0) return x.front();
+  if (above == y.size()) return x.back();
+  return x[above - 1] + (x[above] - x[above - 1]) * (wanted - y[above - 1]) / (y[above] - y[above - 1]);
+}
+
+/// Steps below a radian, and below `longest`, however fast the fringes are where.
+std::vector<double> steps_along(const FringePhase& fringes, double longest) {
+  std::vector<double> steps{0};
+  for (std::size_t i = 1; i < fringes.value.size(); ++i)
+    steps.push_back(steps.back() + std::max(fringes.radians[i] - fringes.radians[i - 1], (fringes.value[i] - fringes.value[i - 1]) / longest));
+  const int points = static_cast<int>(std::clamp(std::ceil(steps.back()), 1.0, static_cast<double>(kMostPointsPerAxis)));
+  std::vector<double> values;
+  // Cell middles: the bounds themselves are where models degenerate.
+  for (int i = 0; i < points; ++i) values.push_back(inverse_of(fringes.value, steps, steps.back() * (i + 0.5) / points));
+  return values;
+}
+
+std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std::vector<FringePhase>& fringes) {
   std::vector<Axis> axes;
   for (std::size_t j = 0; j < unknowns.searched.size(); ++j) {
+    if (fringes[j].value.empty()) continue;
     const Parameter& parameter = job.parameters[unknowns.searched[j]];
-    const double width = parameter.upper - parameter.lower;
-    if (!(phase_per_unit[j] > 0) || !std::isfinite(width) || !(width > 0)) continue;
-    double fewest = kFewestPointsPerAxis;
+    double longest = (parameter.upper - parameter.lower) / kFewestPointsPerAxis;
     for (const Micrograph& m : job.micrographs)
       if (const Droplet* droplet = std::get_if<Droplet>(&m.scene.sample); droplet && droplet->diameter_um.index == unknowns.searched[j])
-        fewest = std::max(fewest, std::ceil(width / (kDiameterStep * parameter.upper)));
-    const int points = static_cast<int>(std::clamp(std::ceil(width * phase_per_unit[j]) + 1, fewest, static_cast<double>(kMostPointsPerAxis)));
-    Axis axis{static_cast<int>(j), {}};
-    // Cell middles: the bounds themselves are where models degenerate.
-    for (int i = 0; i < points; ++i) axis.values.push_back(parameter.lower + width * (i + 0.5) / points);
-    axes.push_back(std::move(axis));
+        longest = std::min(longest, kDiameterStep * parameter.upper);
+    axes.push_back({static_cast<int>(j), steps_along(fringes[j], longest)});
   }
   if (axes.empty()) return axes;
   // The rest moves the minima along the fringes' axes. But a centre: the picture has shown it.
@@ -62,7 +77,7 @@ std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std
   for (std::size_t j = 0; j < unknowns.searched.size() && product * kPlacesWithoutFringes <= kMostPointsWithoutFringes; ++j) {
     const Parameter& parameter = job.parameters[unknowns.searched[j]];
     const double width = parameter.upper - parameter.lower;
-    if (phase_per_unit[j] > 0 || !std::isfinite(width) || !(width > 0) || is_centre(unknowns.searched[j])) continue;
+    if (!fringes[j].value.empty() || !std::isfinite(width) || !(width > 0) || is_centre(unknowns.searched[j])) continue;
     Axis axis{static_cast<int>(j), {}};
     for (int i = 0; i < kPlacesWithoutFringes; ++i) axis.values.push_back(parameter.lower + width * (i + 0.5) / kPlacesWithoutFringes);
     axes.push_back(std::move(axis));
@@ -156,6 +171,43 @@ Eigen::VectorXd spread_point(int index, const FitJob& job, const Unknowns& unkno
 
 }  // namespace
 
+double FringePhase::at(double v) const { return inverse_of(radians, value, v); }
+
+std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknowns, const Theta& theta) {
+  // A rate may be largest anywhere between the bounds (a voltage just above its threshold).
+  constexpr int kIntervals = 16;
+  // Of hundreds of rows of a table a few dozen show it.
+  const std::size_t frames = job.micrographs.size(), stride = (frames + 31) / 32;
+  std::vector<FringePhase> result;
+  for (const int index : unknowns.searched) {
+    result.emplace_back();
+    const Parameter& parameter = job.parameters[index];
+    const double width = parameter.upper - parameter.lower;
+    if (!std::isfinite(width) || !(width > 0)) continue;
+    std::array<Theta, 3> others{theta, theta, theta};
+    for (const int other : unknowns.searched) {
+      const Parameter& bounds = job.parameters[other];
+      if (std::isfinite(bounds.upper - bounds.lower)) others[1][static_cast<std::size_t>(other)] = bounds.lower, others[2][static_cast<std::size_t>(other)] = bounds.upper;
+    }
+    std::vector<double> rates;
+    FringePhase fringes;
+    for (int i = 0; i <= kIntervals; ++i) {
+      fringes.value.push_back(parameter.lower + width * i / kIntervals);
+      double fastest = 0;
+      for (Theta& probe : others) {
+        probe[static_cast<std::size_t>(index)] = fringes.value.back();
+        for (std::size_t g = 0; g < frames; g += stride)
+          if (const double rate = fringe_phase_per_unit(job.micrographs[g].scene, probe, index); std::isfinite(rate)) fastest = std::max(fastest, rate);
+      }
+      rates.push_back(fastest);
+    }
+    fringes.radians.push_back(0);
+    for (std::size_t i = 1; i < rates.size(); ++i) fringes.radians.push_back(fringes.radians.back() + std::max(rates[i - 1], rates[i]) * width / kIntervals);
+    if (fringes.radians.back() > 0) result.back() = std::move(fringes);
+  }
+  return result;
+}
+
 double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
   if (minimum.searched.size() == 0) return 0;
   return (minimum.information * (other - minimum.searched)).norm();
@@ -183,7 +235,7 @@ Eigen::MatrixXd projected_information(const LeastSquares& problem) {
 }
 
 ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                const std::vector<double>& phase_per_unit, double hopeless_above) {
+                const std::vector<FringePhase>& fringes, double hopeless_above) {
   ScanResult result;
   const FitOptions& options = job.options;
   const auto interrupted = [&] { return options.interrupted && options.interrupted->load(); };
@@ -197,7 +249,7 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
   const int candidates = std::max(1, options.scan_candidates);
   std::vector<std::pair<double, Eigen::VectorXd>> starts;
-  const std::vector<Axis> axes = axes_of(job, unknowns, phase_per_unit);
+  const std::vector<Axis> axes = axes_of(job, unknowns, fringes);
   std::size_t product = axes.empty() ? 0 : 1;
   for (const Axis& axis : axes) product = std::min<std::size_t>(product * axis.values.size(), 1000000);
   if (options.progress && product > 0) options.progress("scanning for the fringe order");
@@ -269,7 +321,8 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
       if (apart.size() >= 4 * kMostBatches * static_cast<std::size_t>(candidates) || !std::isfinite(objective)) break;
       const bool near = std::any_of(apart.begin(), apart.end(), [&](const auto& other) {
         return std::all_of(axes.begin(), axes.end(), [&](const Axis& axis) {
-          return std::abs(x[axis.searched] - other.second[axis.searched]) * phase_per_unit[static_cast<std::size_t>(axis.searched)] < 1;
+          const FringePhase& phase = fringes[static_cast<std::size_t>(axis.searched)];
+          return std::abs(phase.at(x[axis.searched]) - phase.at(other.second[axis.searched])) < 1;
         });
       });
       if (!near) apart.emplace_back(objective, x);
@@ -303,9 +356,9 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   return result;
 }
 
-double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start, const std::vector<double>& phase_per_unit) {
+double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start, const std::vector<FringePhase>& fringes) {
   constexpr int kFew = 150;
-  const std::vector<Axis> axes = axes_of(job, unknowns, phase_per_unit);
+  const std::vector<Axis> axes = axes_of(job, unknowns, fringes);
   double lowest = std::numeric_limits<double>::infinity();
   for (int i = -1; i < (axes.empty() ? 0 : kFew); ++i) {
     problem.evaluate(i < 0 ? start : spread_point(i, job, unknowns, axes, start), false);

@@ -23,14 +23,24 @@ struct ScanResult {
   bool interrupted = false;
 };
 
-/// `problem` holds the subsample; `start` is the user's. `phase_per_unit[j]` > 0 marks fringe-forming parameters; others, but centres, are
-/// scanned coarsely where the grid stays small (docs/methods.md, "Scan").
+/// The phase that fringes gain along one searched unknown: linear between values that ascend from its lower to its upper bound. Empty for one that
+/// forms no fringes, or has no bounds to scan between.
+struct FringePhase {
+  std::vector<double> value, radians;
+  double at(double v) const;  ///< radians from the lower bound on
+};
+
+/// Of every searched unknown, the fastest of all images, and of the others at `theta` and at either end of what they may be.
+std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknowns, const Theta& theta);
+
+/// `problem` holds the subsample; `start` is the user's. Unknowns that form no fringes, but centres, are scanned coarsely where the grid stays small
+/// (docs/methods.md, "Scan").
 /// Minima whose objective stays above `hopeless_above` are not polished further: another branch has beaten them.
 ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                const std::vector<double>& phase_per_unit, double hopeless_above);
+                const std::vector<FringePhase>& fringes, double hopeless_above);
 
 /// The lowest objective at `start` and at a few places spread over what scan() would look at: to compare two starts of the other unknowns.
-double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start, const std::vector<double>& phase_per_unit);
+double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start, const std::vector<FringePhase>& fringes);
 
 /// The same as scan() from given starts instead of a grid, best first, of which four at most (options.scan_candidates) are polished; `steps` of
 /// the solver for each before the worst are dropped, and those that `same` finds on the way to a minimum that is already known.

@@ -120,19 +120,21 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
   for (int a = 0; a < n; ++a)
     for (int b = a + 1; b < n; ++b) {
       const ParameterEstimate &pa = result.parameters[a], &pb = result.parameters[b];
-      if (!(std::abs(result.correlation(a, b)) > kTogether)) continue;
+      // By the data alone: what models err by moves all parameters together, too, and makes no valley.
+      const double of_data_a = std::sqrt(inverse.covariance(a, a)), of_data_b = std::sqrt(inverse.covariance(b, b)), correlation = inverse.covariance(a, b) / (of_data_a * of_data_b);
+      if (!(std::abs(correlation) > kTogether)) continue;
       if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) continue;  // the prior's own correlation
+      if (!(of_data_a > kValley * inverse.conditional_sd[a] && of_data_b > kValley * inverse.conditional_sd[b])) continue;
       const double sa = std::sqrt(result.covariance(a, a)), sb = std::sqrt(result.covariance(b, b));
-      if (!(sa > kValley * inverse.conditional_sd[a] && sb > kValley * inverse.conditional_sd[b])) continue;
       result.identifiable = false;
       FisherDirection direction;
-      const double sign = result.correlation(a, b) > 0 ? 1 : -1;
+      const double sign = correlation > 0 ? 1 : -1;
       Eigen::Vector2d weights(sa / scale[a], sign * sb / scale[b]);
       direction.stderr_ = weights.norm();
       weights /= direction.stderr_;
       direction.weights = {{pa.name, weights[0]}, {pb.name, weights[1]}};
       direction.identifiable = false;
-      const double across = t * sa * std::sqrt(std::max(0.0, 1 - std::pow(result.correlation(a, b), 2)));
+      const double across = t * sa * std::sqrt(std::max(0.0, 1 - correlation * correlation));
       direction.words = fmt::format(
           "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the "
           "two "
@@ -155,6 +157,8 @@ std::string verdict(const FitResult& result, bool signal) {
   if (!signal)
     sentences.push_back(rows ? "The table shows no signal of the model: a constant explains it as well, so that the values mean nothing."
                              : "The image shows no signal of the model: a constant image explains it as well, so that the values mean nothing.");
+  else if (!result.described)
+    sentences.push_back(fmt::format("The model is not that of the {}: it leaves {:.0f} % of what there is to see unexplained, so that the values mean little.", rows ? "table" : "image", 100 * result.left_over));
   for (const FisherDirection& direction : result.directions)
     if (!direction.identifiable && !direction.words.empty())
       sentences.push_back("Not identifiable: " + direction.words + ".");

@@ -7,7 +7,7 @@
 namespace birefit::estimation {
 
 /// Fills directions, identifiable and the NaN standard errors from the factor of the whitened Jacobian (priors
-/// included). Needs result.parameters, covariance, correlation and interval_degrees_of_freedom.
+/// included), of which `inverse` is the inverse. Needs result.parameters, covariance and interval_degrees_of_freedom.
 void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns& unknowns,
                            const Eigen::MatrixXd& factor, const Inverse& inverse);
 

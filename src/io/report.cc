@@ -877,6 +877,7 @@ std::string badge(const FitResult& result) {
   if (result.has_answer()) return "<span class=\"badge good\">Answer</span>";
   const char* reason = result.interrupted     ? "interrupted"
                        : !result.converged    ? "not converged"
+                       : !result.described    ? "not described by the model"
                        : result.ambiguous     ? "ambiguous"
                        : !result.identifiable ? "not identifiable"
                                               : "pinned at a bound";

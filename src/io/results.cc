@@ -172,6 +172,8 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["converged"] = result.converged;
   json["interrupted"] = result.interrupted;
   json["pinned"] = result.pinned;
+  json["described"] = result.described;
+  json["left_over"] = number(result.left_over);
   json["ambiguous"] = result.ambiguous;
   json["rivals"] = Json::array();
   for (const RivalMinimum& rival : result.rivals) {

@@ -199,6 +199,7 @@ std::optional<RecordedFit> load_recorded_fit(const std::filesystem::path& fit_js
     fit.ambiguous = root.at("ambiguous");
     fit.identifiable = root.at("identifiable");
     fit.pinned = root.at("pinned");
+    fit.described = root.at("described");
     fit.verdict = root.at("verdict");
     fit.interval_degrees_of_freedom = root.at("interval_degrees_of_freedom").is_null() ? std::numeric_limits<double>::infinity()
                                                                                        : root.at("interval_degrees_of_freedom").get<double>();
@@ -238,6 +239,7 @@ std::optional<RecordedFit> load_recorded_fit(const std::filesystem::path& fit_js
 
 std::string verdict_word(const FitResult& result) {
   if (!result.converged || result.interrupted) return "not converged";
+  if (!result.described) return "not described";
   if (result.ambiguous) return "ambiguous";
   if (!result.identifiable) return "not identifiable";
   return result.pinned ? "at a bound" : "answer";

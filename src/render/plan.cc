@@ -233,7 +233,8 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
     plan.warnings.push_back(fmt::format(
         "The droplet is {:.3g} wavelengths across: straight rays leave out diffraction and walk-off. Measured on exact "
         "solutions of 5 to 20 um droplets of birefringence 0.22, ray images differ by 25 to 60 % RMS and a fitted "
-        "birefringence comes out 1 to 7 % low; the error bars do not contain this.",
+        "birefringence comes out 1 to 7 % low. Where microscope.objective_na is given, a fit foretells what it is here and its error bars contain that; "
+        "elsewhere they do not.",
         size));
   if (const double turned = turned_by_core(o); turned > 0.005 && scene.rays == Rays::straight)
     plan.warnings.push_back(fmt::format(

@@ -253,7 +253,7 @@ TEST(ChoosingWaves, NotWhereItWouldTakeTooLong) {
 }
 
 // By how much rays are off is foretold from the picture alone: a fit by rays to the waves of what it found returns what it lost, with the right sign.
-// It is first order in that loss: where rays are off by percents, it may fall far short of it.
+// It is first order in that loss: where rays are off by percents, it may fall far short of it. The error bar holds it, and with it the truth.
 TEST(ChoosingWaves, RaysForetellTheirBias) {
   int told = 0;
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
@@ -268,8 +268,11 @@ TEST(ChoosingWaves, RaysForetellTheirBias) {
       const double bias = p->value - truth;
       std::printf("  %u %s: off by %+.4g, foretold %+.4g, standard error %.2g\n", seed, name.c_str(), bias, foretold, p->stderr_);
       EXPECT_GT(foretold * bias, 0) << name;
-      // Foretold at the biased values, not at the truth, and by a fit of its own: the size to a factor of two (here 0.2 to 1.6).
-      EXPECT_LT(std::abs(foretold), 2 * std::abs(bias)) << name;
+      EXPECT_LT(std::abs(bias), 3 * p->stderr_) << name;
+      EXPECT_GE(p->stderr_, 0.94 * std::abs(foretold)) << name;  // among other things; the warning has two digits
+      // The bias has the noise of this picture in it.
+      const double others = std::sqrt(std::max(0.0, p->stderr_ * p->stderr_ - foretold * foretold));
+      EXPECT_LT(std::abs(foretold), std::abs(bias) + 2 * others) << name;
       ++told;
     }
   }

@@ -12,6 +12,7 @@
 #include "birefit/fit.h"
 #include "birefit/render.h"
 #include "fit/least_squares.h"
+#include "fit/scan.h"
 
 namespace birefit {
 namespace {
@@ -461,6 +462,107 @@ TEST(Fit, NoiseAloneIsNoSignal) {
     const FitResult result = fit(bar.job);
     EXPECT_FALSE(result.identifiable) << seed << ' ' << result.verdict;
     EXPECT_NE(result.verdict.find("no signal"), std::string::npos) << result.verdict;
+  }
+}
+
+// Stripes that the model cannot draw, orthogonal to all it can: their part of the picture's sum of squares is what it leaves over, noise aside.
+TEST(Fit, WhatTheModelLeavesOverIsItsShareOfThePicture) {
+  for (const double stripes : {0.0, 250.0, 800.0}) {
+    Bar bar;
+    bar.free(bar.bias, 650, 100, 1400);
+    bar.free_linear();
+    Micrograph& micrograph = bar.add_image(40, 40, bar.bias);
+    constexpr double kNoise = 10;
+    micrograph.noise = NoiseModel{kNoise, 0, false};
+    Gaussian gaussian(7);
+    expose(micrograph, 3000, 100, 700, 0.4, [&](int x, int, double) { return (x % 2 ? stripes : -stripes) + kNoise * gaussian(); });
+    const FitResult result = fit(bar.job);
+    double mean = 0, variance = 0;
+    for (const double v : result.micrographs[0].fitted.values()) mean += v / 1600;
+    for (const double v : result.micrographs[0].fitted.values()) variance += (v - mean) * (v - mean) / 1600;
+    const double share = stripes * stripes / (variance + stripes * stripes);
+    // Noise is as large as stripes on the average of 1600 pixels to this.
+    EXPECT_NEAR(result.left_over, share, 5 * 2 * kNoise * std::max(stripes, kNoise) / 40 / (variance + stripes * stripes));
+    EXPECT_EQ(result.described, share < 0.5);
+    EXPECT_EQ(result.has_answer(), share < 0.5) << result.verdict;
+    EXPECT_EQ(result.verdict.find("not that of the image") != std::string::npos, share > 0.5) << result.verdict;
+  }
+}
+
+// phase = pi V/V_half (1 + c): linear in V, fastest at the least V_half; along V_half fastest at the largest V and next to the least V_half, so that steps have to be unequal.
+TEST(Scan, FringePhasesAreThoseOfTheFastestFringes) {
+  Bar bar(700, 0.4);
+  bar.free(bar.bias, 650, 100, 1400);
+  bar.free(bar.half_wave, 1500, 800, 4000);
+  bar.free_linear();
+  bar.add_image(4, 4, bar.bias);
+  const auto unknowns = estimation::Unknowns::of(bar.job);
+  const std::vector<estimation::FringePhase> fringes = estimation::fringe_phases(bar.job, unknowns, bar.job.parameters.values());
+  ASSERT_EQ(fringes.size(), 2u);
+  for (std::size_t j = 0; j < 2; ++j) {
+    const Parameter& parameter = bar.job.parameters[unknowns.searched[j]];
+    const auto exact = [&](double from, double to) {
+      return std::numbers::pi * 1.4 * (unknowns.searched[j] == bar.bias.index ? (to - from) / 800 : 1400 * (1 / from - 1 / to));
+    };
+    EXPECT_EQ(fringes[j].at(parameter.lower), 0);
+    const double step = (parameter.upper - parameter.lower) / 50;
+    for (double from = parameter.lower; from + step <= parameter.upper; from += step) {
+      const double said = fringes[j].at(from + step) - fringes[j].at(from);
+      // Never less; more by how much the rate changes within a sixteenth of the bounds: (1000/800)^2.
+      EXPECT_GE(said, exact(from, from + step) * (1 - 1e-6)) << parameter.name << ' ' << from;
+      EXPECT_LE(said, exact(from, from + step) * 1.5626) << parameter.name << ' ' << from;
+    }
+  }
+}
+
+// And the grid that is made of them: no two neighbours a radian apart, however large the droplet and weak the field.
+TEST(Scan, NoStepIsLongerThanARadian) {
+  ParameterTable table;
+  const auto add = [&](const char* name, double value, double lower, double upper) {
+    Parameter p;
+    p.name = name, p.value = value, p.lower = lower, p.upper = upper, p.free = upper > lower;
+    return table.add(p);
+  };
+  FitJob job;
+  Micrograph m;
+  m.name = "droplet";
+  Droplet droplet;
+  droplet.diameter_um = add("diameter_um", 6, 5.5, 16);
+  AxialDirector axial;
+  axial.reduced_field = add("reduced_field", 30, 1, 39);
+  droplet.director = axial;
+  m.scene.sample = droplet;
+  m.scene.material = ConstantIndices{add("ordinary", 1.52, 0, 0), add("birefringence", 0.3, 0, 0)};
+  m.scene.surround_index = add("surround", 1.5, 0, 0);
+  m.scene.microscope.wavelength_nm = add("wavelength_nm", 590, 0, 0);
+  m.scene.microscope.polarizer_deg = add("polarizer_deg", 0, 0, 0);
+  m.scene.microscope.analyzer_deg = add("analyzer_deg", 90, 0, 0);
+  m.scene.view.width = m.scene.view.height = 32;
+  m.scene.view.pixel_size_um = 0.6;
+  m.scene.view.center_x_px = m.scene.view.center_y_px = add("center", 15.5, 0, 0);
+  m.scene.view.rotation_deg = add("rotation_deg", 0, 0, 0);
+  m.noise = NoiseModel{0.01, 0, false};
+  job.parameters = table;
+  m.values = render(m.scene, plan(m.scene, table.values()), table.values(), {}, 1).intensity;
+  m.mask = Mask(32, 32, 1);
+  job.micrographs.push_back(m);
+  const FitResult result = fit(job);
+  ASSERT_EQ(result.scans.size(), 2u);
+  for (const ScanTrace& scan : result.scans) {
+    const int index = table.find(scan.name).index;
+    double widest = 0, narrowest = 1e9;
+    for (std::size_t i = 1; i < scan.value.size(); ++i) {
+      Theta theta = table.values();
+      theta[static_cast<std::size_t>(droplet.diameter_um.index)] = 16;
+      const double step = scan.value[i] - scan.value[i - 1];
+      theta[static_cast<std::size_t>(index)] = 0.5 * (scan.value[i] + scan.value[i - 1]);
+      // The rate in the middle for the step. It may be a little larger between two of the 17 places where the scan asks for it.
+      EXPECT_LT(fringe_phase_per_unit(m.scene, theta, index) * step, 1.05) << scan.name << ' ' << theta[static_cast<std::size_t>(index)];
+      widest = std::max(widest, step), narrowest = std::min(narrowest, step);
+    }
+    if (index == axial.reduced_field.index) {
+      EXPECT_GT(widest, 2 * narrowest);  // a field's fringes are fast where it is weak
+    }
   }
 }
 
