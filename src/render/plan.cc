@@ -328,9 +328,11 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
   };
   double largest_phase = 0;
   for (int i = 0; i <= 64; ++i) largest_phase = std::max(largest_phase, phase_at(edge * i / 64));
-  // Half a pixel apart. Where the phase turns back its ends tell nothing of what it does in between.
-  std::vector<double> change;
-  for (int i = -1; i < 2 * bins + 4; ++i) change.push_back(std::abs(phase_at(std::abs(0.5 * (i + 1) * px)) - phase_at(std::abs(0.5 * i * px))));
+  // Half a pixel apart, by the parabola through three places: all that the phase goes, there and back, and by how much more it would go were it everywhere as fast as
+  // at the pixel's faster end. The difference of the ends alone is nothing where the phase turns back.
+  std::vector<double> step;
+  for (int i = -1; i < 2 * bins + 4; ++i) step.push_back(phase_at(std::abs(0.5 * (i + 1) * px)) - phase_at(std::abs(0.5 * i * px)));
+  const auto across = [&](std::size_t i) { return std::abs(step[i]) + std::abs(step[i + 1]) + 2 * std::abs(step[i + 1] - step[i]); };
   sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
     const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
     // The cross turns within the innermost pixels; at the rim intensity ends like a root.
@@ -340,7 +342,7 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
     if (high > edge - px && low < edge + px) return 3.0;
     // Of pixels whose middles lie in this bin, r - 1/2 to r + 1/2.
     const std::size_t first = static_cast<std::size_t>(std::lround(2 * r - 1));
-    return std::max({change[first] + change[first + 1], change[first + 1] + change[first + 2], change[first + 2] + change[first + 3]});
+    return std::max({across(first), across(first + 1), across(first + 2)});
   });
   const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
   plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel", most));
