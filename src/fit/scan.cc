@@ -173,6 +173,20 @@ Eigen::VectorXd spread_point(int index, const FitJob& job, const Unknowns& unkno
 
 double FringePhase::at(double v) const { return inverse_of(radians, value, v); }
 
+namespace {
+
+/// 0 where the bounds leave what the model can do (no equilibrium, beyond a clearing point): there is no image to look at either.
+double rate_at(const Scene& scene, const Theta& theta, int index) {
+  try {
+    const double rate = fringe_phase_per_unit(scene, theta, index);
+    return std::isfinite(rate) ? rate : 0;
+  } catch (const UserError&) {
+    return 0;
+  }
+}
+
+}  // namespace
+
 std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknowns, const Theta& theta) {
   // A rate may be largest anywhere between the bounds (a voltage just above its threshold).
   constexpr int kIntervals = 16;
@@ -197,7 +211,7 @@ std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknow
       for (Theta& probe : others) {
         probe[static_cast<std::size_t>(index)] = fringes.value.back();
         for (std::size_t g = 0; g < frames; g += stride)
-          if (const double rate = fringe_phase_per_unit(job.micrographs[g].scene, probe, index); std::isfinite(rate)) fastest = std::max(fastest, rate);
+          fastest = std::max(fastest, rate_at(job.micrographs[g].scene, probe, index));
       }
       rates.push_back(fastest);
     }
