@@ -3,6 +3,8 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <numbers>
 
 #include "birefit/render.h"
@@ -458,23 +460,29 @@ TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
     for (std::size_t k = 0; k < active.size(); ++k) {
       const int i = active[k];
       // Surfaces of propagated spheres are ramps a third of a wavelength thick whose second derivative jumps: differences must be short beside that.
-      const double h = (p.wave ? 1e-5 : 5e-5) * std::max(0.1, std::abs(theta[static_cast<std::size_t>(i)]));
+      const double longest = (p.wave ? 1e-5 : 5e-5) * std::max(0.1, std::abs(theta[static_cast<std::size_t>(i)]));
       const auto at = [&](double step) {
         Theta moved = theta;
         moved[static_cast<std::size_t>(i)] += step;
         return render(c.scene, p, moved, {}, 1).intensity;
       };
-      const Image a = at(h), b = at(-h), a2 = at(h / 2), b2 = at(-h / 2);
-      double size = 0, error = 0;
-      for (std::size_t j = 0; j < a.size(); ++j) {
-        const double coarse = (a.values()[j] - b.values()[j]) / (2 * h), fine = (a2.values()[j] - b2.values()[j]) / h;
-        const double exact = (4 * fine - coarse) / 3;
-        size = std::max(size, std::abs(exact));
-        error = std::max(error, std::abs(exact - r.derivatives[k].values()[j]));
+      // A pixel is wrong by both steps or not at all: a kink near one of its points lies within the longer and not within the shorter.
+      std::vector<double> error(r.intensity.size(), std::numeric_limits<double>::infinity());
+      for (const double h : {longest, longest / 4}) {
+        const Image a = at(h), b = at(-h), a2 = at(h / 2), b2 = at(-h / 2);
+        Image exact = a;
+        double size = 0;
+        for (std::size_t j = 0; j < a.size(); ++j) {
+          const double coarse = (a.values()[j] - b.values()[j]) / (2 * h), fine = (a2.values()[j] - b2.values()[j]) / h;
+          exact.values()[j] = (4 * fine - coarse) / 3;
+          size = std::max(size, std::abs(exact.values()[j]));
+        }
+        // 1e-11/h: rounding of the differences.
+        for (std::size_t j = 0; j < a.size(); ++j)
+          error[j] = std::min(error[j], std::abs(exact.values()[j] - r.derivatives[k].values()[j]) / (1e-6 * size + 1e-11 / h));
+        any = any || size > 1e-6;
       }
-      any = any || size > 1e-6;
-      // 1e-11/h: rounding of the differences.
-      EXPECT_LT(error, 1e-6 * size + 1e-11 / h) << c.name << ", " << c.t.table[i].name;
+      EXPECT_LT(*std::max_element(error.begin(), error.end()), 1) << c.name << ", " << c.t.table[i].name;
     }
     EXPECT_TRUE(any) << c.name << " depends on nothing";
   }
