@@ -23,10 +23,12 @@ using namespace testing;
 
 struct Count {
   int problems = 0, right = 0, limits = 0;
-  int undecided = 0;     ///< ambiguous, the truth among the minima named
-  int without_right = 0; ///< ambiguous, and it is not
-  int refused = 0;       ///< no answer for other reasons
-  int timid = 0;  ///< of these three: the truth's chi-square lies kClear and more below that of every other minimum named
+  int undecided = 0;      ///< ambiguous, the truth among the minima named
+  int without_right = 0;  ///< ambiguous, and it is not
+  int refused = 0;        ///< no answer for other reasons
+  /// Of these three: the pictures do tell the parameters, and the truth's chi-square lies kClear and more below that of
+  /// every other minimum named.
+  int timid = 0;
   int wrong = 0;  ///< an answer with a searched parameter more than five standard errors off
   double seconds = 0;
 };
@@ -51,7 +53,8 @@ double errors_off(const RandomProblem& p, const FitResult& of, const Theta& thet
   for (const ParameterEstimate& e : of.parameters) {
     if (e.linear || !e.limit.empty()) continue;
     const int k = p.b.table.find(e.name).index;
-    const double off = std::abs(difference(p, k, theta[static_cast<std::size_t>(k)], truth[static_cast<std::size_t>(k)]));
+    const double off =
+        std::abs(difference(p, k, theta[static_cast<std::size_t>(k)], truth[static_cast<std::size_t>(k)]));
     worst = std::max(worst, std::isfinite(e.stderr_) ? off / e.stderr_ : std::numeric_limits<double>::infinity());
   }
   return worst;
@@ -60,6 +63,15 @@ constexpr double kFar = 5;
 
 bool is_true(const RandomProblem& p, const FitResult& of, const Theta& theta, const std::vector<Theta>& truths) {
   return std::any_of(truths.begin(), truths.end(), [&](const Theta& t) { return errors_off(p, of, theta, t) <= kFar; });
+}
+
+/// Errors mean nothing where a minimum is no parabola: two fits that end in the same place are in the same minimum.
+bool same_place(const RandomProblem& p, const FitResult& of, const Theta& a, const Theta& b) {
+  constexpr double kShare = 0.01;  // of the bounds
+  return std::all_of(of.parameters.begin(), of.parameters.end(), [&](const ParameterEstimate& e) {
+    const auto k = static_cast<std::size_t>(p.b.table.find(e.name).index);
+    return e.linear || std::abs(difference(p, static_cast<int>(k), a[k], b[k])) <= kShare * (e.upper - e.lower);
+  });
 }
 
 struct Outcome {
@@ -101,26 +113,34 @@ Outcome solve_one(const RandomProblem& p, const Posed& posed) {
   // A rival in the truth's other numbers is as good as the truth, and no mistake; in the very truth's it is the truth.
   double others = std::numeric_limits<double>::infinity();
   const auto named = [&](const Theta& theta) {
-    o.named = o.named || is_true(p, o.from_truth, theta, truths);
-    if (!is_true(p, o.from_truth, theta, {posed.truth})) others = std::min(others, chi_square_at(posed, theta));
+    const bool true_one =
+        is_true(p, o.from_truth, theta, {posed.truth}) || same_place(p, o.found, theta, o.from_truth.theta);
+    o.named = o.named || true_one || is_true(p, o.from_truth, theta, truths);
+    if (!true_one) others = std::min(others, chi_square_at(posed, theta));
   };
+  o.named = !o.wrong;
   named(o.found.theta);
   for (const RivalMinimum& rival : o.found.rivals) named(rival.theta);
-  o.timid = !o.found.has_answer() && o.truth_chi_square < others - kClear;
+  o.timid = !o.found.has_answer() && o.from_truth.identifiable && o.truth_chi_square < others - kClear;
   return o;
 }
 
 void describe(const RandomProblem& p, const Posed& posed, const Outcome& o, const std::string& name, int number) {
   const FitResult& r = o.found;
-  const char* how = r.ambiguous ? o.named ? "undecided" : "AMBIGUOUS WITHOUT THE RIGHT ONE" : !r.has_answer() ? "no answer" : "WRONG";
-  std::printf("  %s %d, noise %.4f, lamp %.4f, %s%s: %.1f standard errors off, chi-square %.1f, from the truth %.1f, of %d;",
-              name.c_str(), number, posed.noise / kProblemGain, p.lamp_jitter, how, o.timid ? " (timid)" : "", o.off,
-              o.chi_square, o.truth_chi_square, r.degrees_of_freedom);
+  const char* how = r.ambiguous       ? o.named ? "undecided" : "AMBIGUOUS WITHOUT THE RIGHT ONE"
+                    : !r.has_answer() ? "no answer"
+                                      : "WRONG";
+  std::printf(
+      "  %s %d, noise %.4f, lamp %.4f, %s%s: %.1f standard errors off, chi-square %.1f, from the truth %.1f, of %d;",
+      name.c_str(), number, posed.noise / kProblemGain, p.lamp_jitter, how, o.timid ? " (timid)" : "", o.off,
+      o.chi_square, o.truth_chi_square, r.degrees_of_freedom);
   for (const ParameterEstimate& e : r.parameters) {
     if (e.linear) continue;
     const ParameterEstimate* true_one = find_estimate(o.from_truth, e.name);
+    if (e.profiled) std::printf(" [%.6g, %.6g]", e.interval95_low, e.interval95_high);
     std::printf(" %s %.6g +- %.2g (truth %.6g, from there %.6g +- %.2g)", e.name.c_str(), e.value, e.stderr_,
-                posed.truth[static_cast<std::size_t>(p.b.table.find(e.name).index)], true_one->value, true_one->stderr_);
+                posed.truth[static_cast<std::size_t>(p.b.table.find(e.name).index)], true_one->value,
+                true_one->stderr_);
   }
   for (const RivalMinimum& rival : r.rivals) {
     std::printf(" rival %.2g (chi-square %.1f) at", rival.odds, chi_square_at(posed, rival.theta));
@@ -153,10 +173,12 @@ Count solve(const Family& family, int problems, int first = 1, Ceiling ceiling =
     if (!o.right()) describe(p, posed, o, family.name, first + i);
     std::fflush(stdout);
   });
-  std::printf("  %s: %d problems, %d right, %d limits, %d undecided, %d ambiguous without the right one, %d without an answer, %d WRONG; "
-              "%d timid; %.2f s each\n",
-              family.name.c_str(), count.problems, count.right, count.limits, count.undecided, count.without_right,
-              count.refused, count.wrong, count.timid, count.seconds / std::max(1, count.problems));
+  std::printf(
+      "  %s: %d problems, %d right, %d limits, %d undecided, %d ambiguous without the right one, %d without an answer, "
+      "%d WRONG; "
+      "%d timid; %.2f s each\n",
+      family.name.c_str(), count.problems, count.right, count.limits, count.undecided, count.without_right,
+      count.refused, count.wrong, count.timid, count.seconds / std::max(1, count.problems));
   return count;
 }
 
@@ -169,8 +191,9 @@ TEST_P(GlobalSearch, FindsTheOrder) {
   EXPECT_LE(count.timid, count.problems / 10);
 }
 
-// Between two rings of this droplet the retardance has its maximum: planned by what changes from one end of a pixel to the other, one point served
-// as the mean of pixels there, 0.04 wrong, and the fit left the truth by 11 standard errors when it was planned anew.
+// Between two rings of this droplet the retardance has its maximum: planned by what changes from one end of a pixel to
+// the other, one point served as the mean of pixels there, 0.04 wrong, and the fit left the truth by 11 standard errors
+// when it was planned anew.
 TEST(PixelMeansInAFit, APictureWhoseRetardanceTurnsBackWithinAPixel) {
   const Count count = solve(family("DropletInAField"), 1, 1617);
   EXPECT_EQ(count.right, 1);
@@ -183,7 +206,8 @@ TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   EXPECT_LE(count.timid, count.problems / 10);
 }
 
-// The same on pictures by wave optics, for the families that are finite: 100 of each. Ripples of large droplets may be as likely as each other.
+// The same on pictures by wave optics, for the families that are finite: 100 of each. Ripples of large droplets may be
+// as likely as each other.
 class LongWaveSearch : public GlobalSearch {};
 TEST_P(LongWaveSearch, IsNeverConfidentlyWrong) {
   const Count count = solve(GetParam(), problems_or(100), first_problem(), Ceiling::wave);
@@ -192,7 +216,8 @@ TEST_P(LongWaveSearch, IsNeverConfidentlyWrong) {
   EXPECT_LE(count.undecided, count.problems / 20);
 }
 
-// The lowest chi-square of this shell lies in a resonance 0.6 nm wide that follows the noise, 17 of its standard errors from the truth: the valley around it is the likelier answer.
+// The lowest chi-square of this shell lies in a resonance 0.6 nm wide that follows the noise, 17 of its standard errors
+// from the truth: the valley around it is the likelier answer.
 TEST(WaveSearch, AResonanceThatFollowsTheNoiseIsNotTheAnswer) {
   const Count count = solve(family("Shell"), 1, 69, Ceiling::wave);
   EXPECT_EQ(count.right, 1);
@@ -211,7 +236,9 @@ TEST_P(RandomProblems, SymmetriesShowTheSamePictures) {
     }
     for (Scene scene : p.scenes) {
       scene.intensity_accuracy = 1e-5;
-      const auto shown = [&](const Theta& theta) { return render(scene, plan(scene, theta), theta, {}, 1).intensity.values(); };
+      const auto shown = [&](const Theta& theta) {
+        return render(scene, plan(scene, theta), theta, {}, 1).intensity.values();
+      };
       const std::vector<double> expected = shown(posed.truth);
       for (const Theta& other : others) {
         const std::vector<double> values = shown(other);
@@ -221,7 +248,7 @@ TEST_P(RandomProblems, SymmetriesShowTheSamePictures) {
   }
 }
 
-// What an independent model shows is what the program shows.
+// What an independent model shows is what the program shows, to a sixth of the least noise.
 TEST_P(RandomProblems, PicturesAreTheProgramsToo) {
   for (int number = 1; number <= 10; ++number) {
     RandomProblem p = draw(GetParam(), number);
@@ -232,7 +259,7 @@ TEST_P(RandomProblems, PicturesAreTheProgramsToo) {
       const std::vector<double> values = render(scene, plan(scene, truth), truth, {}, 1).intensity.values();
       for (std::size_t i = 0; i < values.size(); ++i) {
         if (!p.masks.empty() && !p.masks[g].values()[i]) continue;
-        ASSERT_NEAR(values[i], p.light[g][i], 3e-4) << number << " " << g;
+        ASSERT_NEAR(values[i], p.light[g][i], 5e-4) << number << " " << g;
       }
     }
   }

@@ -83,7 +83,8 @@ inline double birefringence_along_z(double n_o, double birefringence, double til
   return n_o * n_e / std::hypot(n_e * s, n_o * c) - n_o;
 }
 
-/// What of a cell's retardance is searched: light along z knows only the product of thickness and birefringence_along_z.
+/// What of a cell's retardance is searched: light along z knows only the product of thickness and
+/// birefringence_along_z.
 struct CellSize {
   ParameterRef thickness_um, birefringence, tilt_deg;
   double retardance_um = 0;
@@ -95,7 +96,8 @@ inline CellSize draw_size(RandomProblem& p, double most_waves, double most_tilt_
   const double thickness = p.scaled(2, std::min(30.0, most_waves * 0.55 / birefringence));
   const int unknown = p.count(0, most_tilt_deg > 0 ? 2 : 1);
   CellSize size;
-  size.thickness_um = unknown == 0 ? p.around("thickness_um", thickness, 0.25, 0.3) : p.b.fixed("thickness_um", thickness);
+  size.thickness_um =
+      unknown == 0 ? p.around("thickness_um", thickness, 0.25, 0.3) : p.b.fixed("thickness_um", thickness);
   const double lower = birefringence * p.between(0.3, 0.9), upper = birefringence * p.between(1.1, 1.8);
   size.birefringence = unknown == 1 ? p.b.fitted("birefringence", birefringence, lower, upper)
                                     : p.b.fixed("birefringence", birefringence);
@@ -145,7 +147,8 @@ inline void uniform_cell(RandomProblem& p) {
   const CellViews views = draw_views(p, 3, 5);
   const CellSize size = draw_size(p, 12, 80);
   const CellAngle angle = draw_angle(p, true);
-  const Scene s = cell_scene(p, size, angle, Cell{size.thickness_um, UniformDirector{{}, angle.azimuth_deg, size.tilt_deg}});
+  const Scene s =
+      cell_scene(p, size, angle, Cell{size.thickness_um, UniformDirector{{}, angle.azimuth_deg, size.tilt_deg}});
   look(p, s, views, light_of(size, 0, angle.sum_deg));
   maybe_unsteady(p, views);
 }
@@ -156,7 +159,8 @@ inline void twisted_cell(RandomProblem& p) {
   const CellSize size = draw_size(p, 5, 30);
   const CellAngle angle = draw_angle(p, false);
   const ParameterRef twist = p.anywhere("twist_deg", 10, 180);
-  const Scene s = cell_scene(p, size, angle, Cell{size.thickness_um, TwistedDirector{twist, angle.azimuth_deg, size.tilt_deg}});
+  const Scene s =
+      cell_scene(p, size, angle, Cell{size.thickness_um, TwistedDirector{twist, angle.azimuth_deg, size.tilt_deg}});
   look(p, s, views, light_of(size, p.truth_of(twist), angle.sum_deg));
   maybe_unsteady(p, views);
 }

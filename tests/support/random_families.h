@@ -16,8 +16,8 @@ namespace birefit::testing {
 struct Family {
   std::string name;
   void (*make)(RandomProblem&);
-  int quick = 4;     ///< problems of the ordinary suite, seconds all together; 0 where one takes that long
-  int many = 1000;   ///< of the long one: fewer where one takes ten seconds and more
+  int quick = 4;    ///< problems of the ordinary suite, seconds all together; 0 where one takes that long
+  int many = 1000;  ///< of the long one: fewer where one takes ten seconds and more
 };
 
 inline std::ostream& operator<<(std::ostream& out, const Family& family) { return out << family.name; }

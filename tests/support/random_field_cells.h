@@ -135,11 +135,12 @@ inline void helix_cell(RandomProblem& p) {
   helix.pitch_um = right;
   helix.azimuth_deg = angle.azimuth_deg;
   const bool unwound = p.chance(0.4);
-  if (unwound) helix.modulus = p.chance(0.5) ? p.from_zero("modulus", 0.98) : p.b.fixed("modulus", p.between(0.3, 0.95));
+  if (unwound)
+    helix.modulus = p.chance(0.5) ? p.from_zero("modulus", 0.98) : p.b.fixed("modulus", p.between(0.3, 0.95));
   CellSize size;
   size.thickness_um = p.b.fixed("thickness_um", thickness);
-  size.birefringence = p.chance(0.4) ? p.around("birefringence", birefringence, 0.25, 0.3)
-                                     : p.b.fixed("birefringence", birefringence);
+  size.birefringence =
+      p.chance(0.4) ? p.around("birefringence", birefringence, 0.25, 0.3) : p.b.fixed("birefringence", birefringence);
   size.retardance_um = thickness * birefringence;
   const Scene s = cell_scene(p, size, angle, Cell{size.thickness_um, helix});
   look(p, s, views, unwound ? CellLight{} : light_of(size, hand * 360 * thickness / pitch, angle.sum_deg));

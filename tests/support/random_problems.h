@@ -30,10 +30,10 @@ struct RandomProblem {
   std::vector<std::vector<double>> light;
   std::vector<Mask> masks;  ///< of each scene; none: all pixels
   std::mt19937_64 random;
-  double least_noise = 0.003;  ///< of the gain
-  double lamp_jitter = 0;      ///< share by which the lamp differs from frame to frame
+  double least_noise = 0.003;                   ///< of the gain
+  double lamp_jitter = 0;                       ///< share by which the lamp differs from frame to frame
   bool own_gains = false, own_offsets = false;  ///< one for each frame instead of one for all
-  std::map<int, double> period;  ///< of angles that come back to the same state
+  std::map<int, double> period;                 ///< of angles that come back to the same state
   /// Changes of the parameters that leave all pictures as they are; each its own inverse, up to the periods.
   std::vector<std::function<void(Theta&)>> symmetries;
 
@@ -42,7 +42,8 @@ struct RandomProblem {
   double scaled(double low, double high) { return std::exp(between(std::log(low), std::log(high))); }
   bool chance(double probability) { return between(0, 1) < probability; }
   int count(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); }
-  /// Its truth anywhere between the bounds but for their last twentieth, where a fit would have to say that it is at one.
+  /// Its truth anywhere between the bounds but for their last twentieth, where a fit would have to say that it is at
+  /// one.
   ParameterRef anywhere(const std::string& name, double low, double high) {
     return b.fitted(name, between(low + 0.05 * (high - low), high - 0.05 * (high - low)), low, high);
   }

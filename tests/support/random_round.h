@@ -54,8 +54,7 @@ inline void heated_plate(RandomProblem& p) {
   Scene s = seen(p, 64, 0);
   Plate plate;
   plate.thickness_um = p.b.fixed("thickness_um", 800);
-  plate.director.axis = {p.b.fixed("axis.x", -0.353553), p.b.fixed("axis.y", 0.353553),
-                         p.b.fixed("axis.z", -0.866025)};
+  plate.director.axis = {p.b.fixed("axis.x", -0.353553), p.b.fixed("axis.y", 0.353553), p.b.fixed("axis.z", -0.866025)};
   HeatStep heat;
   heat.fourier_number = p.b.fitted("fourier_number", p.scaled(0.004, 0.25), 0.002, 0.5);
   heat.cold_k = p.b.fixed("cold_k", 278);
@@ -83,9 +82,9 @@ inline void turned_droplet(RandomProblem& p, double largest_um, const std::funct
   director(sample);
   s.sample = sample;
   const double birefringence = p.scaled(0.02, most);
-  s.material = ConstantIndices{p.b.fixed("ordinary", n_o),
-                               p.chance(0.5) ? p.around("birefringence", birefringence, 0.25, 0.3)
-                                             : p.b.fixed("birefringence", birefringence)};
+  s.material =
+      ConstantIndices{p.b.fixed("ordinary", n_o), p.chance(0.5) ? p.around("birefringence", birefringence, 0.25, 0.3)
+                                                                : p.b.fixed("birefringence", birefringence)};
   s.surround_index = p.b.fixed("surround", p.between(1.46, 1.52));
   const double polarizer = p.chance(0.5) ? 0 : p.between(0, 90);
   s.microscope.polarizer_deg = p.b.fixed("polarizer", polarizer);
@@ -142,18 +141,18 @@ inline void eccentric_shell(RandomProblem& p) {
 
 /// Load and its direction, which is the same after half a turn. Of the disc only what lies within the forces' reach.
 inline void stressed_disc(RandomProblem& p) {
-  constexpr int kSize = 64;
+  constexpr int kSize = 96;
   IndependentDisc model;
-  model.um_per_px = 200;
+  model.um_per_px = 133;
   model.circular = p.chance(0.5);
   Scene s = seen(p, kSize, model.um_per_px);
   s.microscope.wavelength_nm = p.b.fixed("wavelength_546", model.wavelength_nm);
   s.microscope.quarter_wave = model.circular;
-  s.view.center_x_px = p.anywhere("center_x", 30, 33);
-  s.view.center_y_px = p.anywhere("center_y", 30, 33);
+  s.view.center_x_px = p.anywhere("center_x", 46, 49);
+  s.view.center_y_px = p.anywhere("center_y", 46, 49);
   StressedDisc disc;
   // Orders in the middle: 8 load C / (pi diameter wavelength) (docs/methods.md).
-  const double load = p.scaled(30, 700);
+  const double load = p.scaled(30, 400);
   disc.load_n = p.b.fitted("load_n", load, load * p.between(0.1, 0.7), load * p.between(1.2, 3));
   disc.load_azimuth_deg = p.angle("load_azimuth_deg", 180);
   disc.diameter_um = p.b.fixed("diameter_um", 2 * model.radius_um);
@@ -168,9 +167,9 @@ inline void stressed_disc(RandomProblem& p) {
   std::vector<double> picture;
   for (int row = 0; row < kSize; ++row)
     for (int column = 0; column < kSize; ++column) {
-      const double away = std::hypot(column - 31.5, row - 31.5) * model.um_per_px;
+      const double away = std::hypot(column - 47.5, row - 47.5) * model.um_per_px;
       mask(column, row) = away < 0.8 * model.radius_um;
-      picture.push_back(mask(column, row) ? model.pixel(column, row, 32) : 0);
+      picture.push_back(mask(column, row) ? model.pixel(column, row, 24) : 0);
     }
   p.scenes.push_back(s);
   p.masks.push_back(mask);
