@@ -47,15 +47,22 @@ double chi_square_at(const Posed& posed, const Theta& theta) {
   return sum;
 }
 
-/// The largest error in standard errors of `of`, of parameters without a limit; NaN errors are infinitely large.
+/// What the fit calls a standard error on the side where `off` is positive or negative: of a profiled interval, which
+/// says that the likelihood is no parabola, as much of it as is one of a normal distribution.
+double standard_error(const ParameterEstimate& e, double off) {
+  if (!e.profiled) return e.stderr_;
+  return (off > 0 ? e.interval95_high - e.value : e.value - e.interval95_low) / 1.96;
+}
+
+/// The largest error in standard errors of `of`, of parameters without a limit; infinite where there is none.
 double errors_off(const RandomProblem& p, const FitResult& of, const Theta& theta, const Theta& truth) {
   double worst = 0;
   for (const ParameterEstimate& e : of.parameters) {
     if (e.linear || !e.limit.empty()) continue;
     const int k = p.b.table.find(e.name).index;
-    const double off =
-        std::abs(difference(p, k, theta[static_cast<std::size_t>(k)], truth[static_cast<std::size_t>(k)]));
-    worst = std::max(worst, std::isfinite(e.stderr_) ? off / e.stderr_ : std::numeric_limits<double>::infinity());
+    const double off = difference(p, k, truth[static_cast<std::size_t>(k)], theta[static_cast<std::size_t>(k)]);
+    const double stderr_ = standard_error(e, off);
+    worst = std::max(worst, std::isfinite(stderr_) ? std::abs(off) / stderr_ : std::numeric_limits<double>::infinity());
   }
   return worst;
 }
@@ -248,7 +255,7 @@ TEST_P(RandomProblems, SymmetriesShowTheSamePictures) {
   }
 }
 
-// What an independent model shows is what the program shows, to a sixth of the least noise.
+// What an independent model shows is what the program shows, to a tenth of the least noise.
 TEST_P(RandomProblems, PicturesAreTheProgramsToo) {
   for (int number = 1; number <= 10; ++number) {
     RandomProblem p = draw(GetParam(), number);
@@ -259,7 +266,7 @@ TEST_P(RandomProblems, PicturesAreTheProgramsToo) {
       const std::vector<double> values = render(scene, plan(scene, truth), truth, {}, 1).intensity.values();
       for (std::size_t i = 0; i < values.size(); ++i) {
         if (!p.masks.empty() && !p.masks[g].values()[i]) continue;
-        ASSERT_NEAR(values[i], p.light[g][i], 5e-4) << number << " " << g;
+        ASSERT_NEAR(values[i], p.light[g][i], 3e-4) << number << " " << g;
       }
     }
   }

@@ -81,7 +81,6 @@ inline void field_cell(RandomProblem& p) {
   enum { planar, twisted, hybrid, cholesteric, homeotropic };
   const int kind = p.count(planar, homeotropic);
   CellViews views = draw_views(p, 2, 3);
-  views.pairs_deg.resize(static_cast<std::size_t>(p.count(3, 6)));
   const double birefringence = p.scaled(0.04, 0.25), thickness = p.scaled(3, std::min(15.0, 3 / birefringence));
   FreederickszDirector d;
   d.anchoring = kind == hybrid        ? FreederickszDirector::Anchoring::hybrid
@@ -90,8 +89,9 @@ inline void field_cell(RandomProblem& p) {
   CellSize size;
   CellAngle angle = draw_angle(p, false);
   d.azimuth_deg = angle.azimuth_deg;
-  // One number more than the voltage.
-  const int unknown = p.count(0, 3);
+  // One number more than the voltage, but where nothing twists an image at one voltage tells its retardance only.
+  const bool one_voltage = p.chance(0.5), turns = kind == twisted || kind == cholesteric;
+  const int unknown = one_voltage && !turns ? -1 : p.count(0, 3);
   const auto maybe = [&](int number, const std::string& name, double truth, double below, double above) {
     return unknown == number ? p.around(name, truth, below, above) : p.b.fixed(name, truth);
   };
@@ -100,7 +100,7 @@ inline void field_cell(RandomProblem& p) {
   size.birefringence = maybe(2, "birefringence", birefringence, 0.25, 0.3);
   d.eps_ratio = p.b.fixed("eps_ratio", kind == homeotropic ? p.between(0.4, 0.8) : p.between(1.5, 4.5));
   d.pretilt_deg = unknown == 3 ? p.from_zero("pretilt_deg", 15) : p.b.fixed("pretilt_deg", p.between(0.5, 5));
-  if (kind == twisted || kind == cholesteric) {
+  if (turns) {
     d.k22_over_k11 = p.b.fixed("k22_over_k11", p.between(0.4, 0.8));
     d.twist_deg = p.b.fixed("twist_deg", kind == twisted ? 90 : 180);
     if (kind == cholesteric) d.pitch_um = p.b.fixed("pitch_um", 2 * thickness * p.between(0.9, 1.1));
@@ -108,7 +108,7 @@ inline void field_cell(RandomProblem& p) {
   const auto add = [&](const FreederickszDirector& at) {
     look(p, cell_scene(p, size, angle, Cell{size.thickness_um, at}), views, {});
   };
-  if (p.chance(0.5)) {
+  if (one_voltage) {
     d.reduced_voltage = p.from_zero("reduced_voltage", 4);
     add(d);
   } else {
