@@ -31,11 +31,11 @@ inline const std::vector<Family>& families() {
                                           {"UniformCell", uniform_cell, 20},
                                           {"TwistedCell", twisted_cell, 20},
                                           {"FreederickszTable", freedericksz_table, 0, 300},
-                                          {"FieldCell", field_cell},
+                                          {"FieldCell", field_cell, 2},
                                           {"HelixCell", helix_cell},
-                                          {"BipolarDroplet", bipolar_droplet},
-                                          {"DropletInAFieldAcross", droplet_in_a_field_across},
-                                          {"EccentricShell", eccentric_shell},
+                                          {"BipolarDroplet", bipolar_droplet, 0, 300},
+                                          {"DropletInAFieldAcross", droplet_in_a_field_across, 0, 300},
+                                          {"EccentricShell", eccentric_shell, 0, 300},
                                           {"Disc", stressed_disc}};
   return all;
 }
