@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <limits>
+#include <utility>
 
 #include "fit/errors/left_out.h"
 #include "fit/errors/report.h"
@@ -21,9 +22,8 @@ Optimum settle(const Task& task, Optimum optimum) {
   return with_settled_misfit(task, std::move(optimum));
 }
 
-/// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
-Outcome finish(const Task& task, Minima minima, bool beaten) {
-  Optimum optimum = settle(task, best_minimum(task, minima, beaten));
+/// Rivals, what the model leaves out, errors and words: everything but the values.
+Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool beaten) {
   Rivals rivals = weigh_rivals(task, optimum);
   LeftOut left_out;
   measure_propagation(task, optimum, left_out);
@@ -31,9 +31,24 @@ Outcome finish(const Task& task, Minima minima, bool beaten) {
   const Eigen::VectorXd sd = covariances.with_misfit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   foretell_curved_rays(task, optimum, sd, left_out);
   foretell_waves(task, optimum, sd, left_out);
-  FitResult result =
-      report(task, optimum, std::move(minima), std::move(rivals), left_out, std::move(covariances), beaten);
+  FitResult result = report(task, optimum, minima, std::move(rivals), left_out, std::move(covariances), beaten);
   return {std::move(result), left_out.change_by_curved_rays, left_out.change_by_waves};
+}
+
+/// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
+Outcome finish(const Task& task, const Minima& minima, bool beaten) {
+  Optimum optimum = settle(task, best_minimum(task, minima, beaten));
+  Outcome outcome = judge(task, optimum, minima, beaten);
+  // A profile has gone on to where the solver had not: from there once more.
+  constexpr int kTimes = 2;
+  for (int i = 0; i < kTimes && optimum.better && !optimum.stopped; ++i) {
+    optimum.rivals.push_back(optimum.searched);
+    optimum.searched = *std::exchange(optimum.better, std::nullopt);
+    solve_again(task, optimum, "from a better place on a profile");
+    optimum = with_settled_misfit(task, std::move(optimum));
+    outcome = judge(task, optimum, minima, beaten);
+  }
+  return outcome;
 }
 
 }  // namespace
@@ -58,7 +73,7 @@ std::vector<Outcome> fit_side_by_side(std::span<const FitJob> jobs) {
   for (std::size_t b = 0; b < jobs.size(); ++b) {
     const Clock::time_point begin = Clock::now();
     const bool beaten = minima[b].lowest_per_pixel() > kBeaten * best;
-    outcomes.push_back(finish(tasks[b], std::move(minima[b]), beaten));
+    outcomes.push_back(finish(tasks[b], minima[b], beaten));
     outcomes.back().result.seconds = seconds[b] + seconds_since(begin);
     if (outcomes.back().result.interrupted) break;
   }

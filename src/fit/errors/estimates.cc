@@ -56,8 +56,9 @@ std::optional<double> upper_limit(const Question& q) {
   return std::nullopt;
 }
 
-/// value +- t stderr where the objective is a parabola that far; else the places where the profile likelihood has
-/// fallen as much. What models err by is added to either half.
+/// value +- t stderr where the objective is a parabola that far and twice as far; else the places where the profile
+/// likelihood has fallen as much, or half as far as those where it has fallen four times as much: beyond the edge of an
+/// interval there may be a plateau. What models err by is added to either half.
 void settle_interval(const Question& q, ParameterEstimate& estimate) {
   const auto unknown = static_cast<std::size_t>(q.unknown);
   const double t = student_t_quantile(0.975, q.result.interval_degrees_of_freedom);
@@ -69,20 +70,27 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
   const Parameter& parameter = q.parameter();
   // A valley longer than the bounds is no interval but a verdict.
   if (!(t * sd < parameter.upper - parameter.lower)) return;
-  constexpr double kBent = 0.1;  // 5 % of the interval
+  constexpr double kBent = 0.1, kBentFar = 0.2;  // 5 % of the interval
+  constexpr double kFar = 2, kPlateau = 1.5;
   Profile profile = q.profile();
-  const std::array<double, 2> straight = profile.straightness(t * t);
-  if (std::abs(straight[0] - 1) < kBent && std::abs(straight[1] - 1) < kBent) return;
+  const auto bent = [&](double reach, double by) {
+    const std::array<double, 2> straight = profile.straightness(reach * reach);
+    return std::abs(straight[0] - 1) > by || std::abs(straight[1] - 1) > by;
+  };
+  const bool far = bent(kFar * t, kBentFar);
+  if (!far && !bent(t, kBent)) return;
   // A bound that the data do not exclude is no end of the interval.
   const auto half = [&](double end) {
-    const double to = profile.crossing(end, t * t), length = std::abs(to - estimate.value);
-    return to == end ? std::max(length, t * sd) : length;
+    const auto reaching = [&](double reach) {
+      const double to = profile.crossing(end, reach * reach), length = std::abs(to - estimate.value) * t / reach;
+      return to == end ? std::max(length, t * sd) : length;
+    };
+    const double near = reaching(t), beyond = far ? reaching(kFar * t) : 0;
+    return beyond > kPlateau * near ? beyond : near;
   };
   const double low = half(parameter.lower), high = half(parameter.upper);
-  if (profile.lowest() < -1)
-    q.result.warnings.push_back(fmt::format(
-        "A better fit by {:.2g} in chi-square was met on the profile of {}: the solver had not reached the minimum.",
-        -profile.lowest(), parameter.name));
+  constexpr double kBetter = 1;  // of chi-square
+  if (profile.lowest() < -kBetter) q.optimum.better = profile.lowest_place();
   if (std::abs(low / (t * sd) - 1) < 0.5 * kBent && std::abs(high / (t * sd) - 1) < 0.5 * kBent)
     return;  // only the way there was bent
   const double more = t * t * (estimate.stderr_ * estimate.stderr_ - sd * sd);

@@ -135,6 +135,12 @@ double Profile::lowest() const {
       ->rise;
 }
 
+const Eigen::VectorXd& Profile::lowest_place() const {
+  return std::min_element(places_.begin(), places_.end(),
+                          [](const Place& a, const Place& b) { return a.rise < b.rise; })
+      ->searched;
+}
+
 std::array<double, 2> Profile::straightness(double allowed) {
   std::array<double, 2> ratio{1, 1};
   const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(unknown_)]];

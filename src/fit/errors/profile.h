@@ -25,6 +25,7 @@ class Profile {
   double crossing(double end, double allowed);
   /// Of all rises so far; clearly below zero: the estimate was not the minimum.
   double lowest() const;
+  const Eigen::VectorXd& lowest_place() const;
   /// The rise `allowed`^(1/2) standard errors up and down, the others following along straight lines, over `allowed`:
   /// both 1 where the objective is a parabola. Clipped at the bounds.
   std::array<double, 2> straightness(double allowed);

@@ -26,6 +26,7 @@ double pay_for_misfit(const LeastSquares& problem, const Inverse& of_noise, Inve
 /// What the standard errors contain, in words.
 std::string covariance_words(const Task& task, const Optimum& optimum, const Covariances& covariances,
                              const LeftOut& left_out) {
+  constexpr double kOfNote = 0.5;  // of a frame's variance: more than what no fit of several frames can exclude
   const MisfitFound& found = optimum.misfit;
   const std::optional<JointPrior>& prior = task.job.prior;
   std::string words;
@@ -38,6 +39,9 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
   else if (prior && prior->frame_scatter)
     words = fmt::format("frame misfit of {:.2g} of the model intensity from the prior's fit included",
                         prior->frame_scatter->intensity_sd);
+  if (found.lamp_share > kOfNote)
+    words += fmt::format("{}{:.2g} % of jitter of the lamp between frames included", words.empty() ? "" : "; ",
+                         100 * found.lamp_jitter);
   if (found.row_length > 1.5) words += fmt::format(", {:.2g} neighbours alike", found.row_length);
   if (found.beyond_noise) {
     if (!words.empty()) words += "; ";
@@ -64,12 +68,29 @@ double interval_freedom(const Task& task, const Optimum& optimum, const Covarian
                         const FitResult& result) {
   const MisfitFound& found = optimum.misfit;
   double dof = found.frames_scatter ? found.frame_dof : std::max(1.0, result.degrees_of_freedom / found.largest_area);
+  // Of a sum of variances the one of which is known by few frames (F. E. Satterthwaite, Biometrics Bull. 2, 110
+  // (1946)).
+  if (!found.frames_scatter && found.lamp_share > 0)
+    dof = std::min(dof, found.frame_dof / (found.lamp_share * found.lamp_share));
   if (covariances.along > 1) dof = std::min(dof, static_cast<double>(LeastSquares::kLeastModulations));
   if (const std::optional<JointPrior>& prior = task.job.prior) {
     dof = std::min(dof, prior->degrees_of_freedom);
     if (prior->frame_scatter) dof = std::min(dof, prior->frame_scatter->degrees_of_freedom);
   }
   return dof;
+}
+
+/// What one whole frame is off by, of the model intensity: what frames scatter by, the lamp's jitter on their mean
+/// light included; nothing where they show neither.
+std::optional<double> scatter_of_frames(const Task& task, const Optimum& optimum) {
+  constexpr double kShown = 0.5;
+  const MisfitFound& found = optimum.misfit;
+  if (!found.frames_scatter && !(found.lamp_share > kShown)) return std::nullopt;
+  double light = 0;
+  for (int g = 0; g < task.frames(); ++g)
+    if (const double gain = task.gain_of(g, optimum.theta); gain != 0)
+      light += std::pow(optimum.problem->frame_misfit(g).mean_light / gain, 2) / task.frames();
+  return std::hypot(found.frame_sd, found.lamp_jitter * std::sqrt(light));
 }
 
 }  // namespace
@@ -84,18 +105,18 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
   return covariances;
 }
 
-FitResult report(const Task& task, Optimum& optimum, Minima minima, Rivals rivals, const LeftOut& left_out,
+FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
                  Covariances covariances, bool beaten) {
   FitResult result;
   result.theta = optimum.theta;
   result.converged = optimum.converged;
-  result.solver_report = std::move(optimum.solver_report);
-  result.iterations = std::move(optimum.iterations);
-  result.scans = std::move(minima.scan.traces);
+  result.solver_report = optimum.solver_report;
+  result.iterations = optimum.iterations;
+  result.scans = minima.scan.traces;
   result.identifiable = optimum.possible;
   result.ambiguous = rivals.ambiguous;
   result.rivals = std::move(rivals.minima);
-  result.warnings = std::move(optimum.warnings);
+  result.warnings = optimum.warnings;
   result.warnings.insert(result.warnings.end(), left_out.warnings.begin(), left_out.warnings.end());
   result.interrupted = (optimum.stopped && !beaten) || task.interrupted();
   if (result.interrupted) result.converged = false;
@@ -104,8 +125,8 @@ FitResult report(const Task& task, Optimum& optimum, Minima minima, Rivals rival
   result.chi_square = data_chi_square + optimum.problem->prior_chi_square();
   result.degrees_of_freedom = optimum.degrees_of_freedom(task);
   result.reduced_chi_square = optimum.reduced_chi_square(task);
-  if (optimum.misfit.frames_scatter)
-    result.frame_scatter = JointPrior::FrameScatter{optimum.misfit.frame_sd, optimum.misfit.frame_dof};
+  if (const std::optional<double> sd = scatter_of_frames(task, optimum))
+    result.frame_scatter = JointPrior::FrameScatter{*sd, optimum.misfit.frame_dof};
   result.interval_degrees_of_freedom = interval_freedom(task, optimum, covariances, result);
 
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;

@@ -19,7 +19,7 @@ struct Covariances {
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);
 
 /// Everything that is to be said of a fit. `beaten`: another branch has won, so that this one was not finished.
-FitResult report(const Task& task, Optimum& optimum, Minima minima, Rivals rivals, const LeftOut& left_out,
+FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
                  Covariances covariances, bool beaten);
 
 // Parts of the report, each of which fills its members of the result.

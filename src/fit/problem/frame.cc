@@ -71,6 +71,27 @@ std::vector<Misfit> misfit_of_prior(const Task& task, const Theta& theta) {
   return misfit;
 }
 
+bool lit_by_a_lamp(const Scene& scene) {
+  const Plate* plate = std::get_if<Plate>(&scene.sample);
+  return scene.quantity == Quantity::intensity && !(plate && !plate->ring_numbers.empty());
+}
+
+std::vector<Misfit> misfit_expected(const Task& task, const Frames& frames, const Theta& theta) {
+  std::vector<Misfit> misfit = misfit_of_prior(task, theta);
+  if (task.frames() < 2) return misfit;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Micrograph& micrograph = task.micrograph(g);
+    if (!lit_by_a_lamp(micrograph.scene)) continue;
+    const Pixels& pixels = frames[static_cast<std::size_t>(g)].pixels;
+    double sum = 0;
+    for (const auto& [x, y] : pixels) sum += micrograph.values(x, y);
+    Misfit& own = misfit[static_cast<std::size_t>(g)];
+    own.mean_sd = std::hypot(own.mean_sd, kLampJitter * sum / static_cast<double>(pixels.size()));
+    own.mean_follows_shape = false;
+  }
+  return misfit;
+}
+
 std::unique_ptr<LeastSquares> problem_of(const Task& task, const Frames& frames, const std::vector<Misfit>& misfit) {
   std::vector<PixelSet> sets;
   std::vector<RenderPlan> plans;

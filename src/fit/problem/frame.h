@@ -37,6 +37,15 @@ std::string table_of(const std::string& row);
 /// misfit that the calibration's frames had.
 std::vector<Misfit> misfit_of_prior(const Task& task, const Theta& theta);
 
+/// Standard deviation of a lamp's brightness from frame to frame, as a share: what is expected of a lamp before its
+/// frames have shown it.
+inline constexpr double kLampJitter = 0.003;
+/// Values that a lamp's brightness enters: not retardances, nor radii of rings.
+bool lit_by_a_lamp(const Scene& scene);
+/// The same where several frames are compared, with a lamp's jitter: before it is measured no minimum may be chosen by
+/// it.
+std::vector<Misfit> misfit_expected(const Task& task, const Frames& frames, const Theta& theta);
+
 /// The problem of all frames' pixels.
 std::unique_ptr<LeastSquares> problem_of(const Task& task, const Frames& frames, const std::vector<Misfit>& misfit);
 

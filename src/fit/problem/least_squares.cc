@@ -591,6 +591,9 @@ LeastSquares::FrameMisfit LeastSquares::frame_misfit(int micrograph) const {
   misfit.mean_whitened = along.dot(noise);
   misfit.mean_noise_sd = 1 / frame.inverse_sigma_norm;
   misfit.mean_residual = misfit.mean_whitened * misfit.mean_noise_sd;
+  const Eigen::ArrayXd bright =
+      light(frame, true, 0, frame.count).array() * intensity_.segment(frame.begin, frame.count).array();
+  misfit.mean_light = along.dot((bright * frame.inverse_sigma.array()).matrix()) * misfit.mean_noise_sd;
   const Eigen::Index p = searched_size();
   misfit.mean_jacobian_whitened = Eigen::VectorXd::Zero(unknowns_.size());
   if (has_derivatives_)

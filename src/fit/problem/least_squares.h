@@ -74,6 +74,7 @@ class LeastSquares {
   // At the last evaluated point:
   double objective() const { return residual_.squaredNorm(); }  ///< priors and misfit weights included
   const Theta& theta() const { return theta_; }
+  const Eigen::VectorXd& intensity() const { return intensity_; }  ///< of the model, every pixel of every frame
   int evaluations() const { return evaluations_; }
   /// Noise-whitened residual sums of one micrograph, its misfit weights not applied.
   struct FrameMisfit {
@@ -81,6 +82,7 @@ class LeastSquares {
     double mean_whitened = 0;                ///< generalised mean residual over its noise standard deviation
     double mean_noise_sd = 0;                ///< that standard deviation, units of the values
     double mean_residual = 0;                ///< units of the values
+    double mean_light = 0;                   ///< generalised mean of gain times intensity, units of the values
     Eigen::VectorXd mean_jacobian_whitened;  ///< d mean_whitened / d unknown (searched first)
   };
   FrameMisfit frame_misfit(int micrograph) const;

@@ -88,7 +88,7 @@ bool ranks_lower(const Minimum& a, const Minimum& b) { return a.rank < b.rank; }
 Minimum minimum_from(const Task& task, Optimum& optimum, Eigen::VectorXd x, const std::string& label,
                      int max_iterations) {
   const SolveSummary summary = solve(task, optimum, x, label, max_iterations);
-  const Candidate at{x, optimum.problem->objective(), projected_information(*optimum.problem)};
+  const Candidate at{x, deviance(task, optimum.frames, *optimum.problem), projected_information(*optimum.problem)};
   return {at, rank(task, optimum.problem->theta(), at), summary.converged, summary.report};
 }
 
@@ -133,7 +133,7 @@ bool look_among_ripples(const Task& task, Optimum& optimum, std::vector<Minimum>
         const Eigen::VectorXd x = moved(side * off * sd);
         if (!allowed(x)) break;
         optimum.problem->evaluate(x, false);
-        const double objective = optimum.problem->objective();
+        const double objective = deviance(task, optimum.frames, *optimum.problem);
         if (objective < std::min(least, from.at.objective + 0.5 * off * off)) least = objective, start = x;
       }
       if (start) look_from(*start);
@@ -149,7 +149,7 @@ Optimum best_minimum(const Task& task, const Minima& found, bool beaten) {
   optimum.frames = found.frames;
   optimum.theta = found.theta;
   optimum.searched = found.scan.candidates.front().searched;
-  optimum.problem = problem_of(task, optimum.frames, misfit_of_prior(task, optimum.theta));
+  optimum.problem = problem_of(task, optimum.frames, misfit_expected(task, optimum.frames, optimum.theta));
   optimum.evaluations = found.evaluations;
   optimum.stopped = found.stopped || beaten;
   optimum.warnings = task.job.warnings;

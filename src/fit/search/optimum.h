@@ -9,8 +9,10 @@ namespace birefit::estimation {
 
 /// More than noise, as the residual shows it.
 struct MisfitFound {
-  double frame_sd = 0;          ///< of the model intensity, common to a frame
-  double frame_dof = 0;         ///< degrees of freedom behind it
+  double lamp_jitter = 0;       ///< share by which the lamp's brightness scatters from frame to frame
+  double lamp_share = 0;        ///< of the variance of the frame's mean that it makes most of
+  double frame_sd = 0;          ///< of the model intensity, common to a frame, and beyond the lamp's jitter
+  double frame_dof = 0;         ///< degrees of freedom behind both
   bool frames_scatter = false;  ///< measured between this fit's own frames
   double largest_area = 1;      ///< pixels that share one misfit
   bool beyond_noise = false;    ///< in some micrograph
@@ -21,9 +23,10 @@ struct Optimum {
   Frames frames;
   std::unique_ptr<LeastSquares> problem;  ///< evaluated at `searched`, with derivatives
   Eigen::VectorXd searched;
-  Theta theta;                          ///< the whole table there
-  std::vector<Eigen::VectorXd> rivals;  ///< other minima that a subsample could not exclude
-  std::vector<Outliers> left_out;       ///< of each micrograph
+  Theta theta;                            ///< the whole table there
+  std::vector<Eigen::VectorXd> rivals;    ///< other minima that a subsample could not exclude
+  std::optional<Eigen::VectorXd> better;  ///< a lower place that was met after all
+  std::vector<Outliers> left_out;         ///< of each micrograph
   MisfitFound misfit;
 
   bool converged = false;
@@ -56,6 +59,10 @@ Optimum best_minimum(const Task& task, const Minima& minima, bool beaten);
 /// Between one ripple of a sphere's image and the next, of a searched unknown; 0 where it has none.
 double ripple_period_of(const Task& task, const Theta& theta, std::size_t j);
 bool has_ripples(const Task& task, const Theta& theta);
+/// -2 ln of the likelihood where `problem` was evaluated last, but for a constant. Of several frames, each with its
+/// mean: these may scatter as a lamp does, or by more, at the price of their smaller likelihood, whatever the problem's
+/// weights are, which have been settled elsewhere.
+double deviance(const Task& task, const Frames& frames, const LeastSquares& problem);
 /// -2 ln of a minimum's evidence.
 double score(const Task& task, const Candidate& minimum);
 /// What the best minimum has least of. Only of a sphere's ripples, which are alike but for their width, is that the

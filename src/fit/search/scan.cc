@@ -14,81 +14,92 @@
 namespace birefit::estimation {
 namespace {
 
+/// Of a grid, or places spread over the box of all axes: pictures of cells without a field cost microseconds.
+constexpr std::size_t kMostPlaces = 3000, kMostPlacesOfCells = 6000;
 constexpr int kMostPointsPerAxis = 400;
-constexpr int kMostProductPoints = 3000;
-constexpr std::size_t kMostAxesSpread = 4;
 /// Fewer points than this could step over the valley of a parameter that also moves an edge.
-constexpr int kFewestPointsPerAxis = 7;
+constexpr int kFewestPointsOfFringes = 7, kFewestPoints = 3;
+/// Radians a step. A cosine's square, which chi-square is made of, turns twice as fast: two or three steps a valley.
+constexpr double kStepOfFringes = 1, kStep = 0.7;
 /// A droplet's edge carries all of its rings: the largest step of a diameter, of its upper bound.
 constexpr double kDiameterStep = 1.0 / 30;
-/// Of a parameter that forms no fringes, as long as the grid has no more points than the second.
-constexpr int kPlacesWithoutFringes = 9;
-constexpr std::size_t kMostPointsWithoutFringes = 1000;
+/// Pictures that turn by less along all of an unknown have one valley there, which the solver follows.
+constexpr double kOneValley = 4;
+/// Of a grid that has axes of one valley, too.
+constexpr std::size_t kMostPlacesWithoutNeed = 1000;
 /// Batches of starts looked at; the next one only where chi-square is more standard deviations above its expectation.
 constexpr std::size_t kMostBatches = 4;
 constexpr double kDoubtful = 5;
 /// Of the solver, for every start of a batch.
 constexpr int kFirstSteps = 2;
 
+using Places = std::vector<std::pair<double, Eigen::VectorXd>>;  ///< objective, searched
+bool lower(const Places::value_type& a, const Places::value_type& b) { return a.first < b.first; }
+
 struct Axis {
   int searched = 0;
+  PicturePhase steps;          ///< the phase, or more where steps have to be shorter
   std::vector<double> values;  ///< of the grid, ascending
 };
 
-/// Where the line through (x, y), both ascending, has `y`; beyond its ends, there.
-double inverse_of(const std::vector<double>& x, const std::vector<double>& y, double wanted) {
-  const std::size_t above = static_cast<std::size_t>(std::lower_bound(y.begin(), y.end(), wanted) - y.begin());
-  if (above == 0) return x.front();
-  if (above == y.size()) return x.back();
-  return x[above - 1] + (x[above] - x[above - 1]) * (wanted - y[above - 1]) / (y[above] - y[above - 1]);
-}
-
-/// Steps below a radian, and below `longest`, however fast the fringes are where.
-std::vector<double> steps_along(const FringePhase& fringes, double longest) {
-  std::vector<double> steps{0};
-  for (std::size_t i = 1; i < fringes.value.size(); ++i)
-    steps.push_back(steps.back() + std::max(fringes.radians[i] - fringes.radians[i - 1],
-                                            (fringes.value[i] - fringes.value[i - 1]) / longest));
-  const int points =
-      static_cast<int>(std::clamp(std::ceil(steps.back()), 1.0, static_cast<double>(kMostPointsPerAxis)));
-  std::vector<double> values;
+/// Steps below `radians`, and below `longest`, however fast the picture turns where.
+Axis axis_along(int searched, const PicturePhase& phase, double radians, double longest) {
+  Axis axis{searched, {phase.value, {0}}, {}};
+  for (std::size_t i = 1; i < phase.value.size(); ++i)
+    axis.steps.radians.push_back(
+        axis.steps.radians.back() +
+        std::max((phase.radians[i] - phase.radians[i - 1]) / radians, (phase.value[i] - phase.value[i - 1]) / longest));
+  const double total = axis.steps.total();
+  const int points = static_cast<int>(std::clamp(std::ceil(total), 1.0, static_cast<double>(kMostPointsPerAxis)));
   // Cell middles: the bounds themselves are where models degenerate.
-  for (int i = 0; i < points; ++i)
-    values.push_back(inverse_of(fringes.value, steps, steps.back() * (i + 0.5) / points));
-  return values;
+  for (int i = 0; i < points; ++i) axis.values.push_back(axis.steps.value_at(total * (i + 0.5) / points));
+  return axis;
 }
 
-std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std::vector<FringePhase>& fringes) {
+std::size_t product_of(const std::vector<Axis>& axes) {
+  constexpr std::size_t kMany = 1000000;
+  std::size_t product = axes.empty() ? 0 : 1;
+  for (const Axis& axis : axes) product = std::min(product * axis.values.size(), kMany);
+  return product;
+}
+
+/// A cell's picture is one number, of a director that no field has to be found for.
+bool costs_microseconds(const Task& task) {
+  return std::all_of(task.job.micrographs.begin(), task.job.micrographs.end(), [](const Micrograph& m) {
+    const Cell* cell = std::get_if<Cell>(&m.scene.sample);
+    return cell && !std::holds_alternative<FreederickszDirector>(cell->director);
+  });
+}
+
+/// What has several valleys, and what has one as long as the grid stays small: it moves the others' minima. `fineness`:
+/// steps are so much shorter.
+std::vector<Axis> axes_of(const Task& task, const std::vector<PicturePhase>& phases, double fineness = 1) {
   std::vector<Axis> axes;
-  for (std::size_t j = 0; j < unknowns.searched.size(); ++j) {
-    if (fringes[j].value.empty()) continue;
-    const Parameter& parameter = job.parameters[unknowns.searched[j]];
-    double longest = (parameter.upper - parameter.lower) / kFewestPointsPerAxis;
-    for (const Micrograph& m : job.micrographs)
-      if (const Droplet* droplet = std::get_if<Droplet>(&m.scene.sample);
-          droplet && droplet->diameter_um.index == unknowns.searched[j])
-        longest = std::min(longest, kDiameterStep * parameter.upper);
-    axes.push_back({static_cast<int>(j), steps_along(fringes[j], longest)});
-  }
-  if (axes.empty()) return axes;
-  // The rest moves the minima along the fringes' axes. But a centre: the picture has shown it.
-  std::size_t product = 1;
-  for (const Axis& axis : axes) product = std::min(product * axis.values.size(), 2 * kMostPointsWithoutFringes);
-  const auto is_centre = [&](int index) {
-    return std::any_of(job.micrographs.begin(), job.micrographs.end(), [&](const Micrograph& m) {
-      return m.scene.view.center_x_px.index == index || m.scene.view.center_y_px.index == index;
-    });
-  };
-  for (std::size_t j = 0; j < unknowns.searched.size() && product * kPlacesWithoutFringes <= kMostPointsWithoutFringes;
-       ++j) {
-    const Parameter& parameter = job.parameters[unknowns.searched[j]];
-    const double width = parameter.upper - parameter.lower;
-    if (!fringes[j].value.empty() || !std::isfinite(width) || !(width > 0) || is_centre(unknowns.searched[j])) continue;
-    Axis axis{static_cast<int>(j), {}};
-    for (int i = 0; i < kPlacesWithoutFringes; ++i)
-      axis.values.push_back(parameter.lower + width * (i + 0.5) / kPlacesWithoutFringes);
-    axes.push_back(std::move(axis));
-    product *= kPlacesWithoutFringes;
+  for (const bool of_fringes : {true, false})
+    for (std::size_t j = 0; j < phases.size(); ++j) {
+      if (phases[j].value.empty() || phases[j].of_fringes != of_fringes) continue;
+      const Parameter& parameter = task.searched(j);
+      double longest = (parameter.upper - parameter.lower) / (of_fringes ? kFewestPointsOfFringes : kFewestPoints);
+      for (const Micrograph& m : task.job.micrographs)
+        if (const Droplet* droplet = std::get_if<Droplet>(&m.scene.sample);
+            droplet && droplet->diameter_um.index == task.unknowns.searched[j])
+          longest = std::min(longest, kDiameterStep * parameter.upper);
+      Axis axis = axis_along(static_cast<int>(j), phases[j], (of_fringes ? kStepOfFringes : kStep) / fineness, longest);
+      const bool needed = of_fringes || phases[j].total() > kOneValley;
+      if (needed || product_of(axes) * axis.values.size() <= kMostPlacesWithoutNeed) axes.push_back(std::move(axis));
+    }
+  return axes;
+}
+
+/// Of several numbers known to a thousandth each a minimum may be far narrower than the phase of any: as fine a grid as
+/// pictures of cells cost next to nothing for.
+std::vector<Axis> fine_axes_of(const Task& task, const std::vector<PicturePhase>& phases) {
+  constexpr double kFinest = 5, kFiner = 1.2;
+  std::vector<Axis> axes = axes_of(task, phases);
+  for (double fineness = kFiner; costs_microseconds(task) && fineness < kFinest; fineness *= kFiner) {
+    std::vector<Axis> finer = axes_of(task, phases, fineness);
+    if (product_of(finer) > kMostPlacesOfCells) break;
+    axes = std::move(finer);
   }
   return axes;
 }
@@ -111,8 +122,9 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
     }
     std::stable_sort(starts.begin(), starts.end(), by_objective);
   };
-  // Two steps tell whether a valley leads down; a wrong order stays many times worse.
-  constexpr double kHopeless = 4;
+  // Two steps tell whether a valley leads down; a wrong order stays many times worse, or out of the evidence's reach
+  // where few numbers tell all.
+  constexpr double kHopeless = 4, kReach = 60;
   if (starts.size() > finalists + 1) {
     walk(kFirstSteps);
     starts.resize(finalists);
@@ -121,7 +133,8 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
   const double best = starts.front().first;
   const bool beaten = best > hopeless_above;
   for (const auto& [objective, from] : starts) {
-    if (!(objective <= (beaten ? 1 : kHopeless) * best) || !std::isfinite(objective)) continue;
+    const double worth = beaten ? best : std::max(kHopeless * best, best + kReach);
+    if (!(objective <= worth) || !std::isfinite(objective)) continue;
     if (beaten) {
       problem.evaluate(from, true);
       result.candidates.push_back({from, problem.objective(), projected_information(problem)});
@@ -161,82 +174,142 @@ void keep_distinct(ScanResult& result, LeastSquares& problem, const Eigen::Vecto
   result.candidates = std::move(distinct);
 }
 
-/// Member `index` >= 1 of the van der Corput sequence: evenly spread over (0, 1) however many are taken.
-double van_der_corput(int index, int base) {
-  double value = 0, digit = 1.0 / base;
-  for (; index > 0; index /= base, digit /= base) value += digit * (index % base);
-  return value;
-}
-
-/// The same in the box of several axes (J. H. Halton, Numer. Math. 2, 84 (1960)).
-Eigen::VectorXd spread_point(int index, const FitJob& job, const Unknowns& unknowns, const std::vector<Axis>& axes,
-                             const Eigen::VectorXd& start) {
-  constexpr std::array<int, 8> kPrimes{2, 3, 5, 7, 11, 13, 17, 19};
+/// Spread evenly over the phases of the axes.
+Eigen::VectorXd spread_point(int index, const std::vector<Axis>& axes, const Eigen::VectorXd& start) {
   Eigen::VectorXd x = start;
-  for (std::size_t k = 0; k < axes.size(); ++k) {
-    const Parameter& parameter = job.parameters[unknowns.searched[static_cast<std::size_t>(axes[k].searched)]];
-    x[axes[k].searched] =
-        parameter.lower + (parameter.upper - parameter.lower) * van_der_corput(index + 1, kPrimes[k % kPrimes.size()]);
-  }
+  const std::vector<double> share = spread_in_box(index, axes.size());
+  for (std::size_t k = 0; k < axes.size(); ++k)
+    x[axes[k].searched] = axes[k].steps.value_at(share[k] * axes[k].steps.total());
   return x;
 }
 
-}  // namespace
+/// Where the objective is looked at before any solver starts.
+class Survey {
+ public:
+  Survey(LeastSquares& problem, const Task& task, const std::vector<Axis>& axes, const Eigen::VectorXd& start,
+         ScanResult& result)
+      : problem_(problem), task_(task), axes_(axes), start_(start), result_(result) {}
 
-double FringePhase::at(double v) const { return inverse_of(radians, value, v); }
-
-namespace {
-
-/// 0 where the bounds leave what the model can do (no equilibrium, beyond a clearing point): there is no image to look
-/// at either.
-double rate_at(const Scene& scene, const Theta& theta, int index) {
-  try {
-    const double rate = fringe_phase_per_unit(scene, theta, index);
-    return std::isfinite(rate) ? rate : 0;
-  } catch (const UserError&) {
-    return 0;
-  }
-}
-
-}  // namespace
-
-std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknowns, const Theta& theta) {
-  // A rate may be largest anywhere between the bounds (a voltage just above its threshold).
-  constexpr int kIntervals = 16;
-  // Of hundreds of rows of a table a few dozen show it.
-  const std::size_t frames = job.micrographs.size(), stride = (frames + 31) / 32;
-  std::vector<FringePhase> result;
-  for (const int index : unknowns.searched) {
-    result.emplace_back();
-    const Parameter& parameter = job.parameters[index];
-    const double width = parameter.upper - parameter.lower;
-    if (!std::isfinite(width) || !(width > 0)) continue;
-    std::array<Theta, 3> others{theta, theta, theta};
-    for (const int other : unknowns.searched) {
-      const Parameter& bounds = job.parameters[other];
-      if (std::isfinite(bounds.upper - bounds.lower))
-        others[1][static_cast<std::size_t>(other)] = bounds.lower,
-        others[2][static_cast<std::size_t>(other)] = bounds.upper;
-    }
-    std::vector<double> rates;
-    FringePhase fringes;
-    for (int i = 0; i <= kIntervals; ++i) {
-      fringes.value.push_back(parameter.lower + width * i / kIntervals);
-      double fastest = 0;
-      for (Theta& probe : others) {
-        probe[static_cast<std::size_t>(index)] = fringes.value.back();
-        for (std::size_t g = 0; g < frames; g += stride)
-          fastest = std::max(fastest, rate_at(job.micrographs[g].scene, probe, index));
+  /// Every point of the product grid; its minima are points below their neighbours along every axis: a valley across
+  /// the axes has several.
+  Places minima_of_grid() {
+    const std::size_t product = product_of(axes_);
+    std::vector<double> chi(product, std::numeric_limits<double>::infinity());
+    for (std::size_t i = 0; i < product && !result_.interrupted; ++i) chi[i] = objective_at(point_at(i));
+    trace_grid(chi);
+    Places minima;
+    for (std::size_t i = 0; i < product; ++i) {
+      bool lowest = std::isfinite(chi[i]);
+      std::size_t rest = i, step = 1;
+      for (const Axis& axis : axes_) {
+        const std::size_t size = axis.values.size(), at = rest % size;
+        rest /= size;
+        if (at > 0) lowest = lowest && chi[i] < chi[i - step];
+        if (at + 1 < size) lowest = lowest && chi[i] <= chi[i + step];
+        step *= size;
       }
-      rates.push_back(fastest);
+      if (lowest) minima.emplace_back(chi[i], point_at(i));
     }
-    fringes.radians.push_back(0);
-    for (std::size_t i = 1; i < rates.size(); ++i)
-      fringes.radians.push_back(fringes.radians.back() + std::max(rates[i - 1], rates[i]) * width / kIntervals);
-    if (fringes.radians.back() > 0) result.back() = std::move(fringes);
+    std::stable_sort(minima.begin(), minima.end(), lower);
+    return minima;
   }
-  return result;
+
+  /// So many points spread evenly over the box, then each axis through the best of them, twice; of neighbours, less
+  /// than a radian apart in everything, the best.
+  Places best_of_box(std::size_t points, std::size_t wanted) {
+    Places places;
+    for (std::size_t i = 0; i < points && !result_.interrupted; ++i) {
+      Eigen::VectorXd x = spread_point(static_cast<int>(i), axes_, start_);
+      const double objective = objective_at(x);
+      places.emplace_back(objective, std::move(x));
+    }
+    places.emplace_back(objective_at(start_), start_);
+    for (int round = 0; round < 2 && !result_.interrupted; ++round)
+      for (const Axis& axis : axes_) {
+        ScanTrace trace{name_of(axis), axis.values, {}};
+        Eigen::VectorXd x = std::min_element(places.begin(), places.end(), lower)->second;
+        for (const double value : axis.values) {
+          x[axis.searched] = value;
+          trace.chi_square.push_back(result_.interrupted ? std::numeric_limits<double>::infinity() : objective_at(x));
+          places.emplace_back(trace.chi_square.back(), x);
+        }
+        if (round == 1) result_.traces.push_back(std::move(trace));
+      }
+    std::stable_sort(places.begin(), places.end(), lower);
+    Places apart;
+    for (auto& place : places) {
+      if (apart.size() >= wanted || !std::isfinite(place.first)) break;
+      if (std::none_of(apart.begin(), apart.end(), [&](const auto& other) { return near(place.second, other.second); }))
+        apart.push_back(std::move(place));
+    }
+    return apart;
+  }
+
+ private:
+  double objective_at(const Eigen::VectorXd& x) {
+    ++result_.points;
+    problem_.evaluate(x, false);
+    result_.interrupted = result_.interrupted || task_.interrupted();
+    const double objective = problem_.objective();
+    return std::isfinite(objective) ? objective : std::numeric_limits<double>::infinity();
+  }
+  Eigen::VectorXd point_at(std::size_t flat) const {
+    Eigen::VectorXd x = start_;
+    for (const Axis& axis : axes_) {
+      x[axis.searched] = axis.values[flat % axis.values.size()];
+      flat /= axis.values.size();
+    }
+    return x;
+  }
+  bool near(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const {
+    return std::all_of(axes_.begin(), axes_.end(), [&](const Axis& axis) {
+      return std::abs(axis.steps.at(a[axis.searched]) - axis.steps.at(b[axis.searched])) < 1;
+    });
+  }
+  const std::string& name_of(const Axis& axis) const {
+    return task_.searched(static_cast<std::size_t>(axis.searched)).name;
+  }
+  void trace_grid(const std::vector<double>& chi) {
+    std::size_t stride = 1;
+    for (const Axis& axis : axes_) {
+      ScanTrace trace{name_of(axis), axis.values, {}};
+      trace.chi_square.assign(axis.values.size(), std::numeric_limits<double>::infinity());
+      for (std::size_t i = 0; i < chi.size(); ++i) {
+        double& best = trace.chi_square[i / stride % axis.values.size()];
+        best = std::min(best, chi[i]);
+      }
+      stride *= axis.values.size();
+      result_.traces.push_back(std::move(trace));
+    }
+  }
+
+  LeastSquares& problem_;
+  const Task& task_;
+  const std::vector<Axis>& axes_;
+  const Eigen::VectorXd& start_;
+  ScanResult& result_;
+};
+
+/// How many starts are worth a few steps of the solver, and how many of them all the way. A batch takes no longer than
+/// the grid did, but for a few starts that any fit deserves: images are the unit, a step of the solver takes one with a
+/// derivative by every unknown.
+struct Effort {
+  std::size_t first_look = 0, finalists = 0, batches = 1;
+};
+constexpr int kSteps = 6;
+Effort effort_of(const LeastSquares& problem, int points, int candidates) {
+  constexpr int kFewest = 4;
+  const int step_cost = 1 + problem.searched_size(), affordable = points / step_cost;
+  Effort effort;
+  effort.finalists =
+      static_cast<std::size_t>(std::clamp(affordable / (2 * kSteps), std::min(kFewest, candidates), candidates));
+  effort.first_look = static_cast<std::size_t>(
+      std::clamp(affordable / (2 * kFirstSteps), static_cast<int>(effort.finalists), 4 * candidates));
+  effort.batches = affordable > 4 * candidates * kFirstSteps ? kMostBatches : 1;
+  return effort;
 }
+
+}  // namespace
 
 double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
   if (minimum.searched.size() == 0) return 0;
@@ -267,138 +340,48 @@ Eigen::MatrixXd projected_information(const LeastSquares& problem) {
   return problem.projected_factor(Eigen::VectorXd::Ones(p)).topLeftCorner(p, p);
 }
 
-ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                const std::vector<FringePhase>& fringes, double hopeless_above) {
+ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
+                const std::vector<PicturePhase>& phases, double hopeless_above) {
   ScanResult result;
-  const FitOptions& options = job.options;
-  const auto interrupted = [&] { return options.interrupted && options.interrupted->load(); };
-  const auto objective_at = [&](const Eigen::VectorXd& x) {
-    ++result.points;
-    problem.evaluate(x, false);
-    const double objective = problem.objective();
-    return std::isfinite(objective) ? objective : std::numeric_limits<double>::infinity();
-  };
-
-  const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
-  const int candidates = std::max(1, options.scan_candidates);
-  std::vector<std::pair<double, Eigen::VectorXd>> starts;
-  const std::vector<Axis> axes = axes_of(job, unknowns, fringes);
-  std::size_t product = axes.empty() ? 0 : 1;
-  for (const Axis& axis : axes) product = std::min<std::size_t>(product * axis.values.size(), 1000000);
-  if (options.progress && product > 0) options.progress("scanning for the fringe order");
-
-  if (product > 0 && product <= kMostProductPoints && axes.size() <= 3) {
-    // Every point of the product grid; its minima are points below their neighbours along every axis: a valley across
-    // the axes has several.
-    std::vector<double> chi(product, std::numeric_limits<double>::infinity());
-    const auto point_at = [&](std::size_t flat) {
-      Eigen::VectorXd x = start;
-      for (const Axis& axis : axes) {
-        x[axis.searched] = axis.values[flat % axis.values.size()];
-        flat /= axis.values.size();
-      }
-      return x;
-    };
-    for (std::size_t i = 0; i < product && !result.interrupted; ++i) {
-      chi[i] = objective_at(point_at(i));
-      result.interrupted = interrupted();
-    }
-    std::size_t stride = 1;
-    for (const Axis& axis : axes) {
-      ScanTrace trace{job.parameters[unknowns.searched[axis.searched]].name, axis.values, {}};
-      trace.chi_square.assign(axis.values.size(), std::numeric_limits<double>::infinity());
-      for (std::size_t i = 0; i < product; ++i) {
-        double& best = trace.chi_square[i / stride % axis.values.size()];
-        best = std::min(best, chi[i]);
-      }
-      stride *= axis.values.size();
-      result.traces.push_back(std::move(trace));
-    }
-    for (std::size_t i = 0; i < product; ++i) {
-      bool lowest = std::isfinite(chi[i]);
-      std::size_t rest = i, step = 1;
-      for (const Axis& axis : axes) {
-        const std::size_t size = axis.values.size(), at = rest % size;
-        rest /= size;
-        if (at > 0) lowest = lowest && chi[i] < chi[i - step];
-        if (at + 1 < size) lowest = lowest && chi[i] <= chi[i + step];
-        step *= size;
-      }
-      if (lowest) starts.emplace_back(chi[i], point_at(i));
-    }
-  } else if (product > 0) {
-    // Too many for a product: points spread evenly over the box, where its axes are few enough for them to come near
-    // each other, then each axis through the best of them, twice.
-    for (int i = 0; i < kMostProductPoints && axes.size() <= kMostAxesSpread && !result.interrupted; ++i) {
-      Eigen::VectorXd x = spread_point(i, job, unknowns, axes, start);
-      const double objective = objective_at(x);
-      starts.emplace_back(objective, std::move(x));
-      result.interrupted = interrupted();
-    }
-    starts.emplace_back(objective_at(start), start);
-    for (int round = 0; round < 2 && !result.interrupted; ++round)
-      for (const Axis& axis : axes) {
-        ScanTrace trace{job.parameters[unknowns.searched[axis.searched]].name, axis.values, {}};
-        Eigen::VectorXd x = std::min_element(starts.begin(), starts.end(), by_objective)->second;
-        for (const double value : axis.values) {
-          x[axis.searched] = value;
-          trace.chi_square.push_back(result.interrupted ? std::numeric_limits<double>::infinity() : objective_at(x));
-          starts.emplace_back(trace.chi_square.back(), x);
-          result.interrupted = result.interrupted || interrupted();
-        }
-        if (round == 1) result.traces.push_back(std::move(trace));
-      }
-    // Of neighbours, less than a radian apart in everything, the best.
-    std::stable_sort(starts.begin(), starts.end(), by_objective);
-    std::vector<std::pair<double, Eigen::VectorXd>> apart;
-    for (auto& [objective, x] : starts) {
-      if (apart.size() >= 4 * kMostBatches * static_cast<std::size_t>(candidates) || !std::isfinite(objective)) break;
-      const bool near = std::any_of(apart.begin(), apart.end(), [&](const auto& other) {
-        return std::all_of(axes.begin(), axes.end(), [&](const Axis& axis) {
-          const FringePhase& phase = fringes[static_cast<std::size_t>(axis.searched)];
-          return std::abs(phase.at(x[axis.searched]) - phase.at(other.second[axis.searched])) < 1;
-        });
-      });
-      if (!near) apart.emplace_back(objective, x);
-    }
-    starts = std::move(apart);
-  }
-  std::stable_sort(starts.begin(), starts.end(), by_objective);
-
-  // A batch takes no longer than the grid did, but for a few starts that any fit deserves: images are the unit, a step
-  // of the solver takes one with a derivative by every unknown.
-  constexpr int kSteps = 6, kFewest = 4;
-  const int step_cost = 1 + problem.searched_size(), affordable = result.points / step_cost;
-  const std::size_t finalists =
-      static_cast<std::size_t>(std::clamp(affordable / (2 * kSteps), std::min(kFewest, candidates), candidates));
-  const std::size_t first_look = static_cast<std::size_t>(
-      std::clamp<int>(affordable / (2 * kFirstSteps), static_cast<int>(finalists), 4 * candidates));
-  const std::size_t batches = affordable > 4 * candidates * kFirstSteps ? kMostBatches : 1;
-
+  const FitOptions& options = task.job.options;
+  const std::vector<Axis> axes = fine_axes_of(task, phases);
+  const bool cheap = costs_microseconds(task);
+  const int candidates = std::max(1, options.scan_candidates) * (cheap ? 4 : 1);
+  const std::size_t most = cheap ? kMostPlacesOfCells : kMostPlaces, product = product_of(axes);
+  if (product > 0) task.say("scanning for the fringe order");
+  Places starts;
+  Survey survey(problem, task, axes, start, result);
+  if (product > 0)
+    starts = product <= most ? survey.minima_of_grid()
+                             : survey.best_of_box(most, 4 * kMostBatches * static_cast<std::size_t>(candidates));
+  const Effort effort = effort_of(problem, result.points, candidates);
   // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet
   // believed: the next ones, then, as long as there are any.
   const double rows = static_cast<double>(problem.pixel_rows());
   double best = std::numeric_limits<double>::infinity();
-  for (std::size_t batch = 0; batch < batches && !result.interrupted; ++batch) {
-    const std::size_t first = batch * first_look, last = std::min(starts.size(), first + first_look);
-    std::vector<std::pair<double, Eigen::VectorXd>> some;
-    for (std::size_t i = first; i < last; ++i) some.push_back(starts[i]);
+  for (std::size_t batch = 0; batch < effort.batches && !result.interrupted; ++batch) {
+    const std::size_t first = std::min(starts.size(), batch * effort.first_look),
+                      last = std::min(starts.size(), first + effort.first_look);
+    Places some(starts.begin() + static_cast<std::ptrdiff_t>(first),
+                starts.begin() + static_cast<std::ptrdiff_t>(last));
     if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
-    best = std::min(best, polish_into(result, problem, options, std::move(some), finalists, kSteps, hopeless_above));
-    if (best < rows + kDoubtful * std::sqrt(2 * rows) || best > hopeless_above) break;
+    best = std::min(best,
+                    polish_into(result, problem, options, std::move(some), effort.finalists, kSteps, hopeless_above));
+    // Where pictures cost next to nothing, all of them: minima may be as good as each other.
+    if ((best < rows + kDoubtful * std::sqrt(2 * rows) && !cheap) || best > hopeless_above) break;
   }
   keep_distinct(result, problem, start);
   return result;
 }
 
-double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                     const std::vector<FringePhase>& fringes) {
+double lowest_of_few(LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
+                     const std::vector<PicturePhase>& phases) {
   constexpr int kFew = 150;
-  const std::vector<Axis> axes = axes_of(job, unknowns, fringes);
+  const std::vector<Axis> axes = axes_of(task, phases);
   double lowest = std::numeric_limits<double>::infinity();
   for (int i = -1; i < (axes.empty() ? 0 : kFew); ++i) {
-    problem.evaluate(i < 0 ? start : spread_point(i, job, unknowns, axes, start), false);
+    problem.evaluate(i < 0 ? start : spread_point(i, axes, start), false);
     if (std::isfinite(problem.objective())) lowest = std::min(lowest, problem.objective());
   }
   return lowest;

@@ -1,11 +1,12 @@
 #pragma once
-// The global part of a fit: which fringe order? Residuals of fringes are full of local minima one order apart, so the
-// fringe-forming parameters are scanned on a grid, on a subsample of pixels, before any solver starts.
+// The global part of a fit: which fringe order, which twist? Residuals are full of local minima as far apart as
+// pictures take to turn once, so that whatever turns them is scanned, on a subsample of pixels, before any solver
+// starts.
 
 #include <functional>
 #include <vector>
 
-#include "fit/problem/least_squares.h"
+#include "fit/search/phases.h"
 
 namespace birefit::estimation {
 
@@ -23,27 +24,17 @@ struct ScanResult {
   bool interrupted = false;
 };
 
-/// The phase that fringes gain along one searched unknown: linear between values that ascend from its lower to its
-/// upper bound. Empty for one that forms no fringes, or has no bounds to scan between.
-struct FringePhase {
-  std::vector<double> value, radians;
-  double at(double v) const;  ///< radians from the lower bound on
-};
-
-/// Of every searched unknown, the fastest of all images, and of the others at `theta` and at either end of what they
-/// may be.
-std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknowns, const Theta& theta);
-
-/// `problem` holds the subsample; `start` is the user's. Unknowns that form no fringes, but centres, are scanned
-/// coarsely where the grid stays small (docs/methods.md, "Scan"). Minima whose objective stays above `hopeless_above`
-/// are not polished further: another branch has beaten them.
-ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                const std::vector<FringePhase>& fringes, double hopeless_above);
+/// `problem` holds the subsample; `start` is the user's. Every unknown along which pictures have several minima is
+/// scanned as finely as they lie (docs/methods.md, "Scan"), on a grid or, where that has too many points, on points
+/// spread over the box of all of them. Minima whose objective stays above `hopeless_above` are not polished further:
+/// another branch has beaten them.
+ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
+                const std::vector<PicturePhase>& phases, double hopeless_above);
 
 /// The lowest objective at `start` and at a few places spread over what scan() would look at: to compare two starts of
 /// the other unknowns.
-double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
-                     const std::vector<FringePhase>& fringes);
+double lowest_of_few(LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
+                     const std::vector<PicturePhase>& phases);
 
 /// The same as scan() from given starts instead of a grid, best first, of which four at most (options.scan_candidates)
 /// are polished; `steps` of the solver for each before the worst are dropped, and those that `same` finds on the way to

@@ -66,35 +66,64 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
   return needed < static_cast<double>(share) ? static_cast<std::size_t>(needed) : share;
 }
 
-/// The problem of the pixels that the grid looks at.
-std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, const Theta& theta) {
-  Frames part = frames;
-  for (int g = 0; g < task.frames(); ++g) {
-    Pixels& pixels = part[static_cast<std::size_t>(g)].pixels;
-    pixels = subsample(pixels, scanned_pixels(task, frames, g));
+/// A cell's picture is one number: the mean of its pixels tells all of it, and has a row instead of hundreds.
+bool is_one_number(const Micrograph& micrograph) {
+  return std::holds_alternative<Cell>(micrograph.scene.sample) && micrograph.uneven.empty();
+}
+PixelSet mean_of(const Micrograph& micrograph, const Frame& frame) {
+  double weights = 0, sum = 0;
+  for (const auto& [x, y] : frame.pixels) {
+    const double weight = 1 / (frame.sigma(x, y) * frame.sigma(x, y));
+    weights += weight, sum += weight * micrograph.values(x, y);
   }
-  return problem_of(task, part, misfit_of_prior(task, theta));
+  return {{frame.pixels.front()},
+          Eigen::VectorXd::Constant(1, sum / weights),
+          Eigen::VectorXd::Constant(1, 1 / std::sqrt(weights))};
+}
+
+/// Rough enough to be quick, and finer than a lamp's jitter: where the minima are on all pixels is found out by the
+/// plan.
+RenderPlan rough_plan(Scene scene, const Theta& theta) {
+  constexpr double kRough = 1e-3;
+  scene.intensity_accuracy = std::max(scene.intensity_accuracy, kRough);
+  return plan(scene, theta);
+}
+
+/// The problem of what the grid looks at.
+std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, const Theta& theta) {
+  std::vector<PixelSet> sets;
+  std::vector<RenderPlan> plans;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Micrograph& micrograph = task.micrograph(g);
+    const Frame& frame = frames[static_cast<std::size_t>(g)];
+    sets.push_back(is_one_number(micrograph)
+                       ? mean_of(micrograph, frame)
+                       : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g))));
+    plans.push_back(is_one_number(micrograph) ? rough_plan(micrograph.scene, theta) : frame.plan);
+  }
+  auto problem = std::make_unique<LeastSquares>(task.job, task.unknowns, std::move(plans), std::move(sets));
+  problem->set_misfit(misfit_expected(task, frames, theta));
+  return problem;
 }
 
 }  // namespace
 
 Minima search(const Task& task, const Start& start, double hopeless_above) {
   if (by_waves(start.frames)) return search_near_rays(task, start);
-  const FitJob& job = task.job;
   Minima minima;
   minima.frames = start.frames;
   minima.theta = start.theta;
   Eigen::VectorXd from = start.searched;
-  const std::vector<FringePhase> fringes = fringe_phases(job, task.unknowns, minima.theta);
   std::unique_ptr<LeastSquares> sample = sampled(task, minima.frames, minima.theta);
+  const std::vector<PicturePhase> phases = picture_phases(*sample, task, minima.theta);
   // The picture's own middle, where fringes fit better around it: the grid takes the centre as known.
   if (const std::optional<Eigen::VectorXd> centred = start_at_symmetry(task, start)) {
-    const double by_given = lowest_of_few(*sample, job, task.unknowns, from, fringes);
+    const double by_given = lowest_of_few(*sample, task, from, phases);
     const Theta theta = task.with(minima.theta, *centred);
     Frames frames = replanned(task, minima.frames, theta);
     std::unique_ptr<LeastSquares> around_centre = sampled(task, frames, minima.theta);
     minima.evaluations += sample->evaluations();
-    if (lowest_of_few(*around_centre, job, task.unknowns, *centred, fringes) < by_given) {
+    if (lowest_of_few(*around_centre, task, *centred, phases) < by_given) {
       from = *centred, minima.theta = theta, minima.frames = std::move(frames);
       sample = std::move(around_centre);
     } else {
@@ -102,7 +131,7 @@ Minima search(const Task& task, const Start& start, double hopeless_above) {
     }
   }
   minima.rows = static_cast<double>(sample->pixel_rows());
-  minima.scan = scan(*sample, job, task.unknowns, from, fringes, hopeless_above * std::max(1.0, minima.rows));
+  minima.scan = scan(*sample, task, from, phases, hopeless_above * std::max(1.0, minima.rows));
   minima.evaluations += sample->evaluations();
   minima.stopped = minima.scan.interrupted;
   return minima;

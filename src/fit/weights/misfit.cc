@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <numeric>
 
 #include "fit/errors/statistics.h"
 #include "fit/weights/settle.h"
@@ -17,20 +19,20 @@ namespace {
 
 using FrameSums = std::vector<LeastSquares::FrameMisfit>;
 
-/// Degrees of freedom left to the frames' means.
-double freedom_of_means(const Task& task, const Optimum& optimum, const FrameSums& frames) {
-  if (frames.size() < 2) return 0;
+/// Degree of freedom left to each frame's mean, from 0 to 1.
+std::vector<double> freedom_of_means(const Task& task, const Optimum& optimum, const FrameSums& frames) {
+  if (frames.size() < 2) return {0};
   const Eigen::MatrixXd covariance = invert_normal_equations(optimum.problem->factor()).covariance;
-  double dof = 0;
+  std::vector<double> freedom;
   for (int g = 0; g < task.frames(); ++g) {
     const auto& frame = frames[static_cast<std::size_t>(g)];
     const Misfit& now = optimum.problem->misfit()[static_cast<std::size_t>(g)];
     const double ratio = now.mean_sd / frame.mean_noise_sd;
     const double factor = now.mean_follows_shape ? 1 / now.shape_variance : 1 / (1 + ratio * ratio);
     const Eigen::VectorXd& row = frame.mean_jacobian_whitened;
-    dof += 1 - std::clamp(factor * row.dot(covariance * row), 0.0, 1.0);
+    freedom.push_back(1 - std::clamp(factor * row.dot(covariance * row), 0.0, 1.0));
   }
-  return dof;
+  return freedom;
 }
 
 /// Pixels that share one misfit, of a frame's residual without its mean where that is another observation.
@@ -75,6 +77,59 @@ void weigh_shapes(const Task& task, const Optimum& optimum, const FrameSums& fra
       found.largest_area = std::max(found.largest_area, area);
     }
   }
+}
+
+/// Places at which the lamp's jitter is looked at, from none to the largest that still is a lamp's.
+constexpr int kLampPlaces = 400;
+constexpr double kMostJitter = 5 * kLampJitter;
+
+/// Of the frames' means, in units of their noise and the lamp's jitter.
+double sum_of_squares(const FrameSums& frames, const std::vector<double>& ratio, double jitter) {
+  double sum = 0;
+  for (std::size_t g = 0; g < frames.size(); ++g)
+    sum += frames[g].mean_whitened * frames[g].mean_whitened / (1 + std::pow(jitter * ratio[g], 2));
+  return sum;
+}
+
+/// What the lamp's jitter is over each frame's noise, per unit of its brightness; 0 where a row's noise is not known,
+/// so that its scatter holds the jitter already.
+std::vector<double> lamp_over_noise(const Task& task, const Frames& setup, const FrameSums& frames) {
+  const bool rows = are_rows(setup);
+  std::vector<double> ratio;
+  for (int g = 0; g < task.frames(); ++g) {
+    const auto& frame = frames[static_cast<std::size_t>(g)];
+    const bool known =
+        lit_by_a_lamp(task.micrograph(g).scene) && !(rows && setup[static_cast<std::size_t>(g)].noise.estimated);
+    ratio.push_back(known ? std::abs(frame.mean_light) / frame.mean_noise_sd : 0);
+  }
+  return ratio;
+}
+
+/// The lamp's jitter as a share of its brightness: the median of its posterior, with a half-normal prior of kLampJitter
+/// and the restricted likelihood of the frames' means; where they do not show it, at most what widens an error bar by
+/// kUnseen.
+double lamp_jitter(const FrameSums& frames, const std::vector<double>& freedom, const std::vector<double>& ratio) {
+  constexpr double kUnseen = 1.2, kShown = 0.99;
+  const double most = *std::max_element(ratio.begin(), ratio.end());
+  if (!(most > 0)) return 0;
+  const double dof = std::accumulate(freedom.begin(), freedom.end(), 0.0);
+  std::vector<double> logarithm;
+  for (int i = 0; i <= kLampPlaces; ++i) {
+    const double jitter = kMostJitter * i / kLampPlaces;
+    double sum = -0.5 * (jitter / kLampJitter) * (jitter / kLampJitter) - 0.5 * sum_of_squares(frames, ratio, jitter);
+    for (std::size_t g = 0; g < frames.size(); ++g)
+      sum -= 0.5 * freedom[g] * std::log1p(std::pow(jitter * ratio[g], 2));
+    logarithm.push_back(sum);
+  }
+  const double top = *std::max_element(logarithm.begin(), logarithm.end());
+  double whole = 0, below = 0;
+  for (double& l : logarithm) l = std::exp(l - top), whole += l;
+  int median = 0;
+  while (median < kLampPlaces && below + logarithm[static_cast<std::size_t>(median)] < 0.5 * whole)
+    below += logarithm[static_cast<std::size_t>(median++)];
+  const double jitter = kMostJitter * median / kLampPlaces, unseen = std::sqrt(kUnseen * kUnseen - 1) / most;
+  const bool shown = sum_of_squares(frames, ratio, 0) > chi_square_quantile(kShown, dof);
+  return shown ? jitter : std::min(jitter, unseen);
 }
 
 /// The frames' common standard deviation, units of the model intensity, whose expected scatter is what is seen; 0 where
@@ -127,17 +182,25 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   std::vector<Misfit> misfit = misfit_of_prior(task, optimum.theta);
   FrameSums frames;
   for (int g = 0; g < task.frames(); ++g) frames.push_back(optimum.problem->frame_misfit(g));
-  const double dof = freedom_of_means(task, optimum, frames);
+  const std::vector<double> freedom = freedom_of_means(task, optimum, frames);
+  const double dof = std::accumulate(freedom.begin(), freedom.end(), 0.0);
   constexpr double kEnoughFrames = 0.9;  // one degree of freedom, to rounding of leverages
   const bool own_scatter = dof >= kEnoughFrames;
   weigh_shapes(task, optimum, frames, own_scatter, misfit, found);
 
   found.frames_scatter = false;
   if (!own_scatter) return misfit;
-  double sum = 0;
-  for (const auto& frame : frames) sum += frame.mean_whitened * frame.mean_whitened;
+  const std::vector<double> ratio = lamp_over_noise(task, optimum.frames, frames);
+  found.lamp_jitter = lamp_jitter(frames, freedom, ratio);
+  // What scatters by more than a lamp does is not the lamp.
   constexpr double kSignificant = 0.999;
-  found.frames_scatter = sum > dof && (found.beyond_noise || sum > chi_square_quantile(kSignificant, dof));
+  const double significant = chi_square_quantile(kSignificant, dof);
+  if (sum_of_squares(frames, ratio, found.lamp_jitter) > significant) found.lamp_jitter = 0;
+  found.lamp_share = 0;
+  for (const double r : ratio)
+    found.lamp_share = std::max(found.lamp_share, 1 - 1 / (1 + std::pow(found.lamp_jitter * r, 2)));
+  const double sum = sum_of_squares(frames, ratio, found.lamp_jitter);
+  found.frames_scatter = sum > dof && found.lamp_jitter == 0 && (found.beyond_noise || sum > significant);
   found.frame_sd = found.frames_scatter ? scatter_of_means(task, optimum.theta, frames, dof) : 0;
   // Rows of a table are its pixels: neighbours share a misfit that is wider than their distance.
   const bool rows = are_rows(optimum.frames);
@@ -147,7 +210,8 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   found.frame_dof = dof / found.row_length;
   for (int g = 0; g < task.frames(); ++g) {
     Misfit& own = misfit[static_cast<std::size_t>(g)];
-    own.mean_sd = found.frame_sd * std::sqrt(found.row_length) * std::abs(task.gain_of(g, optimum.theta));
+    const double of_frames = found.frame_sd * std::sqrt(found.row_length) * std::abs(task.gain_of(g, optimum.theta));
+    own.mean_sd = std::hypot(of_frames, found.lamp_jitter * frames[static_cast<std::size_t>(g)].mean_light);
     own.mean_follows_shape = false;
   }
   return misfit;
@@ -155,9 +219,50 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
 
 }  // namespace
 
+double deviance(const Task& task, const Frames& setup, const LeastSquares& problem) {
+  if (task.frames() < 2) return problem.objective();
+  FrameSums frames;
+  double shapes = 0, squares = 0;
+  for (int g = 0; g < task.frames(); ++g) {
+    frames.push_back(problem.frame_misfit(g));
+    const double mean = frames.back().mean_whitened * frames.back().mean_whitened;
+    shapes += (frames.back().chi_square - mean) / problem.misfit()[static_cast<std::size_t>(g)].shape_variance;
+    squares += mean;
+  }
+  const std::vector<double> ratio = lamp_over_noise(task, setup, frames);
+  double least = squares;
+  for (int i = 0; i <= kLampPlaces; ++i) {
+    const double jitter = kMostJitter * i / kLampPlaces;
+    double sum = (jitter / kLampJitter) * (jitter / kLampJitter) + sum_of_squares(frames, ratio, jitter);
+    for (const double r : ratio) sum += std::log1p(std::pow(jitter * r, 2));
+    least = std::min(least, sum);
+  }
+  // A scatter that is no lamp's: of any size, which the means alone tell.
+  std::vector<double> of_scatter;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int g = 0; g < task.frames(); ++g) {
+    of_scatter.push_back(std::abs(task.gain_of(g, problem.theta())) /
+                         frames[static_cast<std::size_t>(g)].mean_noise_sd);
+    if (of_scatter.back() > 0) smallest = std::min(smallest, 1 / of_scatter.back());
+  }
+  constexpr double kStep = 1.05;
+  const double most = smallest * std::sqrt(squares);
+  for (double sd = 0.1 * smallest; sd < most; sd *= kStep) {
+    double sum = sum_of_squares(frames, of_scatter, sd);
+    for (const double r : of_scatter) sum += std::log1p(std::pow(sd * r, 2));
+    least = std::min(least, sum);
+  }
+  return shapes + least + problem.prior_chi_square();
+}
+
 Optimum with_settled_misfit(const Task& task, Optimum optimum) {
+  // What frames scatter by is judged from where their noise alone would put them: elsewhere they scatter more.
+  if (task.frames() > 1 && !optimum.stopped) {
+    optimum.problem->set_misfit(misfit_of_prior(task, optimum.theta));
+    solve_again(task, optimum, "frames weighed");
+  }
   for (int pass = 0; pass < 8; ++pass) {
-    const double before = optimum.misfit.frame_sd;
+    const MisfitFound before = optimum.misfit;
     optimum.problem->set_misfit(assess_misfit(task, optimum, optimum.misfit));
     // Weights common to all rows of a single image move no minimum; against a prior or between frames they do.
     const bool moves = task.frames() > 1 || optimum.problem->prior_rows() > 0;
@@ -167,7 +272,10 @@ Optimum with_settled_misfit(const Task& task, Optimum optimum) {
     }
     solve_again(task, optimum, "misfit weighed");
     constexpr double kSettled = 0.002;
-    if (pass > 0 && std::abs(optimum.misfit.frame_sd - before) <= kSettled * optimum.misfit.frame_sd) break;
+    const auto still = [&](double now, double then) { return std::abs(now - then) <= kSettled * now; };
+    if (pass > 0 && still(optimum.misfit.frame_sd, before.frame_sd) &&
+        still(optimum.misfit.lamp_jitter, before.lamp_jitter))
+      break;
   }
   return optimum;
 }
