@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "fit/errors/left_out.h"
 #include "fit/errors/report.h"
 #include "fit/strategy.h"
@@ -35,8 +37,32 @@ Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool bea
   return {std::move(result), left_out.change_by_curved_rays, left_out.change_by_waves};
 }
 
+/// What the search shows not to be described, fitted to a part of large images without errors to be trusted; nothing
+/// where that is described after all.
+std::optional<Outcome> given_up(const Task& task, Minima minima) {
+  constexpr std::size_t kPixels = 1 << 16;
+  std::size_t all = 0, used = 0;
+  for (const Frame& frame : minima.frames) all += frame.pixels.size();
+  for (Frame& frame : minima.frames) {
+    if (all > kPixels)
+      frame.pixels = subsample(frame.pixels, std::max<std::size_t>(50, kPixels * frame.pixels.size() / all));
+    used += frame.pixels.size();
+  }
+  Optimum optimum = best_minimum(task, minima, false);
+  if (optimum.stopped) return std::nullopt;
+  optimum.stopped = true;  // nothing is worth settling
+  optimum.warnings.push_back(fmt::format(
+      "None of the {} places that the search looked at describes what there is to see: the fit ended there{}.",
+      minima.scan.points, used < all ? fmt::format(", with {} of {} pixels", used, all) : ""));
+  Outcome outcome = judge(task, optimum = settle(task, std::move(optimum)), minima, true);
+  if (outcome.result.has_answer()) return std::nullopt;
+  return outcome;
+}
+
 /// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
 Outcome finish(const Task& task, const Minima& minima, bool beaten) {
+  if (minima.hopeless && !beaten)
+    if (std::optional<Outcome> outcome = given_up(task, minima)) return std::move(*outcome);
   Optimum optimum = settle(task, best_minimum(task, minima, beaten));
   Outcome outcome = judge(task, optimum, minima, beaten);
   // A profile has gone on to where the solver had not: from there once more.

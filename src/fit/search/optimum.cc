@@ -16,8 +16,13 @@ SolveSummary solve(const Task& task, Optimum& optimum, Eigen::VectorXd& searched
   options.label = label;
   // Propagation takes a tenth of a second and more an image: to a thousandth of a chi-square unit, not to rounding.
   if (by_waves(optimum.frames)) options.function_tolerance = 3e-8;
+  // Of what is not described, to a thousandth of the unit that its misfit makes of chi-square.
+  constexpr double kMissed = 4, kOfUnit = 1e-3;
+  const double rows = static_cast<double>(optimum.problem->pixel_rows());
+  if (optimum.per_pixel > kMissed) options.function_tolerance = std::max(options.function_tolerance, kOfUnit / rows);
   if (!label.empty()) options.iterations = &optimum.iterations;
   const SolveSummary summary = optimum.problem->solve(searched, options);
+  optimum.per_pixel = optimum.problem->objective() / std::max(1.0, rows);
   optimum.stopped = optimum.stopped || summary.interrupted;
   return summary;
 }
@@ -153,6 +158,7 @@ Optimum best_minimum(const Task& task, const Minima& found, bool beaten) {
   optimum.evaluations = found.evaluations;
   optimum.stopped = found.stopped || beaten;
   optimum.warnings = task.job.warnings;
+  optimum.per_pixel = found.lowest_per_pixel();
   if (optimum.stopped) {
     optimum.problem->evaluate(optimum.searched, true);
     optimum.theta = optimum.problem->theta();

@@ -29,6 +29,7 @@ struct Optimum {
   std::vector<Outliers> left_out;         ///< of each micrograph
   MisfitFound misfit;
 
+  double per_pixel = 1;  ///< objective of the last solution over its pixels
   bool converged = false;
   bool stopped = false;  ///< interrupted, or beaten: nothing is solved any more
   bool possible = true;  ///< false: the search ended where the scene cannot be

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/problem/constant.h"
 #include "fit/search/centre.h"
 
 namespace birefit::estimation {
@@ -106,6 +107,22 @@ std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, co
   return problem;
 }
 
+/// Whether the best place describes so little that a fit of all pixels will not either. A signal that the pixels looked
+/// at do not show has no minimum that the search could tell from others.
+bool is_hopeless(const Task& task, LeastSquares& sample, const ScanResult& scan) {
+  const Candidate& best = scan.candidates.front();
+  sample.evaluate(best.searched, false);
+  const std::optional<double> constant = chi_square_of_a_constant(task, sample);
+  const double rows = static_cast<double>(sample.pixel_rows()), fewest = 10.0 * task.unknowns.size();
+  if (!constant || rows < fewest || scan.interrupted) return false;
+  constexpr double kMisfit = 2,
+                   kMostLeft = 0.6;  // a little more than what makes a verdict: the best place is not quite the minimum
+  const double reduced = std::max(1.0, best.objective / rows);
+  const double by_chance = 2 * task.unknowns.size() + 2 * std::log(std::max(1, scan.points));
+  const bool not_described = reduced > kMisfit && best.objective - rows > kMostLeft * (*constant - rows);
+  return not_described || *constant - best.objective < by_chance * reduced;
+}
+
 }  // namespace
 
 Minima search(const Task& task, const Start& start, double hopeless_above) {
@@ -132,6 +149,7 @@ Minima search(const Task& task, const Start& start, double hopeless_above) {
   }
   minima.rows = static_cast<double>(sample->pixel_rows());
   minima.scan = scan(*sample, task, from, phases, hopeless_above * std::max(1.0, minima.rows));
+  minima.hopeless = is_hopeless(task, *sample, minima.scan);
   minima.evaluations += sample->evaluations();
   minima.stopped = minima.scan.interrupted;
   return minima;
