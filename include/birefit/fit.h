@@ -74,6 +74,7 @@ struct FitJob {
   std::optional<JointPrior> prior;
   FitOptions options;
   std::vector<std::string> warnings;  ///< gathered while reading the input
+  std::vector<std::string> taken_as_exact;  ///< sentences: what nobody has stated and the model therefore takes for granted
 };
 
 struct ParameterEstimate {
@@ -203,6 +204,7 @@ struct FitResult {
   int evaluations = 0;
   double seconds = 0;
   std::vector<std::string> warnings;   ///< sentences; empty when there is nothing to warn of
+  std::vector<std::string> taken_as_exact;  ///< sentences: what the model takes for granted wherever such a sample is fitted so
   std::string verdict;                 ///< one paragraph in words
   std::string solver_report;           ///< Ceres' own
   Theta theta;                         ///< full table at the optimum

@@ -36,6 +36,7 @@ struct RenderPlan {
   double numerical_error = 0;
   double model_error = 0;           ///< of what the ceiling leaves out, same unit
   std::vector<std::string> warnings;  ///< what is not modelled and may matter here
+  std::vector<std::string> left_out;  ///< what the model leaves out wherever such a sample is computed so
   double cost_seconds = 0;          ///< of a picture by wave optics: expected without derivatives, one thread; rays are quick to try
 
   // The numerical choices themselves.

@@ -79,7 +79,7 @@ int run_explain(const Arguments& arguments) {
   const Theta theta = table.values();
   const RenderPlan chosen = plan(config.scene, theta);
   std::vector<std::string> warnings = config.job.warnings;
-  warnings.insert(warnings.end(), chosen.warnings.begin(), chosen.warnings.end());
+  for (const auto& more : {config.job.taken_as_exact, chosen.warnings, chosen.left_out}) warnings.insert(warnings.end(), more.begin(), more.end());
 
   // A profile's directions and the rows of a table make no picture.
   const bool picture = !config.job.micrographs.empty() && config.scene.microscope.directions.empty() && config.scene.view.width * config.scene.view.height > 1;

@@ -54,7 +54,9 @@ int run_jones(const Arguments& arguments) {
   write_file(arguments.out, text);
   if (!arguments.quiet) {
     print_warnings(config.job.warnings);
+    print_warnings(config.job.taken_as_exact);
     print_warnings(chosen.warnings);
+    print_warnings(chosen.left_out);
     std::cout << fmt::format("{}: {} matrices, method {} ({}), numerical error {:.1e}\n", arguments.out, rows.size(),
                              chosen.method, chosen.physics, chosen.numerical_error);
   }

@@ -40,7 +40,9 @@ int run_render(const Arguments& arguments) {
   save_image(rendering.intensity, arguments.out);
   if (!arguments.quiet) {
     print_warnings(config.job.warnings);
+    print_warnings(config.job.taken_as_exact);
     print_warnings(chosen.warnings);
+    print_warnings(chosen.left_out);
     std::cout << fmt::format("{}: {} x {} pixels, method {} ({}), numerical error {:.1e}, model error {:.1e}\n",
                              arguments.out, rendering.intensity.width(), rendering.intensity.height(), chosen.method,
                              chosen.physics, chosen.numerical_error, chosen.model_error);

@@ -824,7 +824,9 @@ std::string model_section(const Config& config, const FitResult& result) {
                                    " of the incident intensity, from what the physics leaves out") +
            "</dl>\n";
     if (!plan.reasons.empty()) out += list(plan.reasons);
-    if (!plan.warnings.empty()) out += "<p>Not modelled:</p>\n" + list(plan.warnings);
+    std::vector<std::string> not_modelled = plan.warnings;
+    not_modelled.insert(not_modelled.end(), plan.left_out.begin(), plan.left_out.end());
+    if (!not_modelled.empty()) out += "<p>Not modelled:</p>\n" + list(not_modelled);
   }
   return out;
 }

@@ -58,7 +58,8 @@ Json plan_json(const RenderPlan& plan) {
           {"reasons", plan.reasons},
           {"numerical_error", number(plan.numerical_error)},
           {"model_error", number(plan.model_error)},
-          {"warnings", plan.warnings}};
+          {"warnings", plan.warnings},
+          {"left_out", plan.left_out}};
 }
 
 struct PixelCounts {
@@ -260,6 +261,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["evaluations"] = result.evaluations;
   json["seconds"] = number(result.seconds);
   json["warnings"] = result.warnings;
+  json["taken_as_exact"] = result.taken_as_exact;
   // File names and configs may hold bytes that are no UTF-8.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -300,6 +302,7 @@ std::string summary(const FitResult& result) {
   if (!result.verdict.empty()) text += result.verdict + "\n";
   if (result.coverage) text += coverage_text(*result.coverage);
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
+  for (const std::string& sentence : result.taken_as_exact) text += "taken as exact: " + sentence + "\n";
   return text;
 }
 

@@ -225,12 +225,12 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
   plan.model_error = 2 * worst_reflection;
   const double size = 2 * o.radius_um * o.n_host / value(scene.microscope.wavelength_nm) * 1000;
   if (size < 400 && scene.rays == Rays::eikonal)
-    plan.warnings.push_back(fmt::format(
+    plan.left_out.push_back(fmt::format(
         "The droplet is {:.3g} wavelengths across: rays, curved as they are, leave out diffraction. An image of beam propagation (23 wavelengths, "
         "birefringence 0.22) is met to 2 % of its range, its birefringence to 0.3 % and its diameter to 0.1 %; the error bars do not contain this.",
         size));
   else if (size < 400)
-    plan.warnings.push_back(fmt::format(
+    plan.left_out.push_back(fmt::format(
         "The droplet is {:.3g} wavelengths across: straight rays leave out diffraction and walk-off. Measured on exact "
         "solutions of 5 to 20 um droplets of birefringence 0.22, ray images differ by 25 to 60 % RMS and a fitted "
         "birefringence comes out 1 to 7 % low. Where microscope.objective_na is given, a fit foretells what it is here and its error bars contain that; "
@@ -745,7 +745,7 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
     r = std::max({r, reflectance(std::sqrt(f.ordinary), o.n_host), reflectance(std::sqrt(f.extraordinary), o.n_host)});
   plan.model_error = r + (scene.ceiling == Ceiling::e_only ? 0.03 : 0.0);
   if (r > 0.01)
-    plan.warnings.push_back(fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by up to about {:.2g}.", r, r));
+    plan.left_out.push_back(fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by up to about {:.2g}.", r, r));
   note_illumination(scene, value, largest_phase, plan);
   return plan;
 }
@@ -858,7 +858,7 @@ void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
   for (double phase : phases(scene, theta)) largest_phase = std::max(largest_phase, std::abs(phase));
   const double unsure = largest_phase * law->birefringence_uncertainty;
   plan.model_error = std::hypot(plan.model_error, 0.5 * std::min(1.0, unsure));  // the steepest slope of sin^2(phase/2)
-  plan.warnings.push_back(fmt::format(
+  plan.left_out.push_back(fmt::format(
       "The material's birefringence is known to {:.2g} % only (standard deviation): the largest retardance, {:.3g} rad, to {:.2g} rad. "
       "Intervals do not contain this unless sample.material.birefringence_factor is fitted with prior_sd: {:.2g}.",
       100 * law->birefringence_uncertainty, largest_phase, unsure, law->birefringence_uncertainty));

@@ -127,7 +127,7 @@ RenderPlan plan_volume(const Scene& scene, const Values<double>& value) {
   std::sort(squares.begin(), squares.end());
   const double typical = squares.empty() ? 0 : squares[squares.size() / 2], turn = std::sqrt(typical) / (o.k0 * o.n_o);
   plan.model_error = std::min(0.5, typical * o.depth_um / (8 * o.k0 * o.n_o));
-  plan.warnings.push_back(fmt::format(
+  plan.left_out.push_back(fmt::format(
       "Light runs straight through the sampled field: refraction, diffraction and reflections are left out. Its gradients would turn the extraordinary "
       "ray by some {:.2g} degrees (median), which changes the intensity by the order of {:.1g}.",
       turn * 180 / kPi, plan.model_error));

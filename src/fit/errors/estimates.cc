@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -74,7 +75,8 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
   // A valley longer than the bounds is no interval but a verdict.
   if (!(t * sd < parameter.upper - parameter.lower)) return;
   constexpr double kBent = 0.1, kBentFar = 0.2;  // 5 % of the interval
-  constexpr double kFar = 2, kPlateau = 1.5;
+  // A crossing nearer than kLeast of the curvature's is a place where the solver failed, not the end of an interval.
+  constexpr double kFar = 2, kPlateau = 1.5, kLeast = 1e-3;
   Profile profile = q.profile();
   const auto bent = [&](double reach, double by) {
     const std::array<double, 2> straight = profile.straightness(reach * reach);
@@ -86,7 +88,7 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
   const auto half = [&](double end) {
     const auto reaching = [&](double reach) {
       const double to = profile.crossing(end, reach * reach), length = std::abs(to - estimate.value) * t / reach;
-      return to == end ? std::max(length, t * sd) : length;
+      return to == end || !(length > kLeast * t * sd) ? std::max(length, t * sd) : length;
     };
     const double near = reaching(t), beyond = far ? reaching(kFar * t) : 0;
     return beyond > kPlateau * near ? beyond : near;
@@ -96,7 +98,7 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
   if (profile.lowest() < -kBetter) q.optimum.better = profile.lowest_place();
   if (std::abs(low / (t * sd) - 1) < 0.5 * kBent && std::abs(high / (t * sd) - 1) < 0.5 * kBent)
     return;  // only the way there was bent
-  const double more = t * t * (estimate.stderr_ * estimate.stderr_ - sd * sd);
+  const double more = std::max(0.0, t * t * (estimate.stderr_ * estimate.stderr_ - sd * sd));
   estimate.interval95_low = estimate.value - std::sqrt(low * low + more);
   estimate.interval95_high = estimate.value + std::sqrt(high * high + more);
   estimate.profiled = true;
@@ -142,7 +144,13 @@ bool settle_at_bound(const Parameter& parameter, double gradient, ParameterEstim
   estimate.at_bound = true;
   const bool physical =
       at_lower ? parameter.lower == parameter.physical_lower : parameter.upper == parameter.physical_upper;
-  if (!physical) result.pinned = true;
+  if (!physical) {
+    result.pinned = true;
+    // Held at a bound it was not estimated: an error that the data would leave it if it could move is no error of this
+    // value.
+    if (estimate.linear)
+      estimate.stderr_ = estimate.interval95_low = estimate.interval95_high = std::numeric_limits<double>::quiet_NaN();
+  }
   if (physical && std::isfinite(estimate.stderr_) && estimate.stderr_ > 0) {
     // The likelihood is the tail of a normal whose top lies `outside` standard errors beyond the limit; with a flat
     // prior on the allowed side 95 % of that tail lie within `reach`.

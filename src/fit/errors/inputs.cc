@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -48,14 +49,77 @@ Eigen::VectorXd intensity_by_pixel_size(const Task& task, const Optimum& optimum
   return by;
 }
 
+/// The optimum's own picture as the measurement, and an input that is not what it was made with: what a fit makes of
+/// that, by a part of the pixels. The first order does not tell it where the picture turns by a good part of a fringe,
+/// or where light ends at an edge that lies between pixels: two of its derivatives at one place are as far from it as
+/// they like.
+class ChangedInput {
+ public:
+  ChangedInput(const Task& task, const Optimum& optimum, const std::function<void(FitJob&)>& change)
+      : optimum_(optimum), job_(task.job) {
+    change(job_);
+    job_.prior.reset();
+    std::vector<RenderPlan> plans;
+    std::vector<PixelSet> sets;
+    std::size_t all = 0;
+    for (const Frame& frame : optimum.frames) all += frame.pixels.size();
+    for (int g = 0; g < task.frames(); ++g) {
+      const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+      const std::size_t share = std::max<std::size_t>(1, kPixels * frame.pixels.size() / std::max<std::size_t>(all, 1));
+      const Image picture = fitted_image(task, optimum.frames, g, optimum.theta);
+      PixelSet set = pixel_set(task.micrograph(g), frame.sigma, subsample(frame.pixels, share));
+      for (std::size_t i = 0; i < set.pixels.size(); ++i)
+        set.value[static_cast<Eigen::Index>(i)] = picture(set.pixels[i][0], set.pixels[i][1]);
+      sets.push_back(std::move(set));
+      plans.push_back(frame.plan);
+    }
+    problem_ = std::make_unique<LeastSquares>(job_, task.unknowns, std::move(plans), std::move(sets));
+    problem_->set_misfit(optimum.problem->misfit());
+  }
+
+  /// Solved for from where the first order leads.
+  Eigen::VectorXd shift(const Task& task, const Eigen::VectorXd& linear) {
+    Eigen::VectorXd searched = optimum_.searched + linear.head(optimum_.searched.size());
+    for (Eigen::Index j = 0; j < searched.size(); ++j) {
+      const Parameter& parameter = task.searched(static_cast<std::size_t>(j));
+      searched[j] = std::clamp(searched[j], parameter.lower, parameter.upper);
+    }
+    SolveOptions few;
+    few.max_iterations = 15;
+    few.function_tolerance = 1e-6;
+    few.interrupted = task.job.options.interrupted;
+    problem_->solve(searched, few);
+    Eigen::VectorXd change(linear.size());
+    for (int j = 0; j < task.unknowns.size(); ++j) {
+      const auto at = static_cast<std::size_t>(task.unknowns.table_index(j));
+      change[j] = problem_->theta()[at] - optimum_.theta[at];
+    }
+    return change;
+  }
+
+ private:
+  static constexpr std::size_t kPixels = 4000;  // as of a scan
+  const Optimum& optimum_;
+  FitJob job_;
+  std::unique_ptr<LeastSquares> problem_;
+};
+
 }  // namespace
 
 void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {
   if (optimum.stopped || task.unknowns.searched.empty() || by_waves(optimum.frames)) return;
   std::vector<InputEffect> effects;
-  const auto add = [&](const std::string& name, const std::string& unit, double value, const Eigen::VectorXd& by) {
+  const auto add = [&](const std::string& name, const std::string& unit, double value, const Eigen::VectorXd& by,
+                       const std::function<void(FitJob&, double)>& change) {
     InputEffect effect{name, unit, value, unit == "deg" || unit == "px" ? 1.0 : 0.01 * std::abs(value), {}};
-    const Eigen::VectorXd shift = optimum.problem->shift_by(effect.step * by, of_noise.covariance);
+    Eigen::VectorXd shift = optimum.problem->shift_by(effect.step * by, of_noise.covariance);
+    const Eigen::ArrayXd sd = of_noise.covariance.diagonal().array().cwiseMax(0).sqrt();
+    constexpr double kOfNote = 0.5;  // standard errors: what is less is not named
+    const bool of_note = (shift.array().abs() > kOfNote * sd).head(optimum.searched.size()).any();
+    const bool determined =
+        std::none_of(of_noise.undetermined.begin(), of_noise.undetermined.end(), [](bool u) { return u; });
+    if (shift.allFinite() && of_note && determined && effect.step > 0)
+      shift = ChangedInput(task, optimum, [&](FitJob& job) { change(job, effect.step); }).shift(task, shift);
     if (shift.allFinite()) effect.shift.assign(shift.begin(), shift.end());
     if (effect.step > 0 && !effect.shift.empty()) effects.push_back(std::move(effect));
   };
@@ -63,14 +127,20 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
   const Eigen::MatrixXd columns = optimum.problem->intensity_by(inputs);
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const Parameter& p = task.job.parameters[inputs[k]];
-    add(p.name, p.unit, optimum.theta[static_cast<std::size_t>(inputs[k])], columns.col(static_cast<Eigen::Index>(k)));
+    add(p.name, p.unit, optimum.theta[static_cast<std::size_t>(inputs[k])], columns.col(static_cast<Eigen::Index>(k)),
+        [&, index = inputs[k]](FitJob& job, double step) {
+          job.parameters[index].value = optimum.theta[static_cast<std::size_t>(index)] + step;
+        });
   }
   const double pixel_um = task.micrograph(0).scene.view.pixel_size_um;
   const std::vector<Micrograph>& micrographs = task.job.micrographs;
   const bool shared = std::all_of(micrographs.begin(), micrographs.end(),
                                   [&](const Micrograph& m) { return m.scene.view.pixel_size_um == pixel_um; });
   if (pixel_um > 0 && shared)
-    add("micrograph.pixel_size_um", "um", pixel_um, intensity_by_pixel_size(task, optimum, pixel_um));
+    add("micrograph.pixel_size_um", "um", pixel_um, intensity_by_pixel_size(task, optimum, pixel_um),
+        [](FitJob& job, double step) {
+          for (Micrograph& m : job.micrographs) m.scene.view.pixel_size_um += step;
+        });
   const auto weight = [&](const InputEffect& effect) {
     double most = 0;
     for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)

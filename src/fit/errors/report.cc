@@ -117,6 +117,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.ambiguous = rivals.ambiguous;
   result.rivals = std::move(rivals.minima);
   result.warnings = optimum.warnings;
+  result.taken_as_exact = task.job.taken_as_exact;
   result.warnings.insert(result.warnings.end(), left_out.warnings.begin(), left_out.warnings.end());
   result.interrupted = (optimum.stopped && !beaten) || task.interrupted();
   if (result.interrupted) result.converged = false;

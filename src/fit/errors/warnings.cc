@@ -134,6 +134,10 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
   for (int g = 0; g < task.frames(); ++g) {
     const MicrographResult& micrograph = result.micrographs[static_cast<std::size_t>(g)];
     for (const std::string& warning : micrograph.plan.warnings) warn(result, warning);
+    for (const std::string& sentence : micrograph.plan.left_out)
+      if (std::find(result.taken_as_exact.begin(), result.taken_as_exact.end(), sentence) ==
+          result.taken_as_exact.end())
+        result.taken_as_exact.push_back(sentence);
     if (micrograph.used == 1) {  // a row of a table (name:line): judged with the others of it
       Rows& rows = tables[table_of(micrograph.name)];
       const auto [x, y] = optimum.frames[static_cast<std::size_t>(g)].pixels[0];
