@@ -105,13 +105,12 @@ std::string summary_md(const MethodChart& chart) {
   return text;
 }
 
-std::string rays_script(const MethodChart& chart, const std::string& svg) {
+std::string rays_script(const MethodChart& chart) {
   std::string script = fmt::format(
-      "set terminal svg size 1500,820 dynamic font 'sans,13' background rgb 'white'\nset output {}\n"
+      "set terminal svg size 1500,820 dynamic font 'sans,13' background rgb 'white'\n"
       "set logscale xy\nset format x '10^{{%T}}'\nset format y '10^{{%T}}'\nset grid lc rgb '#dddddd'\n"
       "set xrange [1e-14:2]\nset yrange [0.01:20000]\nunset key\n"
-      "set multiplot layout 2,4 margins 0.05,0.99,0.08,0.94 spacing 0.045,0.12\n",
-      svg);
+      "set multiplot layout 2,4 margins 0.05,0.99,0.08,0.94 spacing 0.045,0.12\n");
   for (const ChartScene& scene : chart.scenes) {
     std::string plot, data;
     for (std::size_t m = 0; m < std::size(kChartedMethods); ++m) {
@@ -137,12 +136,11 @@ std::string rays_script(const MethodChart& chart, const std::string& svg) {
   return script + "\nunset multiplot\n";
 }
 
-std::string frames_script(const MethodChart& chart, const std::string& svg) {
+std::string frames_script(const MethodChart& chart) {
   std::string script = fmt::format(
-      "set terminal svg size 820,520 dynamic font 'sans,13' background rgb 'white'\nset output {}\nset logscale xy\n"
+      "set terminal svg size 820,520 dynamic font 'sans,13' background rgb 'white'\nset logscale xy\n"
       "set format x '10^{{%T}}'\nset grid lc rgb '#dddddd'\nset key top right noenhanced\n"
-      "set xlabel 'worst error of a pixel'\nset ylabel 'ms a frame of 500 x 500'\n",
-      svg);
+      "set xlabel 'worst error of a pixel'\nset ylabel 'ms a frame of 500 x 500'\n");
   std::set<std::string> names;
   std::string plot;
   int k = 0;
@@ -166,13 +164,12 @@ std::string waves_csv(const std::vector<WavePoint>& points) {
 }
 
 /// Error against radius for each sample at NA 0.4, and time against error for one droplet.
-std::string waves_script(const std::vector<WavePoint>& points, const std::string& svg) {
+std::string waves_script(const std::vector<WavePoint>& points) {
   constexpr const char* kModels[] = {"straight", "eikonal", "split_step", "march"};
   constexpr const char* kModelColours[] = {"#999999", "#000000", "#0072b2", "#d55e00"};
   std::string script = fmt::format(
-      "set terminal svg size 1500,430 dynamic font 'sans,13' background rgb 'white'\nset output {}\nset logscale y\nset grid lc rgb '#dddddd'\n"
-      "set key top left noenhanced maxrows 2 samplen 1.5 width -1\nset multiplot layout 1,4 margins 0.055,0.99,0.14,0.9 spacing 0.055,0.1\nset yrange [0.001:6]\n",
-      svg);
+      "set terminal svg size 1500,430 dynamic font 'sans,13' background rgb 'white'\nset logscale y\nset grid lc rgb '#dddddd'\n"
+      "set key top left noenhanced maxrows 2 samplen 1.5 width -1\nset multiplot layout 1,4 margins 0.055,0.99,0.14,0.9 spacing 0.055,0.1\nset yrange [0.001:6]\n");
   std::vector<std::string> samples;
   for (const WavePoint& p : points)
     if (std::find(samples.begin(), samples.end(), p.sample) == samples.end()) samples.push_back(p.sample);
@@ -214,13 +211,13 @@ int run_chart(const Arguments& arguments) {
   write_file((out / "scenes.csv").string(), scenes_csv(chart));
   write_file((out / "summary.md").string(), summary_md(chart));
   if (!chart.frames.empty()) write_file((out / "frames.csv").string(), frames_csv(chart));
-  if (draw(rays_script(chart, plot_path(out / "chart.svg"))) && !chart.frames.empty())
-    draw(frames_script(chart, plot_path(out / "frames.svg")));
+  if (draw(rays_script(chart), out / "chart.svg") && !chart.frames.empty())
+    draw(frames_script(chart), out / "frames.svg");
   const std::vector<WavePoint> waves = measure_waves(arguments.quick, [&](const std::string& what) {
     if (!arguments.quiet) std::cerr << "measuring " << what << "\n";
   });
   write_file((out / "waves.csv").string(), waves_csv(waves));
-  draw(waves_script(waves, plot_path(out / "waves.svg")));
+  draw(waves_script(waves), out / "waves.svg");
   if (!arguments.quiet) std::cout << (out / "chart.csv").string() << ": " << chart.points.size() << " measurements\n";
   return kExitDone;
 }

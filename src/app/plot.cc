@@ -1,29 +1,66 @@
 #include "app/plot.h"
 
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <memory>
 
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "birefit/error.h"
 
 namespace birefit {
+namespace {
 
-bool draw(const std::string& script) {
-  std::FILE* pipe = popen("gnuplot", "w");
-  bool done = pipe != nullptr;
-  if (pipe) {
-    std::fwrite(script.data(), 1, script.size(), pipe);
-    done = pclose(pipe) == 0;
-  }
-  if (!done) std::cerr << "birefit: no picture: gnuplot is not there or failed; the tables are complete (Debian: gnuplot-nox)\n";
-  return done;
+/// Runs gnuplot without a shell, its input from one open file and its output to another; its exit code, or the error of starting it.
+int run_gnuplot(std::FILE* input, std::FILE* output) {
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_adddup2(&files, fileno(input), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&files, fileno(output), STDOUT_FILENO);
+  char name[] = "gnuplot";
+  char* arguments[] = {name, nullptr};
+  pid_t child = 0;
+  const int failure = posix_spawnp(&child, name, &files, nullptr, arguments, environ);
+  posix_spawn_file_actions_destroy(&files);
+  if (failure != 0) return failure;
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) return errno;
+  return status;
 }
 
-std::string plot_path(const std::filesystem::path& path) {
+}  // namespace
+
+bool draw(const std::string& script, const std::filesystem::path& picture) {
+  const auto close = [](std::FILE* file) { std::fclose(file); };
+  // The script goes by way of a file without a name: a pipe that nobody reads would end this program.
+  const std::unique_ptr<std::FILE, decltype(close)> input(std::tmpfile(), close);
+  const std::filesystem::path part = picture.parent_path() / ("." + picture.filename().string() + ".part");
+  std::unique_ptr<std::FILE, decltype(close)> output(std::fopen(part.c_str(), "wb"), close);
+  bool done = input && output && std::fwrite(script.data(), 1, script.size(), input.get()) == script.size();
+  if (done) {
+    std::rewind(input.get());
+    done = run_gnuplot(input.get(), output.get()) == 0;
+  }
+  output.reset();
+  std::error_code failure;
+  if (done) std::filesystem::rename(part, picture, failure);
+  else std::filesystem::remove(part, failure);
+  if (!done || failure) std::cerr << "birefit: no picture: gnuplot is not there or failed; the tables are complete (Debian: gnuplot-nox)\n";
+  return done && !failure;
+}
+
+std::string plot_text(const std::string& text) {
   std::string quoted = "'";
-  for (const char c : path.string()) quoted += c == '\'' ? std::string("''") : std::string(1, c);
+  for (const char c : text) {
+    const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+    quoted += control ? " " : c == '\'' ? "''" : std::string(1, c);
+  }
   return quoted + "'";
 }
 

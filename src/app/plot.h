@@ -6,10 +6,12 @@
 
 namespace birefit {
 
-/// Runs a script; false (and a message to stderr) when gnuplot is not there or fails.
-bool draw(const std::string& script);
-/// 'path' as gnuplot reads it, quotes included.
-std::string plot_path(const std::filesystem::path& path);
+/// Draws `picture` by a script that leaves gnuplot's output where it is (no `set output`): no name of a file or folder is ever
+/// part of a script. False (and a message to stderr, and no picture) when gnuplot is not there or fails.
+bool draw(const std::string& script, const std::filesystem::path& picture);
+/// Text of somebody else's as a string of a script, quotes included: between single quotes, in which gnuplot substitutes
+/// nothing (between double quotes it runs what stands between backticks); control characters, line ends too, become spaces.
+std::string plot_text(const std::string& text);
 /// Makes the folder; UserError when it cannot.
 void make_folder(const std::string& folder);
 /// As CSV: empty when not finite.

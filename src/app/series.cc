@@ -41,13 +41,6 @@ void remove_parts(const fs::path& folder) {
     if (entry.path().extension() == ".part" && entry.path().filename().string().starts_with('.')) fs::remove(entry.path(), ignored);
 }
 
-/// Text between double quotes of a gnuplot script.
-std::string plot_text(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
-  return quoted + "\"";
-}
-
 /// "diameter (um)" of sample.droplet.diameter_um: the unit is part of every name.
 std::string axis_label(const std::string& path) {
   const std::size_t dot = path.rfind('.');
@@ -75,7 +68,7 @@ std::optional<std::size_t> abscissa(const ImageSeries& series) {
 
 /// A panel for every searched parameter: estimates with 95 % intervals; limits as triangles that point to what is allowed; frames without
 /// an answer as open circles. Of a shared parameter each frame's own estimate, and the common one as a band.
-std::string script_of(const ImageSeries& series, const SeriesResult& result, const fs::path& svg) {
+std::string script_of(const ImageSeries& series, const SeriesResult& result) {
   std::vector<std::string> drawn;
   for (const auto& fit : result.alone)
     if (fit)
@@ -87,10 +80,10 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result, con
   const int width = columns == 1 ? 760 : 1160, height = static_cast<int>(60 + 230 * rows);
   // Margins in pixels: the same whatever the number of panels.
   std::string script = fmt::format(
-      "set terminal svg size {},{} dynamic font 'sans,13' background rgb 'white'\nset output {}\n"
+      "set terminal svg size {},{} dynamic font 'sans,13' background rgb 'white'\n"
       "set grid lc rgb '#e4e4e4' lt 1\nset border lw 1.1\nset tics nomirror\nunset key\nset offsets 0, 0, graph 0.06, graph 0.06\n"
       "set multiplot layout {},{} margins {:.4f},{:.4f},{:.4f},{:.4f} spacing {:.4f},{:.4f}\n",
-      width, height, plot_path(svg), rows, columns, 100.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 110.0 / width, 22.0 / height);
+      width, height, rows, columns, 100.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 110.0 / width, 22.0 / height);
   for (std::size_t k = 0; k < drawn.size(); ++k) {
     const std::string& name = drawn[k];
     const bool shared = result.shared && std::find(result.shared->posterior.names.begin(), result.shared->posterior.names.end(), name) != result.shared->posterior.names.end();
@@ -229,8 +222,7 @@ int run_series(const Arguments& arguments) {
   write_file(out / "series.csv", series_csv(series, result));
   if (const std::string shared = shared_csv(result); !shared.empty()) write_file(out / "shared.csv", shared);
   folder.keep();
-  const fs::path drawing = out / ".series.svg.part";
-  if (const std::string script = script_of(series, result, drawing); !script.empty() && draw(script)) fs::rename(drawing, out / "series.svg", code);
+  if (const std::string script = script_of(series, result); !script.empty()) draw(script, out / "series.svg");
   if (!arguments.quiet) {
     if (kept > 0) std::cout << kept << " frames were up to date\n";
     std::cout << summary_of(series, result) << "Table: " << (out / "series.csv").string() << "\n";

@@ -34,7 +34,7 @@ std::string table(const std::vector<StressPoint>& points) {
 bool of_picture(const StressPoint& p) { return p.method.find(" of a ") != std::string::npos; }
 
 /// A square for every place and method: its error where it answers, grey where it says that it cannot.
-std::string script(const std::vector<StressPoint>& points, const std::string& svg) {
+std::string script(const std::vector<StressPoint>& points) {
   std::vector<std::string> places, names;
   for (const StressPoint& p : points)
     if (!of_picture(p) && std::find(names.begin(), names.end(), p.method) == names.end()) names.push_back(p.method);
@@ -55,17 +55,17 @@ std::string script(const std::vector<StressPoint>& points, const std::string& sv
   std::string methods;
   for (std::size_t m = 0; m < names.size(); ++m) methods += fmt::format("{}'{}' {}", m ? ", " : "", names[m], m);
   return fmt::format(
-      "set terminal svg size 900,{} dynamic font 'sans,12' background rgb 'white'\nset output {}\n$a << EOD\n{}EOD\n$f << EOD\n{}EOD\n"
+      "set terminal svg size 900,{} dynamic font 'sans,12' background rgb 'white'\n$a << EOD\n{}EOD\n$f << EOD\n{}EOD\n"
       "set yrange [{}:-0.5]\nset xrange [-0.5:{}]\nset ytics noenhanced ({})\nset x2range [-0.5:{}]\nset x2tics noenhanced rotate by 30 ({})\nunset xtics\nunset key\n"
       "set lmargin 26\nset tmargin 6\nset cbrange [-14:-2]\nset palette defined (-14 '#0072B2', -9 '#56B4E9', -6 '#009E73', -4 '#F0E442', -2 '#D55E00')\n"
       "set cblabel 'log_{{10}} of the error; grey: flagged by the method itself'\n"
       "plot $f using 1:2 with points pt 5 ps 0.9 lc rgb '#cccccc', $a using 1:2:3 with points pt 5 ps 0.9 lc palette\n",
-      120 + 17 * places.size(), svg, answered, flagged, static_cast<double>(places.size()) - 0.5, static_cast<double>(names.size()) - 0.5, ticks,
+      120 + 17 * places.size(), answered, flagged, static_cast<double>(places.size()) - 0.5, static_cast<double>(names.size()) - 0.5, ticks,
       static_cast<double>(names.size()) - 0.5, methods);
 }
 
 /// Pictures by wave optics: error against the method's own estimate. The law: no point above the diagonal.
-std::string wave_script(const std::vector<StressPoint>& points, const std::string& svg) {
+std::string wave_script(const std::vector<StressPoint>& points) {
   std::string data, plots;
   int colour = 0;
   for (const auto& [name, rgb] : {std::pair{"series", "#0072B2"}, {"split_step", "#D55E00"}, {"march", "#009E73"}}) {
@@ -77,10 +77,10 @@ std::string wave_script(const std::vector<StressPoint>& points, const std::strin
     plots += fmt::format(", $p{} using 1:2 with points pt 7 ps 0.6 lc rgb '{}' title '{}' noenhanced", colour++, rgb, name);
   }
   return fmt::format(
-      "set terminal svg size 640,560 dynamic font 'sans,13' background rgb 'white'\nset output {}\n{}set logscale xy\nset format xy '10^{{%T}}'\n"
+      "set terminal svg size 640,560 dynamic font 'sans,13' background rgb 'white'\n{}set logscale xy\nset format xy '10^{{%T}}'\n"
       "set xrange [1e-12:10]\nset yrange [1e-13:10]\nset key top left\nset xlabel 'what the method says of its error'\nset ylabel 'error of the picture'\nset grid lc rgb '#dddddd'\n"
       "plot x with lines lc rgb 'black' title 'the law: not above'{}\n",
-      svg, data, plots);
+      data, plots);
 }
 
 int run_stress(const Arguments& arguments) {
@@ -90,8 +90,8 @@ int run_stress(const Arguments& arguments) {
     if (!arguments.quiet) std::cerr << "sweeping " << what << "\n";
   });
   write_file(out / "stress.csv", table(points));
-  draw(script(points, plot_path(out / "stress.svg")));
-  draw(wave_script(points, plot_path(out / "stress_waves.svg")));
+  draw(script(points), out / "stress.svg");
+  draw(wave_script(points), out / "stress_waves.svg");
   int broken = 0, flagged = 0, unknown = 0;
   for (const StressPoint& p : points) {
     if (!p.flag.empty()) ++flagged;

@@ -7,17 +7,18 @@
 
 #include "birefit/fit.h"
 #include "core/threads.h"
-#include "fit/noise.h"
-#include "fit/statistics.h"
+#include "fit/errors/statistics.h"
+#include "fit/weights/noise.h"
 
 namespace birefit {
 namespace {
 
 using namespace estimation;
 
-/// The fit's residual in units of its noise, cut into squares that are drawn with replacement and turned in sign (moving blocks: H. R. Kuensch,
-/// Ann. Stat. 17, 1217 (1989)). Squares are twice as wide as what neighbours share. (Moved as a whole it would lack what the fit has taken
-/// out of it: slow variations.) A pixel whose source was not used keeps its own.
+/// The fit's residual in units of its noise, cut into squares that are drawn with replacement and turned in sign
+/// (moving blocks: H. R. Kuensch, Ann. Stat. 17, 1217 (1989)). Squares are twice as wide as what neighbours share.
+/// (Moved as a whole it would lack what the fit has taken out of it: slow variations.) A pixel whose source was not
+/// used keeps its own.
 Image resampled_residual(const MicrographResult& of, std::mt19937_64& random) {
   const int width = of.residual.width(), height = of.residual.height();
   Image whitened(width, height), noise(width, height);
@@ -82,7 +83,8 @@ void redraw_priors(FitJob& job, const Theta& truth, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   for (int i = 0; i < job.parameters.size(); ++i) {
     Parameter& p = job.parameters[i];
-    if (p.free && p.prior_sd) p.value = std::clamp(truth[static_cast<std::size_t>(i)] + *p.prior_sd * normal(random), p.lower, p.upper);
+    if (p.free && p.prior_sd)
+      p.value = std::clamp(truth[static_cast<std::size_t>(i)] + *p.prior_sd * normal(random), p.lower, p.upper);
   }
   if (!job.prior) return;
   JointPrior& prior = *job.prior;
@@ -93,7 +95,8 @@ void redraw_priors(FitJob& job, const Theta& truth, std::mt19937_64& random) {
   drawn = root.transpositionsP().transpose() * Eigen::VectorXd(root.matrixL() * drawn);
   for (std::size_t k = 0; k < prior.names.size(); ++k)
     if (const ParameterRef ref = job.parameters.find(prior.names[k]); ref && job.parameters[ref].free)
-      prior.mean[static_cast<Eigen::Index>(k)] = truth[static_cast<std::size_t>(ref.index)] + drawn[static_cast<Eigen::Index>(k)];
+      prior.mean[static_cast<Eigen::Index>(k)] =
+          truth[static_cast<std::size_t>(ref.index)] + drawn[static_cast<Eigen::Index>(k)];
 }
 
 }  // namespace

@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 
 #include "birefit/fit.h"
-#include "fit/least_squares.h"
-#include "fit/light.h"
-#include "fit/noise.h"
-#include "fit/statistics.h"
-#include "fit/verdict.h"
+#include "fit/errors/statistics.h"
+#include "fit/errors/verdict.h"
+#include "fit/problem/least_squares.h"
+#include "fit/problem/light.h"
+#include "fit/weights/noise.h"
 
 namespace birefit {
 namespace {
@@ -23,8 +23,8 @@ using namespace estimation;
 constexpr double kAssumedNoise = 0.01;
 
 struct Planned {
-  FitJob job;                    ///< gains and offsets at the images' levels
-  std::vector<PixelSet> sets;    ///< values: the model's own
+  FitJob job;                  ///< gains and offsets at the images' levels
+  std::vector<PixelSet> sets;  ///< values: the model's own
   std::vector<RenderPlan> plans;
   std::string noise;
 };
@@ -51,7 +51,8 @@ Planned planned(const FitJob& job) {
     const bool taken = !m.values.empty();
     if (taken) {  // the image's own level; which fringe is where does not matter for that
       const double dark = quantile(m, 0.005), bright = quantile(m, 0.995);
-      if (m.gain && p.job.parameters[m.gain].free && range > 0) p.job.parameters[m.gain].value = (bright - dark) / range;
+      if (m.gain && p.job.parameters[m.gain].free && range > 0)
+        p.job.parameters[m.gain].value = (bright - dark) / range;
       if (m.offset && p.job.parameters[m.offset].free && !p.job.parameters[m.offset].prior_sd)
         p.job.parameters[m.offset].value = dark - *low * (m.gain ? p.job.parameters[m.gain].value : 1);
     } else if (m.mask.empty()) {
@@ -66,7 +67,8 @@ Planned planned(const FitJob& job) {
       words = m.noise ? "as the config says" : "as measured in the image";
       sigma = standard_deviation(signal, m.noise ? *m.noise : estimate_noise(m), signal.values);
     } else {
-      words = fmt::format("{:g} % of the image's range, assumed: give micrograph.noise for the camera's", 100 * kAssumedNoise);
+      words = fmt::format("{:g} % of the image's range, assumed: give micrograph.noise for the camera's",
+                          100 * kAssumedNoise);
       const double level = std::max(kAssumedNoise * std::abs(gain) * range, 1e-12);
       sigma = Image(light.width(), light.height(), level);
       m.noise = NoiseModel{level, 0, false};  // what another shot has, too
@@ -100,7 +102,8 @@ Information information(const Planned& p) {
   result.unknowns = Unknowns::of(p.job);
   LeastSquares problem(p.job, result.unknowns, p.plans, p.sets);
   Eigen::VectorXd start(static_cast<Eigen::Index>(result.unknowns.searched.size()));
-  for (std::size_t j = 0; j < result.unknowns.searched.size(); ++j) start[static_cast<Eigen::Index>(j)] = p.job.parameters[result.unknowns.searched[j]].value;
+  for (std::size_t j = 0; j < result.unknowns.searched.size(); ++j)
+    start[static_cast<Eigen::Index>(j)] = p.job.parameters[result.unknowns.searched[j]].value;
   problem.evaluate(start, true);
   result.factor = problem.factor();
   result.inverse = invert_normal_equations(result.factor);
@@ -109,7 +112,8 @@ Information information(const Planned& p) {
 
 void refuse_tables(const FitJob& job) {
   for (const Micrograph& m : job.micrographs)
-    if (m.scene.view.width * m.scene.view.height == 1) throw UserError(Where{}, "a table of signals has no next image", "explain --next is for images");
+    if (m.scene.view.width * m.scene.view.height == 1)
+      throw UserError(Where{}, "a table of signals has no next image", "explain --next is for images");
 }
 
 /// The first image's scene, once more, changed by `change`.
@@ -154,7 +158,8 @@ Outlook outlook(const FitJob& job) {
     result.parameters.push_back(std::move(estimate));
   }
   result.covariance = known.inverse.covariance;
-  const Eigen::VectorXd inverse_sd = result.covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
+  const Eigen::VectorXd inverse_sd =
+      result.covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
   result.correlation = inverse_sd.asDiagonal() * result.covariance * inverse_sd.asDiagonal();
   judge_identifiability(result, p.job, known.unknowns, known.factor, known.inverse);
   return {std::move(result.parameters), std::move(result.directions), result.identifiable, p.noise};
@@ -171,7 +176,9 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
     if (name == parameter || ends_so) wanted = unknowns.table_index(j);
     if (j < static_cast<int>(unknowns.searched.size())) names += (names.empty() ? "" : ", ") + name;
   }
-  if (wanted < 0) throw UserError(Where{}, fmt::format("--next {}: no parameter that this config fits", parameter), "one of " + names);
+  if (wanted < 0)
+    throw UserError(Where{}, fmt::format("--next {}: no parameter that this config fits", parameter),
+                    "one of " + names);
 
   const FitJob base = planned(job).job;  // levels and noise as the images have them
   using Change = std::function<void(Scene&, ParameterTable&)>;
@@ -183,27 +190,34 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
   if (known(now.polarizer_deg) && known(now.analyzer_deg)) {
     const double p = table[now.polarizer_deg].value, a = table[now.analyzer_deg].value;
     for (const double turn : {22.5, 45.0})
-      candidates.emplace_back(fmt::format("polarizer and analyser turned together by {:g} deg", turn), [=](Scene& s, ParameterTable& t) {
-        s.microscope.polarizer_deg = constant(t, "next polarizer_deg", p + turn);
+      candidates.emplace_back(fmt::format("polarizer and analyser turned together by {:g} deg", turn),
+                              [=](Scene& s, ParameterTable& t) {
+                                s.microscope.polarizer_deg = constant(t, "next polarizer_deg", p + turn);
+                                s.microscope.analyzer_deg = constant(t, "next analyzer_deg", a + turn);
+                              });
+    for (const double turn : {-45.0, 45.0, 90.0})
+      candidates.emplace_back(fmt::format("analyser turned by {:g} deg", turn), [=](Scene& s, ParameterTable& t) {
         s.microscope.analyzer_deg = constant(t, "next analyzer_deg", a + turn);
       });
-    for (const double turn : {-45.0, 45.0, 90.0})
-      candidates.emplace_back(fmt::format("analyser turned by {:g} deg", turn),
-                              [=](Scene& s, ParameterTable& t) { s.microscope.analyzer_deg = constant(t, "next analyzer_deg", a + turn); });
   }
   if (known(now.wavelength_nm)) {
     const double nm = table[now.wavelength_nm].value;
     for (const double other : {450.0, 532.0, 589.0, 633.0, 700.0})
       if (std::abs(other / nm - 1) > 0.05)
-        candidates.emplace_back(fmt::format("at {:g} nm", other), [=](Scene& s, ParameterTable& t) { s.microscope.wavelength_nm = constant(t, "next wavelength_nm", other); });
+        candidates.emplace_back(fmt::format("at {:g} nm", other), [=](Scene& s, ParameterTable& t) {
+          s.microscope.wavelength_nm = constant(t, "next wavelength_nm", other);
+        });
   }
   const Scene& scene = base.micrographs.front().scene;
   if (std::holds_alternative<StressedDisc>(scene.sample) && !now.quarter_wave)
-    candidates.emplace_back("with quarter-wave plates (circular polariscope)", [](Scene& s, ParameterTable&) { s.microscope.quarter_wave = true; });
+    candidates.emplace_back("with quarter-wave plates (circular polariscope)",
+                            [](Scene& s, ParameterTable&) { s.microscope.quarter_wave = true; });
   if (scene.ceiling == Ceiling::wave && (!now.focus_um || known(now.focus_um)))
     for (const double by : {-3.0, 3.0}) {
       const double at = (now.focus_um ? table[now.focus_um].value : 0) + by;
-      candidates.emplace_back(fmt::format("focused at {:+g} um", at), [=](Scene& s, ParameterTable& t) { s.microscope.focus_um = constant(t, "next focus_um", at); });
+      candidates.emplace_back(fmt::format("focused at {:+g} um", at), [=](Scene& s, ParameterTable& t) {
+        s.microscope.focus_um = constant(t, "next focus_um", at);
+      });
     }
   std::vector<Shot> shots;
   for (const auto& [words, change] : candidates) try {

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/robust.h"
-#include "fit/rows.h"
+#include "fit/weights/rows.h"
 #include "io/table.h"
 
 namespace birefit {

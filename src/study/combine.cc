@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "fit/statistics.h"
+#include "fit/errors/statistics.h"
 
 namespace birefit {
 namespace {

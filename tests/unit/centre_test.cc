@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "fit/centre.h"
+#include "fit/search/centre.h"
 
 namespace birefit::estimation {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "birefit/fit.h"
 #include "birefit/render.h"
-#include "fit/least_squares.h"
-#include "fit/scan.h"
+#include "fit/problem/least_squares.h"
+#include "fit/search/scan.h"
 
 namespace birefit {
 namespace {

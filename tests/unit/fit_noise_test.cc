@@ -1,6 +1,6 @@
 // The noise of an image from the image itself, fringes and all.
 
-#include "fit/noise.h"
+#include "fit/weights/noise.h"
 
 #include <cmath>
 #include <limits>

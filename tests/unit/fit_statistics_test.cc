@@ -1,6 +1,6 @@
 // Distributions and least-squares algebra against tables and closed forms.
 
-#include "fit/statistics.h"
+#include "fit/errors/statistics.h"
 
 #include <cmath>
 #include <limits>

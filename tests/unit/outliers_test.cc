@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "fit/outliers.h"
+#include "fit/weights/outliers.h"
 
 namespace birefit::estimation {
 namespace {

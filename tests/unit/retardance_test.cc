@@ -7,7 +7,7 @@
 
 #include "birefit/error.h"
 #include "birefit/render.h"
-#include "fit/rows.h"
+#include "fit/weights/rows.h"
 #include "scene_builder.h"
 
 namespace birefit {

@@ -1,4 +1,4 @@
-#include "fit/outliers.h"
+#include "fit/weights/outliers.h"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,9 @@ constexpr int kTile = 32;
 Image box_sums(const Image& image, int reach) {
   const int w = image.width(), h = image.height();
   std::vector<double> table(static_cast<std::size_t>(w + 1) * static_cast<std::size_t>(h + 1), 0.0);
-  const auto at = [&](int x, int y) -> double& { return table[static_cast<std::size_t>(y) * static_cast<std::size_t>(w + 1) + static_cast<std::size_t>(x)]; };
+  const auto at = [&](int x, int y) -> double& {
+    return table[static_cast<std::size_t>(y) * static_cast<std::size_t>(w + 1) + static_cast<std::size_t>(x)];
+  };
   for (int y = 0; y < h; ++y) {
     double row = 0;
     for (int x = 0; x < w; ++x) {
@@ -28,7 +30,8 @@ Image box_sums(const Image& image, int reach) {
   Image sums(w, h);
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
-      const int left = std::max(0, x - reach), right = std::min(w, x + reach + 1), top = std::max(0, y - reach), bottom = std::min(h, y + reach + 1);
+      const int left = std::max(0, x - reach), right = std::min(w, x + reach + 1), top = std::max(0, y - reach),
+                bottom = std::min(h, y + reach + 1);
       sums(x, y) = at(right, bottom) - at(left, bottom) - at(right, top) + at(left, top);
     }
   return sums;
@@ -72,7 +75,8 @@ Outliers find_outliers(const Image& whitened, const Mask& used) {
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x)
         if (left(x, y) && std::abs(z(x, y)) > kDeviations * scale(x, y)) found.pixels(x, y) = 1;
-    for (std::size_t i = 0; i < left.values().size(); ++i) left.values()[i] = left.values()[i] && !found.pixels.values()[i];
+    for (std::size_t i = 0; i < left.values().size(); ++i)
+      left.values()[i] = left.values()[i] && !found.pixels.values()[i];
   }
   // The foot of a spot lies below any threshold.
   const Mask core = found.pixels;
@@ -95,7 +99,8 @@ Outliers find_outliers(const Image& whitened, const Mask& used) {
             if (open(i, j)) open(i, j) = 0, group.push_back({i, j});
       found.count += static_cast<int>(group.size());
       ++found.spots;
-      if (group.size() > largest) largest = group.size(), found.largest_column = group[largest / 2][0], found.largest_row = group[largest / 2][1];
+      if (group.size() > largest)
+        largest = group.size(), found.largest_column = group[largest / 2][0], found.largest_row = group[largest / 2][1];
     }
   return found;
 }

@@ -1,4 +1,4 @@
-#include "fit/noise.h"
+#include "fit/weights/noise.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "fit/centre.h"
+#include "fit/search/centre.h"
 
 #include <algorithm>
 #include <cmath>
@@ -34,7 +34,8 @@ std::optional<std::array<double, 2>> centre_of_symmetry(const Image& values, con
   // s = 2c in blocks.
   const auto product = [&](int sx, int sy) {
     double sum = 0;
-    const int left = std::max(0, sx - w + 1), right = std::min(w - 1, sx), top = std::max(0, sy - h + 1), bottom = std::min(h - 1, sy);
+    const int left = std::max(0, sx - w + 1), right = std::min(w - 1, sx), top = std::max(0, sy - h + 1),
+              bottom = std::min(h - 1, sy);
     for (int y = top; y <= bottom; ++y) {
       const double *a = mean.data() + y * w, *b = mean.data() + (sy - y) * w + sx;
       for (int x = left; x <= right; ++x) sum += a[x] * b[-x];

@@ -14,7 +14,8 @@
 #include <Eigen/Dense>
 
 #include "birefit/fit.h"
-#include "fit/light.h"
+#include "fit/problem/light.h"
+#include "fit/problem/pixels.h"
 
 namespace birefit::estimation {
 
@@ -29,12 +30,6 @@ struct Unknowns {
     return j < p ? searched[j] : linear[j - p];
   }
   static Unknowns of(const FitJob& job);
-};
-
-/// The pixels of one micrograph that take part, in a fixed order.
-struct PixelSet {
-  std::vector<std::array<int, 2>> pixels;  ///< column, row
-  Eigen::VectorXd value, sigma;
 };
 
 /// What a micrograph's misfit does to its weights beyond the noise of its pixels. Its residual's generalised mean
@@ -96,15 +91,18 @@ class LeastSquares {
   Eigen::MatrixXd factor(bool with_priors = true) const;
   /// Gradient of the objective with respect to every unknown.
   Eigen::VectorXd gradient() const;
-  /// By how much the residual enlarges the standard error of each unknown, `covariance` being that of all unknowns after the weights; 1 where
-  /// it holds no more of what shifts the unknown than white noise does. In the whole image the fit leaves nothing of it; modulated by cosines
-  /// over the image, and along the distance from the sample's centre, the residual tells what was there: the orthonormal-series estimate of a
-  /// long-run variance (U. K. Mueller, J. Econometrics 141, 1331 (2007); Y. Sun, Econometrics J. 14, 345 (2011)). Micrographs below 32 x 32 pixels are not looked at.
+  /// By how much the residual enlarges the standard error of each unknown, `covariance` being that of all unknowns
+  /// after the weights; 1 where it holds no more of what shifts the unknown than white noise does. In the whole image
+  /// the fit leaves nothing of it; modulated by cosines over the image, and along the distance from the sample's
+  /// centre, the residual tells what was there: the orthonormal-series estimate of a long-run variance (U. K. Mueller,
+  /// J. Econometrics 141, 1331 (2007); Y. Sun, Econometrics J. 14, 345 (2011)). Micrographs below 32 x 32 pixels are
+  /// not looked at.
   Eigen::VectorXd misfit_along(const Eigen::MatrixXd& covariance) const;
   static constexpr int kLeastModulations = 8;
   /// d(intensity of every pixel)/d(table entry), a column each, at the last evaluated point.
   Eigen::MatrixXd intensity_by(const std::vector<int>& table_indices);
-  /// By how much the unknowns at the optimum change when the model's intensity does by this at every pixel; to first order.
+  /// By how much the unknowns at the optimum change when the model's intensity does by this at every pixel; to first
+  /// order.
   Eigen::VectorXd shift_by(const Eigen::VectorXd& intensity_change, const Eigen::MatrixXd& covariance) const;
   /// Of the model intensity over all used pixels of a micrograph.
   std::array<double, 2> intensity_range(int micrograph) const;
@@ -113,36 +111,39 @@ class LeastSquares {
   int prior_rows() const { return static_cast<int>(prior_root_.rows()); }
   Eigen::Index pixel_rows() const { return pixel_rows_; }
 
-  /// Triangular factor of the rows [d/d searched, residual] of the projected problem (the linear unknowns follow), priors
-  /// included, the searched unknowns in units of `scale`: all that a step of the solver needs to know of a million rows.
+  /// Triangular factor of the rows [d/d searched, residual] of the projected problem (the linear unknowns follow),
+  /// priors included, the searched unknowns in units of `scale`: all that a step of the solver needs to know of a
+  /// million rows.
   Eigen::MatrixXd projected_factor(const Eigen::VectorXd& scale) const;
 
  private:
   struct Term : LightTerm {
-    int unknown = -1;          ///< index among the linear unknowns, -1 = known
-    Eigen::VectorXd at_pixels; ///< the shape; empty where it is 1
-    Eigen::VectorXd whitened;  ///< what the coefficient stands before
+    int unknown = -1;           ///< index among the linear unknowns, -1 = known
+    Eigen::VectorXd at_pixels;  ///< the shape; empty where it is 1
+    Eigen::VectorXd whitened;   ///< what the coefficient stands before
   };
   struct Frame {
     PixelSet set;
     Eigen::VectorXd inverse_sigma;
     double inverse_sigma_norm = 0;
     Eigen::Index begin = 0, count = 0;
-    std::vector<int> read;                     ///< searched unknowns that its scene reads
+    std::vector<int> read;  ///< searched unknowns that its scene reads
     std::vector<Term> terms;
     double shape_factor = 1, mean_factor = 1;  ///< whitening of the parts across and along the mean
     double intensity_low = 0, intensity_high = 0;
-    Rendering rendering;                       ///< kept for its memory
+    Rendering rendering;  ///< kept for its memory
   };
   void render_frame(std::size_t frame, bool derivatives, int threads);
-  void render_used(std::size_t frame, const std::vector<int>& active, int threads, Eigen::Ref<Eigen::VectorXd> intensity,
+  void render_used(std::size_t frame, const std::vector<int>& active, int threads,
+                   Eigen::Ref<Eigen::VectorXd> intensity,
                    const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative);
   template <class Body>
   void for_frames(const Body& body);
   Eigen::VectorXd light(const Frame& frame, bool of_intensity, Eigen::Index begin, Eigen::Index rows) const;
   void whiten(const Frame& frame, Eigen::Ref<Eigen::MatrixXd> columns, int threads) const;
   template <class Columns>
-  void add_products(const Frame& frame, int threads, const Columns& columns, Eigen::MatrixXd& gram, Eigen::MatrixXd& cross) const;
+  void add_products(const Frame& frame, int threads, const Columns& columns, Eigen::MatrixXd& gram,
+                    Eigen::MatrixXd& cross) const;
   void set_priors();
   void solve_linear();
   /// Some thousand rows of one micrograph, or the priors'.

@@ -4,26 +4,29 @@
 #include <optional>
 #include <vector>
 
-#include "fit/least_squares.h"
+#include "fit/problem/least_squares.h"
 
 namespace birefit::estimation {
 
-/// How the objective rises when one searched unknown is held away from its best value and all others follow (D. J. Venzon &
-/// S. H. Moolgavkar, Appl. Statist. 37, 87 (1988)). Moves `problem`; whoever needs it at the optimum evaluates it there again.
+/// How the objective rises when one searched unknown is held away from its best value and all others follow (D. J.
+/// Venzon & S. H. Moolgavkar, Appl. Statist. 37, 87 (1988)). Moves `problem`; whoever needs it at the optimum evaluates
+/// it there again.
 class Profile {
  public:
   /// `covariance` of the searched unknowns at `best`: along it the others start.
-  Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best, const Eigen::MatrixXd& covariance, int unknown);
+  Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best,
+          const Eigen::MatrixXd& covariance, int unknown);
 
   /// Above the objective at the optimum; not minimised further where that is below `enough` already.
   double rise(double value, double enough = -1);
-  /// The place between the estimate and `end` where the rise is `allowed`, to 1 % of its root; `end` where it stays below. By Venzon and
-  /// Moolgavkar's iteration, by bisection where that fails; where bisection takes more than sixteen places, the nearest that is beyond.
+  /// The place between the estimate and `end` where the rise is `allowed`, to 1 % of its root; `end` where it stays
+  /// below. By Venzon and Moolgavkar's iteration, by bisection where that fails; where bisection takes more than
+  /// sixteen places, the nearest that is beyond.
   double crossing(double end, double allowed);
   /// Of all rises so far; clearly below zero: the estimate was not the minimum.
   double lowest() const;
-  /// The rise `allowed`^(1/2) standard errors up and down, the others following along straight lines, over `allowed`: both 1 where the
-  /// objective is a parabola. Clipped at the bounds.
+  /// The rise `allowed`^(1/2) standard errors up and down, the others following along straight lines, over `allowed`:
+  /// both 1 where the objective is a parabola. Clipped at the bounds.
   std::array<double, 2> straightness(double allowed);
 
   /// Places that rise() was asked for, in order of value.

@@ -1,4 +1,4 @@
-#include "fit/scan.h"
+#include "fit/search/scan.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "birefit/error.h"
-#include "fit/statistics.h"
+#include "fit/errors/statistics.h"
 
 namespace birefit::estimation {
 namespace {
@@ -47,11 +47,14 @@ double inverse_of(const std::vector<double>& x, const std::vector<double>& y, do
 std::vector<double> steps_along(const FringePhase& fringes, double longest) {
   std::vector<double> steps{0};
   for (std::size_t i = 1; i < fringes.value.size(); ++i)
-    steps.push_back(steps.back() + std::max(fringes.radians[i] - fringes.radians[i - 1], (fringes.value[i] - fringes.value[i - 1]) / longest));
-  const int points = static_cast<int>(std::clamp(std::ceil(steps.back()), 1.0, static_cast<double>(kMostPointsPerAxis)));
+    steps.push_back(steps.back() + std::max(fringes.radians[i] - fringes.radians[i - 1],
+                                            (fringes.value[i] - fringes.value[i - 1]) / longest));
+  const int points =
+      static_cast<int>(std::clamp(std::ceil(steps.back()), 1.0, static_cast<double>(kMostPointsPerAxis)));
   std::vector<double> values;
   // Cell middles: the bounds themselves are where models degenerate.
-  for (int i = 0; i < points; ++i) values.push_back(inverse_of(fringes.value, steps, steps.back() * (i + 0.5) / points));
+  for (int i = 0; i < points; ++i)
+    values.push_back(inverse_of(fringes.value, steps, steps.back() * (i + 0.5) / points));
   return values;
 }
 
@@ -62,7 +65,8 @@ std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std
     const Parameter& parameter = job.parameters[unknowns.searched[j]];
     double longest = (parameter.upper - parameter.lower) / kFewestPointsPerAxis;
     for (const Micrograph& m : job.micrographs)
-      if (const Droplet* droplet = std::get_if<Droplet>(&m.scene.sample); droplet && droplet->diameter_um.index == unknowns.searched[j])
+      if (const Droplet* droplet = std::get_if<Droplet>(&m.scene.sample);
+          droplet && droplet->diameter_um.index == unknowns.searched[j])
         longest = std::min(longest, kDiameterStep * parameter.upper);
     axes.push_back({static_cast<int>(j), steps_along(fringes[j], longest)});
   }
@@ -71,25 +75,29 @@ std::vector<Axis> axes_of(const FitJob& job, const Unknowns& unknowns, const std
   std::size_t product = 1;
   for (const Axis& axis : axes) product = std::min(product * axis.values.size(), 2 * kMostPointsWithoutFringes);
   const auto is_centre = [&](int index) {
-    return std::any_of(job.micrographs.begin(), job.micrographs.end(),
-                       [&](const Micrograph& m) { return m.scene.view.center_x_px.index == index || m.scene.view.center_y_px.index == index; });
+    return std::any_of(job.micrographs.begin(), job.micrographs.end(), [&](const Micrograph& m) {
+      return m.scene.view.center_x_px.index == index || m.scene.view.center_y_px.index == index;
+    });
   };
-  for (std::size_t j = 0; j < unknowns.searched.size() && product * kPlacesWithoutFringes <= kMostPointsWithoutFringes; ++j) {
+  for (std::size_t j = 0; j < unknowns.searched.size() && product * kPlacesWithoutFringes <= kMostPointsWithoutFringes;
+       ++j) {
     const Parameter& parameter = job.parameters[unknowns.searched[j]];
     const double width = parameter.upper - parameter.lower;
     if (!fringes[j].value.empty() || !std::isfinite(width) || !(width > 0) || is_centre(unknowns.searched[j])) continue;
     Axis axis{static_cast<int>(j), {}};
-    for (int i = 0; i < kPlacesWithoutFringes; ++i) axis.values.push_back(parameter.lower + width * (i + 0.5) / kPlacesWithoutFringes);
+    for (int i = 0; i < kPlacesWithoutFringes; ++i)
+      axis.values.push_back(parameter.lower + width * (i + 0.5) / kPlacesWithoutFringes);
     axes.push_back(std::move(axis));
     product *= kPlacesWithoutFringes;
   }
   return axes;
 }
 
-/// Solves from every start, a few steps for all and the rest for those that may still be the best, and adds the minima found to the
-/// result. Returns the lowest objective.
-double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options, std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists,
-                   int steps, double hopeless_above, const SameMinimum& same = {}) {
+/// Solves from every start, a few steps for all and the rest for those that may still be the best, and adds the minima
+/// found to the result. Returns the lowest objective.
+double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options,
+                   std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists, int steps,
+                   double hopeless_above, const SameMinimum& same = {}) {
   const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
   SolveOptions polish;
   polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
@@ -119,7 +127,9 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
       result.candidates.push_back({from, problem.objective(), projected_information(problem)});
       break;
     }
-    if (same && std::any_of(result.candidates.begin(), result.candidates.end(), [&](const Candidate& known) { return same(known.searched, from); })) continue;
+    if (same && std::any_of(result.candidates.begin(), result.candidates.end(),
+                            [&](const Candidate& known) { return same(known.searched, from); }))
+      continue;
     Candidate candidate;
     candidate.searched = from;
     polish.max_iterations = 20;
@@ -159,12 +169,14 @@ double van_der_corput(int index, int base) {
 }
 
 /// The same in the box of several axes (J. H. Halton, Numer. Math. 2, 84 (1960)).
-Eigen::VectorXd spread_point(int index, const FitJob& job, const Unknowns& unknowns, const std::vector<Axis>& axes, const Eigen::VectorXd& start) {
+Eigen::VectorXd spread_point(int index, const FitJob& job, const Unknowns& unknowns, const std::vector<Axis>& axes,
+                             const Eigen::VectorXd& start) {
   constexpr std::array<int, 8> kPrimes{2, 3, 5, 7, 11, 13, 17, 19};
   Eigen::VectorXd x = start;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const Parameter& parameter = job.parameters[unknowns.searched[static_cast<std::size_t>(axes[k].searched)]];
-    x[axes[k].searched] = parameter.lower + (parameter.upper - parameter.lower) * van_der_corput(index + 1, kPrimes[k % kPrimes.size()]);
+    x[axes[k].searched] =
+        parameter.lower + (parameter.upper - parameter.lower) * van_der_corput(index + 1, kPrimes[k % kPrimes.size()]);
   }
   return x;
 }
@@ -175,7 +187,8 @@ double FringePhase::at(double v) const { return inverse_of(radians, value, v); }
 
 namespace {
 
-/// 0 where the bounds leave what the model can do (no equilibrium, beyond a clearing point): there is no image to look at either.
+/// 0 where the bounds leave what the model can do (no equilibrium, beyond a clearing point): there is no image to look
+/// at either.
 double rate_at(const Scene& scene, const Theta& theta, int index) {
   try {
     const double rate = fringe_phase_per_unit(scene, theta, index);
@@ -201,7 +214,9 @@ std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknow
     std::array<Theta, 3> others{theta, theta, theta};
     for (const int other : unknowns.searched) {
       const Parameter& bounds = job.parameters[other];
-      if (std::isfinite(bounds.upper - bounds.lower)) others[1][static_cast<std::size_t>(other)] = bounds.lower, others[2][static_cast<std::size_t>(other)] = bounds.upper;
+      if (std::isfinite(bounds.upper - bounds.lower))
+        others[1][static_cast<std::size_t>(other)] = bounds.lower,
+        others[2][static_cast<std::size_t>(other)] = bounds.upper;
     }
     std::vector<double> rates;
     FringePhase fringes;
@@ -216,7 +231,8 @@ std::vector<FringePhase> fringe_phases(const FitJob& job, const Unknowns& unknow
       rates.push_back(fastest);
     }
     fringes.radians.push_back(0);
-    for (std::size_t i = 1; i < rates.size(); ++i) fringes.radians.push_back(fringes.radians.back() + std::max(rates[i - 1], rates[i]) * width / kIntervals);
+    for (std::size_t i = 1; i < rates.size(); ++i)
+      fringes.radians.push_back(fringes.radians.back() + std::max(rates[i - 1], rates[i]) * width / kIntervals);
     if (fringes.radians.back() > 0) result.back() = std::move(fringes);
   }
   return result;
@@ -234,9 +250,12 @@ double log_share(const Eigen::MatrixXd& information, const FitJob& job, const Un
   for (Eigen::Index j = 0; j < in_widths.cols(); ++j) {
     const Parameter& parameter = job.parameters[unknowns.searched[static_cast<std::size_t>(j)]];
     const double width = parameter.upper - parameter.lower, of_gaussian = std::sqrt(2 * std::numbers::pi);
-    // Bounds as the Gaussian that is as dense in its middle: variance width^2 / (2 pi). A prior is in the information already. Without bounds a unit serves, which says something of
-    // the same parameters only.
-    in_widths.col(j) *= (parameter.prior_sd ? *parameter.prior_sd * of_gaussian : std::isfinite(width) ? width : 1.0) / of_gaussian;
+    // Bounds as the Gaussian that is as dense in its middle: variance width^2 / (2 pi). A prior is in the information
+    // already. Without bounds a unit serves, which says something of the same parameters only.
+    in_widths.col(j) *= (parameter.prior_sd     ? *parameter.prior_sd * of_gaussian
+                         : std::isfinite(width) ? width
+                                                : 1.0) /
+                        of_gaussian;
     if (parameter.prior_sd) prior[j] = 0;
   }
   const Eigen::MatrixXd all = in_widths.transpose() * in_widths + Eigen::MatrixXd(prior.asDiagonal());
@@ -269,7 +288,8 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   if (options.progress && product > 0) options.progress("scanning for the fringe order");
 
   if (product > 0 && product <= kMostProductPoints && axes.size() <= 3) {
-    // Every point of the product grid; its minima are points below their neighbours along every axis: a valley across the axes has several.
+    // Every point of the product grid; its minima are points below their neighbours along every axis: a valley across
+    // the axes has several.
     std::vector<double> chi(product, std::numeric_limits<double>::infinity());
     const auto point_at = [&](std::size_t flat) {
       Eigen::VectorXd x = start;
@@ -307,8 +327,8 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
       if (lowest) starts.emplace_back(chi[i], point_at(i));
     }
   } else if (product > 0) {
-    // Too many for a product: points spread evenly over the box, where its axes are few enough for them to come near each other, then each
-    // axis through the best of them, twice.
+    // Too many for a product: points spread evenly over the box, where its axes are few enough for them to come near
+    // each other, then each axis through the best of them, twice.
     for (int i = 0; i < kMostProductPoints && axes.size() <= kMostAxesSpread && !result.interrupted; ++i) {
       Eigen::VectorXd x = spread_point(i, job, unknowns, axes, start);
       const double objective = objective_at(x);
@@ -345,16 +365,18 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   }
   std::stable_sort(starts.begin(), starts.end(), by_objective);
 
-  // A batch takes no longer than the grid did, but for a few starts that any fit deserves: images are the unit, a step of the solver takes
-  // one with a derivative by every unknown.
+  // A batch takes no longer than the grid did, but for a few starts that any fit deserves: images are the unit, a step
+  // of the solver takes one with a derivative by every unknown.
   constexpr int kSteps = 6, kFewest = 4;
   const int step_cost = 1 + problem.searched_size(), affordable = result.points / step_cost;
-  const std::size_t finalists = static_cast<std::size_t>(std::clamp(affordable / (2 * kSteps), std::min(kFewest, candidates), candidates));
-  const std::size_t first_look = static_cast<std::size_t>(std::clamp<int>(affordable / (2 * kFirstSteps), static_cast<int>(finalists), 4 * candidates));
+  const std::size_t finalists =
+      static_cast<std::size_t>(std::clamp(affordable / (2 * kSteps), std::min(kFewest, candidates), candidates));
+  const std::size_t first_look = static_cast<std::size_t>(
+      std::clamp<int>(affordable / (2 * kFirstSteps), static_cast<int>(finalists), 4 * candidates));
   const std::size_t batches = affordable > 4 * candidates * kFirstSteps ? kMostBatches : 1;
 
-  // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet believed: the next ones,
-  // then, as long as there are any.
+  // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet
+  // believed: the next ones, then, as long as there are any.
   const double rows = static_cast<double>(problem.pixel_rows());
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t batch = 0; batch < batches && !result.interrupted; ++batch) {
@@ -370,7 +392,8 @@ ScanResult scan(LeastSquares& problem, const FitJob& job, const Unknowns& unknow
   return result;
 }
 
-double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start, const std::vector<FringePhase>& fringes) {
+double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& start,
+                     const std::vector<FringePhase>& fringes) {
   constexpr int kFew = 150;
   const std::vector<Axis> axes = axes_of(job, unknowns, fringes);
   double lowest = std::numeric_limits<double>::infinity();
@@ -381,7 +404,8 @@ double lowest_of_few(LeastSquares& problem, const FitJob& job, const Unknowns& u
   return lowest;
 }
 
-ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> from, int steps, const SameMinimum& same) {
+ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> from, int steps,
+                  const SameMinimum& same) {
   ScanResult result;
   std::vector<std::pair<double, Eigen::VectorXd>> starts;
   for (Eigen::VectorXd& x : from) {
@@ -394,9 +418,11 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
   const std::size_t most = static_cast<std::size_t>(std::clamp(job.options.scan_candidates, 1, kMostOfDear));
   if (starts.size() > most) starts.resize(most);
   if (starts.empty())
-    throw UserError(Where{}, "wave optics gives no finite picture at the start values, nor where rays would put them", "check the start values and bounds of indices, diameter_um and wavelength_nm");
+    throw UserError(Where{}, "wave optics gives no finite picture at the start values, nor where rays would put them",
+                    "check the start values and bounds of indices, diameter_um and wavelength_nm");
   const Eigen::VectorXd first = starts.front().second;
-  polish_into(result, problem, job.options, std::move(starts), most, steps, std::numeric_limits<double>::infinity(), same);
+  polish_into(result, problem, job.options, std::move(starts), most, steps, std::numeric_limits<double>::infinity(),
+              same);
   keep_distinct(result, problem, first);
   return result;
 }

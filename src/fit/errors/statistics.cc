@@ -1,4 +1,4 @@
-#include "fit/statistics.h"
+#include "fit/errors/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "fit/least_squares.h"
+#include "fit/problem/least_squares.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,12 +8,9 @@
 #include <numbers>
 #include <set>
 
-#include <ceres/ceres.h>
-#include <fmt/format.h>
-
 #include "birefit/render.h"
 #include "core/threads.h"
-#include "fit/statistics.h"
+#include "fit/errors/statistics.h"
 #include "medium/references.h"
 
 namespace birefit::estimation {
@@ -45,8 +42,8 @@ Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::M
 
 std::size_t parts_of(Eigen::Index rows) { return static_cast<std::size_t>((rows + kTileRows - 1) / kTileRows); }
 
-/// body(part, first row, rows) over the rows of a frame, some thousand at a time. What the parts sum up is added in their order, so that it
-/// does not depend on the number of threads.
+/// body(part, first row, rows) over the rows of a frame, some thousand at a time. What the parts sum up is added in
+/// their order, so that it does not depend on the number of threads.
 template <class Body>
 void for_parts(Eigen::Index rows, int threads, const Body& body) {
   parallel_for(static_cast<int>(parts_of(rows)), threads, [&](int part) {
@@ -88,12 +85,15 @@ LeastSquares::LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vec
       if (term.shape) {
         term.at_pixels.resize(frame.count);
         for (Eigen::Index i = 0; i < frame.count; ++i)
-          term.at_pixels[i] = term.shape_at(job.micrographs[g].scene.view, frame.set.pixels[static_cast<std::size_t>(i)][0], frame.set.pixels[static_cast<std::size_t>(i)][1]);
+          term.at_pixels[i] =
+              term.shape_at(job.micrographs[g].scene.view, frame.set.pixels[static_cast<std::size_t>(i)][0],
+                            frame.set.pixels[static_cast<std::size_t>(i)][1]);
       }
       frame.terms.push_back(std::move(term));
     }
     std::set<int> read;
-    for_each_ref(job.micrographs[g].scene, [&](const ParameterRef& ref) { read.insert(position(unknowns_.searched, ref.index)); });
+    for_each_ref(job.micrographs[g].scene,
+                 [&](const ParameterRef& ref) { read.insert(position(unknowns_.searched, ref.index)); });
     frame.read.assign(read.lower_bound(0), read.end());
     for (Eigen::Index begin = 0; begin < frame.count; begin += kTileRows)
       tiles_.push_back({static_cast<int>(g), begin, std::min(kTileRows, frame.count - begin)});
@@ -135,7 +135,8 @@ void LeastSquares::whiten(const Frame& frame, Eigen::Ref<Eigen::MatrixXd> column
   std::vector<Eigen::RowVectorXd> parts(alike ? 0 : parts_of(frame.count));
   for_parts(frame.count, threads, [&](std::size_t part, Eigen::Index begin, Eigen::Index rows) {
     const auto inverse_sigma = frame.inverse_sigma.segment(begin, rows);
-    for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j).segment(begin, rows).array() *= frame.shape_factor * inverse_sigma.array();
+    for (Eigen::Index j = 0; j < columns.cols(); ++j)
+      columns.col(j).segment(begin, rows).array() *= frame.shape_factor * inverse_sigma.array();
     if (!alike) parts[part] = inverse_sigma.transpose() * columns.middleRows(begin, rows);
   });
   if (alike) return;
@@ -143,7 +144,8 @@ void LeastSquares::whiten(const Frame& frame, Eigen::Ref<Eigen::MatrixXd> column
   for (const Eigen::RowVectorXd& part : parts) along += part;
   along *= (frame.mean_factor / frame.shape_factor - 1) / (frame.inverse_sigma_norm * frame.inverse_sigma_norm);
   for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
-    for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j).segment(begin, rows) += along[j] * frame.inverse_sigma.segment(begin, rows);
+    for (Eigen::Index j = 0; j < columns.cols(); ++j)
+      columns.col(j).segment(begin, rows) += along[j] * frame.inverse_sigma.segment(begin, rows);
   });
 }
 
@@ -190,7 +192,8 @@ void LeastSquares::set_priors() {
 }
 
 /// Intensity of a frame's used pixels and its derivatives by table entries.
-void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, int threads, Eigen::Ref<Eigen::VectorXd> intensity,
+void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, int threads,
+                               Eigen::Ref<Eigen::VectorXd> intensity,
                                const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative) {
   Frame& frame = frames_[g];
   const Scene& scene = job_.micrographs[g].scene;
@@ -200,7 +203,8 @@ void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, in
     const Rendering& rendering = frame.rendering;
     for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
       const auto gather = [&](const Image& image, auto&& out) {
-        for (Eigen::Index i = begin; i < begin + rows; ++i) out[i] = image(pixels[static_cast<std::size_t>(i)][0], pixels[static_cast<std::size_t>(i)][1]);
+        for (Eigen::Index i = begin; i < begin + rows; ++i)
+          out[i] = image(pixels[static_cast<std::size_t>(i)][0], pixels[static_cast<std::size_t>(i)][1]);
       };
       gather(rendering.intensity, intensity);
       for (std::size_t j = 0; j < active.size(); ++j) gather(rendering.derivatives[j], derivative(j));
@@ -208,16 +212,18 @@ void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, in
   } else {
     const PixelRendering rendering = render_pixels(scene, plans_[g], theta_, pixels, active, threads);
     intensity = rendering.intensity;
-    for (std::size_t j = 0; j < active.size(); ++j) derivative(j) = rendering.derivatives.col(static_cast<Eigen::Index>(j));
+    for (std::size_t j = 0; j < active.size(); ++j)
+      derivative(j) = rendering.derivatives.col(static_cast<Eigen::Index>(j));
   }
 }
 
-/// body(frame, threads). A core a frame pays as soon as there are several a core, and for frames of a few pixels nothing else does. Waves take
-/// memory by the gigabyte: one at a time.
+/// body(frame, threads). A core a frame pays as soon as there are several a core, and for frames of a few pixels
+/// nothing else does. Waves take memory by the gigabyte: one at a time.
 template <class Body>
 void LeastSquares::for_frames(const Body& body) {
   const int frames = static_cast<int>(frames_.size()), threads = thread_count(job_.options.threads);
-  const bool apart = frames >= 4 * threads && std::none_of(plans_.begin(), plans_.end(), [](const RenderPlan& plan) { return plan.wave != nullptr; });
+  const bool apart = frames >= 4 * threads && std::none_of(plans_.begin(), plans_.end(),
+                                                           [](const RenderPlan& plan) { return plan.wave != nullptr; });
   parallel_for(frames, apart ? threads : 1, [&](int g) { body(static_cast<std::size_t>(g), apart ? 1 : threads); });
 }
 
@@ -229,8 +235,10 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
   auto intensity = intensity_.segment(frame.begin, frame.count);
   if (derivatives)
     for (int j = 0; j < searched_size(); ++j)
-      if (std::find(frame.read.begin(), frame.read.end(), j) == frame.read.end()) searched_columns_.col(j).segment(frame.begin, frame.count).setZero();
-  render_used(g, active, threads, intensity, [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
+      if (std::find(frame.read.begin(), frame.read.end(), j) == frame.read.end())
+        searched_columns_.col(j).segment(frame.begin, frame.count).setZero();
+  render_used(g, active, threads, intensity,
+              [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
   frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
   frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
   for (Term& term : frame.terms) {
@@ -250,12 +258,15 @@ Eigen::MatrixXd LeastSquares::intensity_by(const std::vector<int>& table_indices
   for_frames([&](std::size_t g, int threads) {
     const Frame& frame = frames_[g];
     Eigen::VectorXd intensity(frame.count);
-    render_used(g, table_indices, threads, intensity, [&](std::size_t j) { return columns.col(static_cast<Eigen::Index>(j)).segment(frame.begin, frame.count); });
+    render_used(g, table_indices, threads, intensity, [&](std::size_t j) {
+      return columns.col(static_cast<Eigen::Index>(j)).segment(frame.begin, frame.count);
+    });
   });
   return columns;
 }
 
-Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change, const Eigen::MatrixXd& covariance) const {
+Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change,
+                                       const Eigen::MatrixXd& covariance) const {
   Eigen::VectorXd pull = Eigen::VectorXd::Zero(unknowns_.size());
   Eigen::VectorXd change = intensity_change;
   for (const Frame& frame : frames_) {
@@ -264,12 +275,14 @@ Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change, 
     whiten(frame, part, thread_count(job_.options.threads));
   }
   for (const Tile& tile : tiles_)
-    if (tile.micrograph >= 0) pull += full_rows(tile).transpose() * change.segment(frames_[tile.micrograph].begin + tile.begin, tile.count);
+    if (tile.micrograph >= 0)
+      pull += full_rows(tile).transpose() * change.segment(frames_[tile.micrograph].begin + tile.begin, tile.count);
   return -covariance * pull;
 }
 
 /// Sum of the coefficients of the intensity, or of those by themselves, at these pixels.
-Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity, Eigen::Index begin, Eigen::Index rows) const {
+Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity, Eigen::Index begin,
+                                    Eigen::Index rows) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows);
   for (const Term& term : frame.terms) {
     if (term.of_intensity != of_intensity) continue;
@@ -284,7 +297,8 @@ Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity, Eigen
 
 /// Sums of products of the linear unknowns' rows with each other and with `columns`, over one frame.
 template <class Columns>
-void LeastSquares::add_products(const Frame& frame, int threads, const Columns& columns, Eigen::MatrixXd& gram, Eigen::MatrixXd& cross) const {
+void LeastSquares::add_products(const Frame& frame, int threads, const Columns& columns, Eigen::MatrixXd& gram,
+                                Eigen::MatrixXd& cross) const {
   struct Products {
     Eigen::MatrixXd gram, cross;
   };
@@ -300,7 +314,8 @@ void LeastSquares::add_products(const Frame& frame, int threads, const Columns& 
     sum.cross.resize(l, right.cols());
     for (Eigen::Index i = 0; i < l; ++i) {
       const auto row = terms[static_cast<std::size_t>(i)]->whitened.segment(begin, rows);
-      for (Eigen::Index j = 0; j <= i; ++j) sum.gram(i, j) = sum.gram(j, i) = row.dot(terms[static_cast<std::size_t>(j)]->whitened.segment(begin, rows));
+      for (Eigen::Index j = 0; j <= i; ++j)
+        sum.gram(i, j) = sum.gram(j, i) = row.dot(terms[static_cast<std::size_t>(j)]->whitened.segment(begin, rows));
       for (Eigen::Index j = 0; j < right.cols(); ++j) sum.cross(i, j) = row.dot(right.col(j));
     }
   });
@@ -327,7 +342,8 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
     const Frame& frame = frames_[g];
     for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
       const Eigen::VectorXd gain = light(frame, true, begin, rows);
-      for (Eigen::Index j = 0; j < p; ++j) searched_columns_.col(j).segment(frame.begin + begin, rows).array() *= gain.array();
+      for (Eigen::Index j = 0; j < p; ++j)
+        searched_columns_.col(j).segment(frame.begin + begin, rows).array() *= gain.array();
     });
     whiten(frame, searched_columns_.middleRows(frame.begin, frame.count), threads);
   });
@@ -344,7 +360,12 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   if (!moving.empty() && p > 0) {
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l), cross = Eigen::MatrixXd::Zero(l, p);
     for (const Frame& frame : frames_)
-      add_products(frame, thread_count(job_.options.threads), [&](Eigen::Index begin, Eigen::Index rows) { return searched_columns_.middleRows(frame.begin + begin, rows); }, gram, cross);
+      add_products(
+          frame, thread_count(job_.options.threads),
+          [&](Eigen::Index begin, Eigen::Index rows) {
+            return searched_columns_.middleRows(frame.begin + begin, rows);
+          },
+          gram, cross);
     if (prior_root_.rows() > 0) {
       gram += prior_root_.rightCols(l).transpose() * prior_root_.rightCols(l);
       cross += prior_root_.rightCols(l).transpose() * prior_root_.leftCols(p);
@@ -363,12 +384,16 @@ void LeastSquares::solve_linear() {
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(l, l), cross = Eigen::MatrixXd::Zero(l, 1);
   for (const Frame& frame : frames_) {
     if (l == 0) break;
-    add_products(frame, threads, [&](Eigen::Index begin, Eigen::Index rows) {
-      Eigen::VectorXd left = whitened_value_.segment(frame.begin + begin, rows);
-      for (const Term& term : frame.terms)
-        if (const double coefficient = term.coefficient_in(theta_); term.unknown < 0 && coefficient != 0) left -= coefficient * term.whitened.segment(begin, rows);
-      return left;
-    }, gram, cross);
+    add_products(
+        frame, threads,
+        [&](Eigen::Index begin, Eigen::Index rows) {
+          Eigen::VectorXd left = whitened_value_.segment(frame.begin + begin, rows);
+          for (const Term& term : frame.terms)
+            if (const double coefficient = term.coefficient_in(theta_); term.unknown < 0 && coefficient != 0)
+              left -= coefficient * term.whitened.segment(begin, rows);
+          return left;
+        },
+        gram, cross);
   }
   Eigen::VectorXd right = cross.col(0);
   Eigen::VectorXd searched(p);
@@ -411,7 +436,8 @@ void LeastSquares::solve_linear() {
       auto residual = residual_.segment(frame.begin + begin, rows);
       residual = -whitened_value_.segment(frame.begin + begin, rows);
       for (const Term& term : frame.terms)
-        if (const double coefficient = term.coefficient_in(theta_); coefficient != 0) residual += coefficient * term.whitened.segment(begin, rows);
+        if (const double coefficient = term.coefficient_in(theta_); coefficient != 0)
+          residual += coefficient * term.whitened.segment(begin, rows);
     });
   });
   if (prior_root_.rows() > 0)
@@ -439,13 +465,15 @@ Eigen::MatrixXd LeastSquares::projected_factor(const Eigen::VectorXd& scale) con
   const Eigen::Index p = scale.size();
   return factor_of(p + 1, [&](const Tile& tile) {
     Eigen::MatrixXd rows(tile.count, p + 1);
-    const Eigen::Index begin = tile.micrograph < 0 ? pixel_rows_ : frames_[static_cast<std::size_t>(tile.micrograph)].begin + tile.begin;
+    const Eigen::Index begin =
+        tile.micrograph < 0 ? pixel_rows_ : frames_[static_cast<std::size_t>(tile.micrograph)].begin + tile.begin;
     rows.leftCols(p) = searched_columns_.middleRows(begin, tile.count);
     if (tile.micrograph < 0) {
       rows.leftCols(p) -= prior_root_.rightCols(projection_.rows()) * projection_;
     } else {
       for (const Term& term : frames_[static_cast<std::size_t>(tile.micrograph)].terms)
-        if (term.unknown >= 0) rows.leftCols(p) -= term.whitened.segment(tile.begin, tile.count) * projection_.row(term.unknown);
+        if (term.unknown >= 0)
+          rows.leftCols(p) -= term.whitened.segment(tile.begin, tile.count) * projection_.row(term.unknown);
     }
     rows.leftCols(p) *= scale.asDiagonal();
     rows.col(p) = residual_.segment(begin, tile.count);
@@ -484,9 +512,11 @@ Eigen::VectorXd LeastSquares::gradient() const {
 Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) const {
   constexpr int kSide = 16, kRings = 64;
   const Eigen::Index n = unknowns_.size();
-  const auto half_waves = [](int order, int cell, int cells) { return std::cos(std::numbers::pi * order * (cell + 0.5) / cells); };
-  // Modulations as columns, over the cells of a square grid or over rings. What has been absorbed most is slow: few slow ones weigh it
-  // more; a misfit that follows fringes shows at the fringes' own rate.
+  const auto half_waves = [](int order, int cell, int cells) {
+    return std::cos(std::numbers::pi * order * (cell + 0.5) / cells);
+  };
+  // Modulations as columns, over the cells of a square grid or over rings. What has been absorbed most is slow: few
+  // slow ones weigh it more; a misfit that follows fringes shows at the fringes' own rate.
   struct Set {
     bool rings;
     Eigen::MatrixXd modulations;
@@ -496,7 +526,9 @@ Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) co
   for (const int orders : {3, 5}) {
     Set set{false, Eigen::MatrixXd(kSide * kSide, orders * orders - 1), {}, {}};
     for (int k = 1; k < orders * orders; ++k)
-      for (int cell = 0; cell < kSide * kSide; ++cell) set.modulations(cell, k - 1) = half_waves(k % orders, cell % kSide, kSide) * half_waves(k / orders, cell / kSide, kSide);
+      for (int cell = 0; cell < kSide * kSide; ++cell)
+        set.modulations(cell, k - 1) =
+            half_waves(k % orders, cell % kSide, kSide) * half_waves(k / orders, cell / kSide, kSide);
     sets.push_back(std::move(set));
   }
   Set rings{true, Eigen::MatrixXd(kRings, 24), {}, {}};
@@ -508,7 +540,8 @@ Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) co
   for (std::size_t g = 0; g < frames_.size(); ++g) {
     const Frame& frame = frames_[g];
     const View& view = job_.micrographs[g].scene.view;
-    const double center_x = theta_[static_cast<std::size_t>(view.center_x_px.index)], center_y = theta_[static_cast<std::size_t>(view.center_y_px.index)];
+    const double center_x = theta_[static_cast<std::size_t>(view.center_x_px.index)],
+                 center_y = theta_[static_cast<std::size_t>(view.center_y_px.index)];
     int left = std::numeric_limits<int>::max(), right = -1, top = left, bottom = -1;
     double farthest = 0;
     for (const auto& [x, y] : frame.set.pixels) {
@@ -517,14 +550,16 @@ Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) co
     }
     if (right - left < 31 || bottom - top < 31) continue;
     Eigen::MatrixXd sum[2], squares[2];
-    for (const bool of_rings : {false, true}) sum[of_rings] = squares[of_rings] = Eigen::MatrixXd::Zero(of_rings ? kRings : kSide * kSide, n);
+    for (const bool of_rings : {false, true})
+      sum[of_rings] = squares[of_rings] = Eigen::MatrixXd::Zero(of_rings ? kRings : kSide * kSide, n);
     for (const Tile& tile : tiles_) {
       if (tile.micrograph != static_cast<int>(g)) continue;
       const Eigen::MatrixXd influence = full_rows(tile) * covariance;
       for (Eigen::Index i = 0; i < tile.count; ++i) {
         const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(tile.begin + i)];
         const int cell = (y - top) * kSide / (bottom - top + 1) * kSide + (x - left) * kSide / (right - left + 1);
-        const int ring = std::min(kRings - 1, static_cast<int>(kRings * std::hypot(x - center_x, y - center_y) / farthest));
+        const int ring =
+            std::min(kRings - 1, static_cast<int>(kRings * std::hypot(x - center_x, y - center_y) / farthest));
         const auto pull = influence.row(i) * residual_[frame.begin + tile.begin + i];
         const auto square = influence.row(i).cwiseAbs2();
         sum[0].row(cell) += pull, squares[0].row(cell) += square;
@@ -541,7 +576,8 @@ Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) co
     // White noise stays below this in all but one of 10,000 parameters: exact errors stay exact.
     const double k = static_cast<double>(set.modulations.cols()), by_chance = chi_square_quantile(0.9999, k) / k;
     for (Eigen::Index j = 0; j < n; ++j)
-      if (set.found[j] > by_chance * set.expected[j]) factor[j] = std::max(factor[j], std::sqrt(set.found[j] / set.expected[j]));
+      if (set.found[j] > by_chance * set.expected[j])
+        factor[j] = std::max(factor[j], std::sqrt(set.found[j] / set.expected[j]));
   }
   return factor;
 }
@@ -561,14 +597,16 @@ LeastSquares::FrameMisfit LeastSquares::frame_misfit(int micrograph) const {
     misfit.mean_jacobian_whitened.head(p) =
         searched_columns_.middleRows(frame.begin, frame.count).transpose() * along / frame.mean_factor;
   for (const Term& term : frame.terms)
-    if (term.unknown >= 0) misfit.mean_jacobian_whitened[p + term.unknown] += term.whitened.dot(along) / frame.mean_factor;
+    if (term.unknown >= 0)
+      misfit.mean_jacobian_whitened[p + term.unknown] += term.whitened.dot(along) / frame.mean_factor;
   return misfit;
 }
 
 Eigen::VectorXd LeastSquares::noise_whitened_residual(int micrograph) const {
   const Frame& frame = frames_[micrograph];
   const Eigen::VectorXd gain = light(frame, true, 0, frame.count), offset = light(frame, false, 0, frame.count);
-  return ((gain.array() * intensity_.segment(frame.begin, frame.count).array() + offset.array() - frame.set.value.array()) *
+  return ((gain.array() * intensity_.segment(frame.begin, frame.count).array() + offset.array() -
+           frame.set.value.array()) *
           frame.inverse_sigma.array())
       .matrix();
 }
@@ -578,168 +616,5 @@ std::array<double, 2> LeastSquares::intensity_range(int micrograph) const {
 }
 
 double LeastSquares::prior_chi_square() const { return residual_.tail(prior_root_.rows()).squaredNorm(); }
-
-// ---- Ceres ----------------------------------------------------------------------------------------------------------
-
-namespace {
-
-/// The solver's parameters are unit-free: (theta - origin) / scale.
-struct Scaling {
-  Eigen::VectorXd origin, scale;
-  Eigen::VectorXd to_theta(const double* x) const {
-    return origin + scale.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(x, scale.size()));
-  }
-};
-
-/// One render per point.
-class SharedEvaluation : public ceres::EvaluationCallback {
- public:
-  SharedEvaluation(LeastSquares& problem, const Scaling& scaling, const std::vector<double>& x)
-      : problem_(problem), scaling_(scaling), x_(x) {}
-
-  void PrepareForEvaluation(bool evaluate_jacobians, bool) override {
-    // Ceres asks again at the same point (line search, then cost, then Jacobian): compare rather than trust the flag.
-    if (valid_ && x_ == last_ && (has_jacobian_ || !evaluate_jacobians)) return;
-    valid_ = false;
-    try {
-      problem_.evaluate(scaling_.to_theta(x_.data()), evaluate_jacobians);
-      valid_ = std::isfinite(problem_.objective());
-    } catch (...) {
-      failure = std::current_exception();  // Ceres knows no exceptions: the step is refused instead
-    }
-    last_ = x_;
-    has_jacobian_ = evaluate_jacobians;
-  }
-  bool valid() const { return valid_; }
-
-  std::exception_ptr failure;
-
- private:
-  LeastSquares& problem_;
-  const Scaling& scaling_;
-  const std::vector<double>& x_;
-  std::vector<double> last_;
-  bool valid_ = false, has_jacobian_ = false;
-};
-
-/// The whole problem in one row more than it has unknowns. With R = [A b; 0 c] the triangular factor of all rows [Jacobian,
-/// residual], the residual (b, c) and the Jacobian (A, 0) have the same sum of squares, gradient and Gauss-Newton steps, and the
-/// solver keeps no copies of a million rows.
-class ReducedCost : public ceres::CostFunction {
- public:
-  ReducedCost(const LeastSquares& problem, const Scaling& scaling, const SharedEvaluation& evaluation)
-      : problem_(problem), scaling_(scaling), evaluation_(evaluation) {
-    const int p = static_cast<int>(scaling.scale.size());
-    set_num_residuals(p + 1);
-    mutable_parameter_block_sizes()->push_back(p);
-  }
-  bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
-    if (!evaluation_.valid()) return false;
-    const Eigen::Index p = scaling_.scale.size();
-    Eigen::Map<Eigen::VectorXd> residual(residuals, p + 1);
-    if (jacobians && jacobians[0]) {
-      const Eigen::MatrixXd factor = problem_.projected_factor(scaling_.scale);
-      residual = factor.col(p);
-      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(jacobians[0], p + 1, p) = factor.leftCols(p);
-    } else {  // only its sum of squares is asked for
-      residual.setZero();
-      residual[p] = std::sqrt(problem_.objective());
-    }
-    return true;
-  }
-
- private:
-  const LeastSquares& problem_;
-  const Scaling& scaling_;
-  const SharedEvaluation& evaluation_;
-};
-
-class Watch : public ceres::IterationCallback {
- public:
-  explicit Watch(const SolveOptions& options) : options_(options) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    if (options_.iterations)
-      options_.iterations->push_back(
-          {static_cast<int>(options_.iterations->size()), 2 * summary.cost, summary.step_norm});
-    if (options_.progress && !options_.label.empty())
-      options_.progress(
-          fmt::format("{}, iteration {}: chi-square {:.6g}", options_.label, summary.iteration, 2 * summary.cost));
-    if (options_.interrupted && options_.interrupted->load()) {
-      stopped = true;
-      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
-    }
-    return ceres::SOLVER_CONTINUE;
-  }
-  bool stopped = false;
-
- private:
-  const SolveOptions& options_;
-};
-
-}  // namespace
-
-SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& options) {
-  SolveSummary result;
-  const int p = searched_size();
-  if (p == 0 || (p == 1 && options.held == 0)) {
-    evaluate(searched, true);
-    if (options.iterations)
-      options.iterations->push_back({static_cast<int>(options.iterations->size()), objective(), 0});
-    result.converged = true;
-    result.report = "Only linear parameters: solved exactly, without iterations.";
-    return result;
-  }
-  Scaling scaling{searched, Eigen::VectorXd::Ones(p)};
-  for (int j = 0; j < p; ++j) {
-    const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
-    const double width = parameter.upper - parameter.lower;
-    const double size = std::abs(searched[j]);
-    scaling.scale[j] = std::isfinite(width) && width > 0 ? width : size > 0 ? size : 1;
-  }
-  std::vector<double> x(p, 0.0);
-  SharedEvaluation evaluation(*this, scaling, x);
-  ceres::Problem::Options problem_options;
-  problem_options.evaluation_callback = &evaluation;
-  ceres::Problem problem(problem_options);
-  problem.AddParameterBlock(x.data(), p);
-  if (options.held >= 0) problem.SetManifold(x.data(), new ceres::SubsetManifold(p, {options.held}));
-  problem.AddResidualBlock(new ReducedCost(*this, scaling, evaluation), nullptr, x.data());
-  for (int j = 0; j < p; ++j) {
-    const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
-    if (std::isfinite(parameter.lower))
-      problem.SetParameterLowerBound(x.data(), j, (parameter.lower - scaling.origin[j]) / scaling.scale[j]);
-    if (std::isfinite(parameter.upper))
-      problem.SetParameterUpperBound(x.data(), j, (parameter.upper - scaling.origin[j]) / scaling.scale[j]);
-  }
-  ceres::Solver::Options solver;
-  solver.minimizer_type = ceres::TRUST_REGION;
-  solver.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
-  // QR keeps the digits that normal equations lose.
-  solver.linear_solver_type = ceres::DENSE_QR;
-  // With bounds Ceres adds a line search; the cubic one would ask for derivative images at every trial step.
-  solver.line_search_interpolation_type = ceres::QUADRATIC;
-  solver.num_threads = 1;
-  solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = options.function_tolerance;
-  solver.parameter_tolerance = 1e-10;
-  solver.gradient_tolerance = 1e-12;
-  solver.logging_type = ceres::SILENT;
-  solver.minimizer_progress_to_stdout = false;
-  Watch watch(options);
-  solver.callbacks.push_back(&watch);
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  if (summary.termination_type == ceres::FAILURE && evaluation.failure) std::rethrow_exception(evaluation.failure);
-  result.converged = summary.termination_type == ceres::CONVERGENCE;
-  result.interrupted = watch.stopped;
-  result.report = summary.FullReport();
-  searched = scaling.to_theta(x.data());
-  for (int j = 0; j < p; ++j) {  // a bound is hit exactly, not to rounding
-    const Parameter& parameter = job_.parameters[unknowns_.searched[j]];
-    searched[j] = std::clamp(searched[j], parameter.lower, parameter.upper);
-  }
-  evaluate(searched, true);
-  return result;
-}
 
 }  // namespace birefit::estimation

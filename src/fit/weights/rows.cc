@@ -1,4 +1,4 @@
-#include "fit/rows.h"
+#include "fit/weights/rows.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,8 @@ RowFindings look_at_rows(const std::vector<double>& x, const std::vector<double>
     size[i] = std::abs(off[i]);
   }
   found.scatter = kNormalSdPerMad * median(size);
-  // A table without noise has no outliers: what its curve does between nine rows is not known. Where a curve bends, its neighbours are off as well.
+  // A table without noise has no outliers: what its curve does between nine rows is not known. Where a curve bends, its
+  // neighbours are off as well.
   for (std::size_t i = 0; i < n; ++i) {
     std::vector<double> beside;
     for (std::size_t j = std::max<std::size_t>(i, 2) - 2; j < std::min(n, i + 3); ++j)

@@ -1,6 +1,6 @@
 #pragma once
-// From a model's intensity to a micrograph's values: value = (gain + uneven light) * intensity + offset + uneven background.
-// Linear in every coefficient.
+// From a model's intensity to a micrograph's values: value = (gain + uneven light) * intensity + offset + uneven
+// background. Linear in every coefficient.
 
 #include <vector>
 
@@ -15,7 +15,9 @@ struct LightTerm {
   bool of_intensity = false;
   std::optional<UnevenLight::Shape> shape;  ///< nothing: 1 everywhere
 
-  double coefficient_in(const Theta& theta) const { return coefficient ? theta[static_cast<std::size_t>(coefficient.index)] : absent; }
+  double coefficient_in(const Theta& theta) const {
+    return coefficient ? theta[static_cast<std::size_t>(coefficient.index)] : absent;
+  }
   double shape_at(const View& view, int column, int row) const;
 };
 

@@ -1,16 +1,18 @@
-#include "fit/profile.h"
+#include "fit/errors/profile.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace birefit::estimation {
 
-Profile::Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best, const Eigen::MatrixXd& covariance, int unknown)
+Profile::Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best,
+                 const Eigen::MatrixXd& covariance, int unknown)
     : problem_(problem), job_(job), unknowns_(unknowns), best_(best), unknown_(unknown) {
   const Eigen::Index p = best.size();
   const double variance = covariance(unknown, unknown);
   sd_ = std::sqrt(variance);
-  direction_ = variance > 0 ? Eigen::VectorXd(covariance.col(unknown).head(p) / variance) : Eigen::VectorXd(Eigen::VectorXd::Unit(p, unknown));
+  direction_ = variance > 0 ? Eigen::VectorXd(covariance.col(unknown).head(p) / variance)
+                            : Eigen::VectorXd(Eigen::VectorXd::Unit(p, unknown));
   problem_.evaluate(best_, false);
   least_ = problem_.objective();
   places_.push_back({best_[unknown_], 0, best_});
@@ -27,8 +29,9 @@ Eigen::VectorXd Profile::along(const Eigen::VectorXd& from, double value) const 
 }
 
 double Profile::rise(double value, double enough) {
-  const auto nearest = std::min_element(places_.begin(), places_.end(),
-                                        [&](const Place& a, const Place& b) { return std::abs(a.value - value) < std::abs(b.value - value); });
+  const auto nearest = std::min_element(places_.begin(), places_.end(), [&](const Place& a, const Place& b) {
+    return std::abs(a.value - value) < std::abs(b.value - value);
+  });
   Eigen::VectorXd x = along(nearest->searched, value);
   problem_.evaluate(x, false);
   if (problem_.objective() - least_ > enough) {
@@ -48,9 +51,9 @@ double Profile::crossing(double end, double allowed) {
   return place ? *place : bisected_crossing(end, allowed);
 }
 
-/// At each place the Gauss-Newton model of the objective says where the others want to go, how far that lowers it, and how the lowered
-/// objective goes on with the unknown: one image with derivatives instead of a whole fit. Nothing where the model leads to bounds or
-/// does not converge in a few places.
+/// At each place the Gauss-Newton model of the objective says where the others want to go, how far that lowers it, and
+/// how the lowered objective goes on with the unknown: one image with derivatives instead of a whole fit. Nothing where
+/// the model leads to bounds or does not converge in a few places.
 std::optional<double> Profile::newton_crossing(double end, double allowed) {
   constexpr int kMostPlaces = 8;
   const Eigen::Index p = best_.size();
@@ -70,7 +73,8 @@ std::optional<double> Profile::newton_crossing(double end, double allowed) {
     const double value = x[unknown_], here = problem_.objective() - least_;
     // |c + R d|^2 is the objective near x but for a constant; the columns in units of their length.
     Eigen::MatrixXd r = problem_.factor();
-    const Eigen::VectorXd c = r.transpose().triangularView<Eigen::Lower>().solve(Eigen::VectorXd(0.5 * problem_.gradient()));
+    const Eigen::VectorXd c =
+        r.transpose().triangularView<Eigen::Lower>().solve(Eigen::VectorXd(0.5 * problem_.gradient()));
     const Eigen::VectorXd length = r.colwise().norm();
     r.array().rowwise() /= length.transpose().array();
     const Eigen::VectorXd own = r.col(unknown_);
@@ -86,7 +90,8 @@ std::optional<double> Profile::newton_crossing(double end, double allowed) {
       Eigen::VectorXd there = x + step;
       there[unknown_] = value;
       places_.push_back({value, rise, there});
-      if (std::abs(std::sqrt(std::max(0.0, rise)) - wanted) < 0.01 * wanted || (value == end && rise < allowed)) return value;
+      if (std::abs(std::sqrt(std::max(0.0, rise)) - wanted) < 0.01 * wanted || (value == end && rise < allowed))
+        return value;
     }
     const double discriminant = slope * slope + curvature * (allowed - rise);
     if (!(discriminant >= 0)) return std::nullopt;
@@ -125,14 +130,17 @@ double Profile::bisected_crossing(double end, double allowed) {
 }
 
 double Profile::lowest() const {
-  return std::min_element(places_.begin(), places_.end(), [](const Place& a, const Place& b) { return a.rise < b.rise; })->rise;
+  return std::min_element(places_.begin(), places_.end(),
+                          [](const Place& a, const Place& b) { return a.rise < b.rise; })
+      ->rise;
 }
 
 std::array<double, 2> Profile::straightness(double allowed) {
   std::array<double, 2> ratio{1, 1};
   const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(unknown_)]];
   for (const int side : {0, 1}) {
-    const double value = std::clamp(best_[unknown_] + (side ? 1 : -1) * std::sqrt(allowed) * sd_, parameter.lower, parameter.upper);
+    const double value =
+        std::clamp(best_[unknown_] + (side ? 1 : -1) * std::sqrt(allowed) * sd_, parameter.lower, parameter.upper);
     const double share = (value - best_[unknown_]) / sd_;
     if (!(share * share > 0.01 * allowed)) continue;
     problem_.evaluate(along(best_, value), false);

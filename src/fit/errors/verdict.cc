@@ -1,4 +1,4 @@
-#include "fit/verdict.h"
+#include "fit/errors/verdict.h"
 
 #include <algorithm>
 #include <cmath>
@@ -121,10 +121,12 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
     for (int b = a + 1; b < n; ++b) {
       const ParameterEstimate &pa = result.parameters[a], &pb = result.parameters[b];
       // By the data alone: what models err by moves all parameters together, too, and makes no valley.
-      const double of_data_a = std::sqrt(inverse.covariance(a, a)), of_data_b = std::sqrt(inverse.covariance(b, b)), correlation = inverse.covariance(a, b) / (of_data_a * of_data_b);
+      const double of_data_a = std::sqrt(inverse.covariance(a, a)), of_data_b = std::sqrt(inverse.covariance(b, b)),
+                   correlation = inverse.covariance(a, b) / (of_data_a * of_data_b);
       if (!(std::abs(correlation) > kTogether)) continue;
       if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) continue;  // the prior's own correlation
-      if (!(of_data_a > kValley * inverse.conditional_sd[a] && of_data_b > kValley * inverse.conditional_sd[b])) continue;
+      if (!(of_data_a > kValley * inverse.conditional_sd[a] && of_data_b > kValley * inverse.conditional_sd[b]))
+        continue;
       const double sa = std::sqrt(result.covariance(a, a)), sb = std::sqrt(result.covariance(b, b));
       result.identifiable = false;
       FisherDirection direction;
@@ -149,16 +151,23 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
 
 std::string verdict(const FitResult& result, bool signal) {
   std::vector<std::string> sentences;
-  const bool rows = std::all_of(result.micrographs.begin(), result.micrographs.end(), [](const MicrographResult& m) { return m.used == 1; });
+  const bool rows = std::all_of(result.micrographs.begin(), result.micrographs.end(),
+                                [](const MicrographResult& m) { return m.used == 1; });
   if (result.interrupted)
     sentences.push_back("The fit was interrupted: these are the best values so far, not a result.");
   else if (!result.converged)
     sentences.push_back("The fit did not converge: the values below are no result.");
   if (!signal)
-    sentences.push_back(rows ? "The table shows no signal of the model: a constant explains it as well, so that the values mean nothing."
-                             : "The image shows no signal of the model: a constant image explains it as well, so that the values mean nothing.");
+    sentences.push_back(
+        rows
+            ? "The table shows no signal of the model: a constant explains it as well, so that the values mean nothing."
+            : "The image shows no signal of the model: a constant image explains it as well, so that the values mean "
+              "nothing.");
   else if (!result.described)
-    sentences.push_back(fmt::format("The model is not that of the {}: it leaves {:.0f} % of what there is to see unexplained, so that the values mean little.", rows ? "table" : "image", 100 * result.left_over));
+    sentences.push_back(
+        fmt::format("The model is not that of the {}: it leaves {:.0f} % of what there is to see unexplained, so that "
+                    "the values mean little.",
+                    rows ? "table" : "image", 100 * result.left_over));
   for (const FisherDirection& direction : result.directions)
     if (!direction.identifiable && !direction.words.empty())
       sentences.push_back("Not identifiable: " + direction.words + ".");
@@ -166,8 +175,9 @@ std::string verdict(const FitResult& result, bool signal) {
     std::vector<std::string> others;
     for (const RivalMinimum& rival : result.rivals)
       if (rival.counts)
-        others.push_back(std::abs(std::log(rival.odds / rival.likelihood_ratio)) < 0.7 ? fmt::format("odds {:.2g}", rival.odds)
-                                                                                       : fmt::format("odds {:.2g}, likelihood ratio {:.2g}", rival.odds, rival.likelihood_ratio));
+        others.push_back(std::abs(std::log(rival.odds / rival.likelihood_ratio)) < 0.7
+                             ? fmt::format("odds {:.2g}", rival.odds)
+                             : fmt::format("odds {:.2g}, likelihood ratio {:.2g}", rival.odds, rival.likelihood_ratio));
     sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),
                                     others.size() == 1 ? "um" : "a", joined(others)));
   }
@@ -176,15 +186,19 @@ std::string verdict(const FitResult& result, bool signal) {
     const std::string name = short_name(estimate.name), unit = unit_suffix(estimate);
     const bool upper = estimate.limit == "upper";
     // What the unit of a reduced voltage means.
-    const std::string below = name == "reduced_voltage" && upper && estimate.limit_value < 1 ? "Below the threshold: " : "";
+    const std::string below =
+        name == "reduced_voltage" && upper && estimate.limit_value < 1 ? "Below the threshold: " : "";
     if (estimate.limit.empty())
-      sentences.push_back(fmt::format("{} ended at its bound {:.6g}{}: the best value lies outside the bounds.", name, estimate.value, unit));
+      sentences.push_back(fmt::format("{} ended at its bound {:.6g}{}: the best value lies outside the bounds.", name,
+                                      estimate.value, unit));
     else if (estimate.at_bound)
-      sentences.push_back(fmt::format("{}{} is at its physical limit {:.6g}{}: {} {:.4g}{} with 95 % confidence.", below, name, estimate.value,
-                                      unit, upper ? "at most" : "at least", estimate.limit_value, unit));
+      sentences.push_back(fmt::format("{}{} is at its physical limit {:.6g}{}: {} {:.4g}{} with 95 % confidence.",
+                                      below, name, estimate.value, unit, upper ? "at most" : "at least",
+                                      estimate.limit_value, unit));
     else
-      sentences.push_back(fmt::format("{}{} is at most {:.4g}{} with 95 % confidence: the data do not tell it from {:.6g}{}.", below, name,
-                                      estimate.limit_value, unit, estimate.lower, unit));
+      sentences.push_back(
+          fmt::format("{}{} is at most {:.4g}{} with 95 % confidence: the data do not tell it from {:.6g}{}.", below,
+                      name, estimate.limit_value, unit, estimate.lower, unit));
   }
   std::vector<std::string> values;
   bool contradicted = false;
@@ -198,24 +212,33 @@ std::string verdict(const FitResult& result, bool signal) {
   for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
     const ParameterEstimate& p = result.parameters[j];
     if (!p.prior_value || !p.prior_sd || !std::isfinite(p.stderr_)) continue;
-    // Of the estimate less the prior's mean, the variance that both expect; where the data add little, not less than a tenth of the prior's.
-    const double expected = std::sqrt(std::max(*p.prior_sd * *p.prior_sd - p.stderr_ * p.stderr_, 0.1 * *p.prior_sd * *p.prior_sd)), away = std::abs(p.value - *p.prior_value) / expected;
+    // Of the estimate less the prior's mean, the variance that both expect; where the data add little, not less than a
+    // tenth of the prior's.
+    const double expected = std::sqrt(
+                     std::max(*p.prior_sd * *p.prior_sd - p.stderr_ * p.stderr_, 0.1 * *p.prior_sd * *p.prior_sd)),
+                 away = std::abs(p.value - *p.prior_value) / expected;
     if (!(away > 4)) continue;
     contradicted = true;
-    sentences.push_back(fmt::format("{} contradicts what was known of it: {} instead of {}{}, {:.0f} standard deviations away. One of the two is wrong.", name_of(result, j),
-                                      with_error(p.value, p.stderr_), with_error(*p.prior_value, *p.prior_sd), unit_suffix(p), away));
+    sentences.push_back(
+        fmt::format("{} contradicts what was known of it: {} instead of {}{}, {:.0f} standard deviations away. One of "
+                    "the two is wrong.",
+                    name_of(result, j), with_error(p.value, p.stderr_), with_error(*p.prior_value, *p.prior_sd),
+                    unit_suffix(p), away));
   }
   if (!values.empty()) sentences.push_back(joined(values) + " (standard errors: " + result.covariance_kind + ").");
   for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
     const ParameterEstimate& p = result.parameters[j];
     if (signal && p.profiled && std::isfinite(p.stderr_))
-      sentences.push_back(fmt::format("The 95 % interval of {} is {:.4g} to {:.4g}{}, by its profile likelihood.", name_of(result, j), p.interval95_low, p.interval95_high, unit_suffix(p)));
+      sentences.push_back(fmt::format("The 95 % interval of {} is {:.4g} to {:.4g}{}, by its profile likelihood.",
+                                      name_of(result, j), p.interval95_low, p.interval95_high, unit_suffix(p)));
   }
   if (result.has_answer())
-    sentences.push_back(
-        fmt::format("Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
-                    result.reduced_chi_square > 2 && contradicted ? ", that contradiction included"
-                    : result.reduced_chi_square > 2 ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise" : ""));
+    sentences.push_back(fmt::format(
+        "Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
+        result.reduced_chi_square > 2 && contradicted ? ", that contradiction included"
+        : result.reduced_chi_square > 2
+            ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise"
+            : ""));
   // The inputs whose error would be the estimates'.
   std::vector<std::string> inputs;
   for (const InputEffect& input : result.inputs) {
@@ -230,8 +253,11 @@ std::string verdict(const FitResult& result, bool signal) {
     const ParameterEstimate& p = result.parameters[most];
     const double shift = input.shift[static_cast<std::size_t>(most)];
     const bool of_value = p.unit != "deg" && std::abs(p.value) > 10 * p.stderr_;  // what may be zero has no per cent
-    inputs.push_back(fmt::format("{} more of {} makes {} {}", input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %", input.name,
-                                 name_of(result, most), of_value ? fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value)) : fmt::format("{:+.2g}{}", shift, unit_suffix(p))));
+    inputs.push_back(fmt::format("{} more of {} makes {} {}",
+                                 input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %", input.name,
+                                 name_of(result, most),
+                                 of_value ? fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value))
+                                          : fmt::format("{:+.2g}{}", shift, unit_suffix(p))));
   }
   if (signal && !inputs.empty()) sentences.push_back("Taken as exact: " + joined(inputs) + ".");
   std::string text;

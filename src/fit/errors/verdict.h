@@ -1,8 +1,8 @@
 #pragma once
 // Which directions of parameter space the image determines, and the whole result in plain words.
 
-#include "fit/least_squares.h"
-#include "fit/statistics.h"
+#include "fit/errors/statistics.h"
+#include "fit/problem/least_squares.h"
 
 namespace birefit::estimation {
 

@@ -1,4 +1,4 @@
-#include "fit/light.h"
+#include "fit/problem/light.h"
 
 namespace birefit::estimation {
 
@@ -7,16 +7,20 @@ double LightTerm::shape_at(const View& view, int column, int row) const {
   const double half = 0.5 * std::max(view.width, view.height);
   const double x = (column - 0.5 * (view.width - 1)) / half, y = (0.5 * (view.height - 1) - row) / half;
   switch (*shape) {
-    case UnevenLight::Shape::x: return x;
-    case UnevenLight::Shape::y: return y;
-    case UnevenLight::Shape::square: return x * x + y * y;
+    case UnevenLight::Shape::x:
+      return x;
+    case UnevenLight::Shape::y:
+      return y;
+    case UnevenLight::Shape::square:
+      return x * x + y * y;
   }
   return 0;
 }
 
 std::vector<LightTerm> light_terms(const Micrograph& micrograph) {
   std::vector<LightTerm> terms{{micrograph.gain, 1, true, {}}, {micrograph.offset, 0, false, {}}};
-  for (const UnevenLight& uneven : micrograph.uneven) terms.push_back({uneven.coefficient, 0, uneven.of_intensity, uneven.shape});
+  for (const UnevenLight& uneven : micrograph.uneven)
+    terms.push_back({uneven.coefficient, 0, uneven.of_intensity, uneven.shape});
   return terms;
 }
 

@@ -1,0 +1,208 @@
+#include "fit/errors/left_out.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "fit/problem/light.h"
+#include "render/wave.h"
+
+namespace birefit::estimation {
+namespace {
+
+struct Shift {
+  int index = 0;  ///< in the table
+  double change = 0, standard_errors = 0;
+};
+
+/// Of the parameters searched for but the centre, the one that another model moves most, in the standard errors `sd`.
+Shift largest_shift(const Task& task, const Eigen::VectorXd& shift, const Eigen::VectorXd& sd) {
+  Shift most{task.unknowns.searched.front()};
+  for (int j = 0; j < std::ssize(task.unknowns.searched); ++j) {
+    const int index = task.unknowns.table_index(j);
+    if (task.job.parameters[index].name.find("center_px") != std::string::npos || !(sd[j] > 0)) continue;
+    if (std::abs(shift[j]) > most.standard_errors * sd[j]) most = {index, shift[j], std::abs(shift[j]) / sd[j]};
+  }
+  return most;
+}
+
+Eigen::VectorXd change_of_unknowns(const Task& task, const Theta& from, const Theta& to) {
+  Eigen::VectorXd change(task.unknowns.size());
+  for (int j = 0; j < task.unknowns.size(); ++j) {
+    const auto index = static_cast<std::size_t>(task.unknowns.table_index(j));
+    change[j] = to[index] - from[index];
+  }
+  return change;
+}
+
+/// A short fit of other pictures, or by other plans, from where the optimum is.
+SolveOptions few_steps(const Task& task, int steps) {
+  SolveOptions few;
+  few.max_iterations = steps;
+  few.interrupted = task.job.options.interrupted;
+  return few;
+}
+
+/// Fits the optimum's model to other values of its pixels: the change of all unknowns.
+Eigen::VectorXd change_by_values(const Task& task, const Optimum& optimum, const std::vector<Image>& values,
+                                 int steps) {
+  std::vector<PixelSet> sets;
+  std::vector<RenderPlan> plans;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+    const Image& image = values[static_cast<std::size_t>(g)];
+    PixelSet set = pixel_set(task.micrograph(g), frame.sigma, frame.pixels);
+    for (std::size_t i = 0; i < set.pixels.size(); ++i)
+      set.value[static_cast<Eigen::Index>(i)] = image(set.pixels[i][0], set.pixels[i][1]);
+    sets.push_back(std::move(set));
+    plans.push_back(frame.plan);
+  }
+  LeastSquares problem(task.job, task.unknowns, std::move(plans), std::move(sets));
+  problem.set_misfit(optimum.problem->misfit());
+  Eigen::VectorXd searched = optimum.searched;
+  problem.solve(searched, few_steps(task, steps));
+  return change_of_unknowns(task, optimum.theta, problem.theta());
+}
+
+}  // namespace
+
+void measure_propagation(const Task& task, const Optimum& optimum, LeftOut& left_out) {
+  left_out.propagation.resize(task.unknowns.size(), 0);
+  if (optimum.stopped || !by_waves(optimum.frames)) return;
+  std::vector<std::vector<Image>> pictures;  // of each frame, each scene of its twin
+  for (const Micrograph& m : task.job.micrographs) {
+    const std::optional<RadialTwin> twin = radial_twin(m.scene, optimum.theta);
+    if (!twin) return;
+    try {
+      pictures.emplace_back();
+      for (const Scene& scene : twin->scenes)
+        pictures.back().push_back(
+            lit(m, optimum.theta,
+                render(scene, plan(scene, twin->theta), twin->theta, {}, task.job.options.threads).intensity));
+    } catch (const UserError& error) {  // too large for the series
+      left_out.warnings.push_back(std::string("What wave propagation errs by could not be measured on a ball of this "
+                                              "size; the error bars do not contain it. ") +
+                                  error.what());
+      return;
+    }
+  }
+  const auto causes = std::max_element(pictures.begin(), pictures.end(),
+                                       [](const auto& a, const auto& b) { return a.size() < b.size(); })
+                          ->size() -
+                      1;
+  for (std::size_t cause = 0; cause < causes; ++cause) {
+    std::vector<Image> values;
+    for (int g = 0; g < task.frames(); ++g) {
+      const std::vector<Image>& seen = pictures[static_cast<std::size_t>(g)];
+      values.push_back(fitted_image(task, optimum.frames, g, optimum.theta));
+      Image& image = values.back();
+      if (cause + 1 < seen.size())
+        for (const auto& [x, y] : optimum.frames[static_cast<std::size_t>(g)].pixels)
+          image(x, y) = image(x, y) + (seen[cause](x, y) - seen[cause + 1](x, y));
+    }
+    constexpr int kNextToLinear = 2;
+    left_out.propagation.conservativeResize(Eigen::NoChange, left_out.propagation.cols() + 1);
+    left_out.propagation.rightCols(1) = change_by_values(task, optimum, values, kNextToLinear);
+  }
+}
+
+void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {
+  const auto has_curved = [](const Micrograph& m) {
+    return has_curved_rays(m.scene) && m.scene.rays == Rays::straight && m.scene.ceiling != Ceiling::wave;
+  };
+  const std::vector<Micrograph>& micrographs = task.job.micrographs;
+  if (optimum.stopped || task.unknowns.searched.empty() ||
+      !std::all_of(micrographs.begin(), micrographs.end(), has_curved))
+    return;
+  FitJob curved = task.job;
+  std::vector<RenderPlan> plans, straight_plans;
+  std::vector<PixelSet> sets;
+  // Of large images a part tells it, fitted both ways: what its noise does to a fit, it does to both.
+  constexpr std::size_t kPixels = 1 << 17;
+  std::size_t all = 0, used = 0;
+  for (const Frame& frame : optimum.frames) all += frame.pixels.size();
+  const bool part = all > kPixels;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+    Scene& scene = curved.micrographs[static_cast<std::size_t>(g)].scene;
+    scene.rays = Rays::eikonal;
+    plans.push_back(plan(scene, optimum.theta));
+    straight_plans.push_back(frame.plan);
+    const Pixels pixels =
+        part ? subsample(frame.pixels, std::max<std::size_t>(50, kPixels * frame.pixels.size() / all)) : frame.pixels;
+    used += pixels.size();
+    sets.push_back(pixel_set(task.micrograph(g), frame.sigma, pixels));
+  }
+  SolveOptions few = few_steps(task, 12);
+  double straight_objective = optimum.problem->objective();
+  // To a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search for more
+  // would follow.
+  few.function_tolerance = 0.1 / std::max(straight_objective, 1.0);
+  Theta straight = optimum.theta;
+  if (part) {
+    LeastSquares problem(task.job, task.unknowns, std::move(straight_plans), sets);
+    problem.set_misfit(optimum.problem->misfit());
+    Eigen::VectorXd searched = optimum.searched;
+    problem.solve(searched, few);
+    straight_objective = problem.objective();
+    straight = problem.theta();
+  }
+  LeastSquares problem(curved, task.unknowns, std::move(plans), std::move(sets));
+  problem.set_misfit(optimum.problem->misfit());
+  Eigen::VectorXd searched = optimum.searched;
+  problem.solve(searched, few);
+  const Eigen::VectorXd change = change_of_unknowns(task, straight, problem.theta());
+  const Shift shift = largest_shift(task, change, sd);
+  const double ratio = problem.objective() / straight_objective,
+               reduced = std::max(1.0, optimum.reduced_chi_square(task));
+  const double worse =
+      (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used);
+  left_out.change_by_curved_rays = worse < 9 * reduced ? shift.standard_errors : 0;
+  if (left_out.change_by_curved_rays < 1) return;
+  const double value = optimum.theta[static_cast<std::size_t>(shift.index)];
+  left_out.warnings.push_back(
+      fmt::format("Rays are taken as straight. Curved ones (physics.rays: eikonal or auto) would put {} at {:.4g} "
+                  "({:+.2g} %, {:.3g} standard errors), with a chi-square {:.3g} times this one. "
+                  "The error bars contain this as the error of the model.",
+                  task.job.parameters[shift.index].name, value + shift.change, 100 * shift.change / value,
+                  left_out.change_by_curved_rays, ratio));
+  left_out.by_curved_rays = change;
+}
+
+void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {
+  const auto has_waves = [](const Micrograph& m) {
+    return std::holds_alternative<Droplet>(m.scene.sample) && m.scene.ceiling == Ceiling::one_way &&
+           m.scene.microscope.objective_na > 0;
+  };
+  const FitJob& job = task.job;
+  if (optimum.stopped || task.unknowns.searched.empty() ||
+      !std::all_of(job.micrographs.begin(), job.micrographs.end(), has_waves))
+    return;
+  constexpr double kMostSeconds = 10;  // for a warning
+  std::vector<Image> values;
+  for (const Micrograph& micrograph : job.micrographs) {
+    Scene waves = micrograph.scene;
+    waves.ceiling = Ceiling::wave;
+    waves.method = "auto";
+    waves.rays = Rays::straight;
+    const WaveChoice choice = wave_choice(waves, optimum.theta);
+    if (choice.seconds_an_image > (job.options.choose_waves ? job.options.max_seconds : kMostSeconds)) return;
+    values.push_back(lit(micrograph, optimum.theta,
+                         render(waves, plan(waves, optimum.theta), optimum.theta, {}, job.options.threads).intensity));
+  }
+  const Eigen::VectorXd change = change_by_values(task, optimum, values, 12);
+  const Shift shift = largest_shift(task, change, sd);
+  left_out.change_by_waves = shift.standard_errors;
+  if (left_out.change_by_waves < kShiftThatMatters) return;
+  left_out.warnings.push_back(
+      fmt::format("Rays are not the image of this sample: fitted to a wave-optical image of the parameters found here, "
+                  "rays return {} off by {:+.2g} ({:+.2g} %, "
+                  "{:.3g} standard errors). The error bars contain this as the error of the model; physics.ceiling: "
+                  "wave does away with it.",
+                  job.parameters[shift.index].name, shift.change,
+                  100 * shift.change / optimum.theta[static_cast<std::size_t>(shift.index)], left_out.change_by_waves));
+  left_out.by_waves = change;
+}
+
+}  // namespace birefit::estimation

@@ -1,0 +1,138 @@
+#include "fit/errors/report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "fit/errors/verdict.h"
+
+namespace birefit::estimation {
+namespace {
+
+/// A slow misfit, like that of uneven light, may be far below the noise of a pixel and still shift a parameter by many
+/// standard errors: what the residual holds of each parameter's own pattern says by how much. It holds what `inverse`
+/// has beyond the noise as well: the larger of the two counts. Returns the largest factor on a standard error.
+double pay_for_misfit(const LeastSquares& problem, const Inverse& of_noise, Inverse& inverse) {
+  const Eigen::VectorXd along = problem.misfit_along(of_noise.covariance);
+  Eigen::VectorXd factor = Eigen::VectorXd::Ones(along.size());
+  for (Eigen::Index j = 0; j < along.size(); ++j)
+    if (const double variance = inverse.covariance(j, j); variance > 0)
+      factor[j] = std::sqrt(std::max(1.0, along[j] * along[j] * of_noise.covariance(j, j) / variance));
+  inverse.covariance = factor.asDiagonal() * inverse.covariance * factor.asDiagonal();
+  return factor.size() > 0 ? factor.maxCoeff() : 1;
+}
+
+/// What the standard errors contain, in words.
+std::string covariance_words(const Task& task, const Optimum& optimum, const Covariances& covariances,
+                             const LeftOut& left_out) {
+  const MisfitFound& found = optimum.misfit;
+  const std::optional<JointPrior>& prior = task.job.prior;
+  std::string words;
+  double largest = 1;
+  for (const Misfit& misfit : optimum.problem->misfit()) largest = std::max(largest, misfit.shape_variance);
+  if (found.frames_scatter)
+    words = fmt::format("{} scatter by {:.2g} of the model intensity about the joint fit",
+                        are_rows(optimum.frames) ? "misfit included: the rows" : "clustered by image: the frames",
+                        found.frame_sd);
+  else if (prior && prior->frame_scatter)
+    words = fmt::format("frame misfit of {:.2g} of the model intensity from the prior's fit included",
+                        prior->frame_scatter->intensity_sd);
+  if (found.row_length > 1.5) words += fmt::format(", {:.2g} neighbours alike", found.row_length);
+  if (found.beyond_noise) {
+    if (!words.empty()) words += "; ";
+    words += found.largest_area > 1.5
+                 ? fmt::format("scaled by reduced chi-square {:.3g} and the {:.3g} pixels that share one misfit",
+                               largest / found.largest_area, found.largest_area)
+                 : fmt::format("scaled by reduced chi-square {:.3g}", largest);
+  }
+  if (words.empty()) words = "white noise: the noise model explains the residuals";
+  if (covariances.along > 1)
+    words += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters",
+                         covariances.along);
+  const Eigen::MatrixXd& propagation = left_out.propagation;
+  if (!propagation.isZero(0))
+    words += ", and the error of wave propagation" + std::string(propagation.cols() > 1 ? " and of sampling" : "") +
+             " by the exact image of a radial twin";
+  if (left_out.by_curved_rays) words += ", and what curved rays would change";
+  if (left_out.by_waves) words += ", and what rays lose of a wave-optical image";
+  return words;
+}
+
+/// Degrees of freedom of the t quantile behind the intervals: the fewest of all that the standard errors are made of.
+double interval_freedom(const Task& task, const Optimum& optimum, const Covariances& covariances,
+                        const FitResult& result) {
+  const MisfitFound& found = optimum.misfit;
+  double dof = found.frames_scatter ? found.frame_dof : std::max(1.0, result.degrees_of_freedom / found.largest_area);
+  if (covariances.along > 1) dof = std::min(dof, static_cast<double>(LeastSquares::kLeastModulations));
+  if (const std::optional<JointPrior>& prior = task.job.prior) {
+    dof = std::min(dof, prior->degrees_of_freedom);
+    if (prior->frame_scatter) dof = std::min(dof, prior->frame_scatter->degrees_of_freedom);
+  }
+  return dof;
+}
+
+}  // namespace
+
+Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation) {
+  Covariances covariances;
+  covariances.factor = optimum.problem->factor();
+  covariances.of_noise = invert_normal_equations(covariances.factor);
+  covariances.with_misfit = covariances.of_noise;
+  covariances.with_misfit.covariance += propagation * propagation.transpose();
+  covariances.along = pay_for_misfit(*optimum.problem, covariances.of_noise, covariances.with_misfit);
+  return covariances;
+}
+
+FitResult report(const Task& task, Optimum& optimum, Minima minima, Rivals rivals, const LeftOut& left_out,
+                 Covariances covariances, bool beaten) {
+  FitResult result;
+  result.theta = optimum.theta;
+  result.converged = optimum.converged;
+  result.solver_report = std::move(optimum.solver_report);
+  result.iterations = std::move(optimum.iterations);
+  result.scans = std::move(minima.scan.traces);
+  result.identifiable = optimum.possible;
+  result.ambiguous = rivals.ambiguous;
+  result.rivals = std::move(rivals.minima);
+  result.warnings = std::move(optimum.warnings);
+  result.warnings.insert(result.warnings.end(), left_out.warnings.begin(), left_out.warnings.end());
+  result.interrupted = (optimum.stopped && !beaten) || task.interrupted();
+  if (result.interrupted) result.converged = false;
+
+  const double data_chi_square = optimum.chi_square(task);
+  result.chi_square = data_chi_square + optimum.problem->prior_chi_square();
+  result.degrees_of_freedom = optimum.degrees_of_freedom(task);
+  result.reduced_chi_square = optimum.reduced_chi_square(task);
+  if (optimum.misfit.frames_scatter)
+    result.frame_scatter = JointPrior::FrameScatter{optimum.misfit.frame_sd, optimum.misfit.frame_dof};
+  result.interval_degrees_of_freedom = interval_freedom(task, optimum, covariances, result);
+
+  Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
+  for (const auto& change : {left_out.by_curved_rays, left_out.by_waves})
+    if (change) covariance += *change * change->transpose();
+  result.log_share = log_share(projected_information(*optimum.problem), task.job, task.unknowns);
+  result.covariance = covariance;
+  const Eigen::VectorXd inverse_sd =
+      covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
+  result.correlation = inverse_sd.asDiagonal() * covariance * inverse_sd.asDiagonal();
+  result.correlation.diagonal().setOnes();
+  result.covariance_kind = covariance_words(task, optimum, covariances, left_out);
+
+  report_parameters(task, optimum, covariances.of_noise, result);
+  judge_identifiability(result, task.job, task.unknowns, covariances.factor, covariances.of_noise);
+  weigh_inputs(task, optimum, covariances.of_noise, result);
+  const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
+  if (!signal) result.identifiable = false;
+  report_micrographs(task, optimum, result);
+  collect_warnings(task, optimum, result);
+  if (task.unknowns.size() == 0)
+    result.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
+  result.evaluations = optimum.evaluations + optimum.problem->evaluations();
+  // Since then, too: profiles and warnings may be half done.
+  if (task.interrupted()) result.interrupted = true, result.converged = false;
+  result.verdict = verdict(result, signal);
+  return result;
+}
+
+}  // namespace birefit::estimation

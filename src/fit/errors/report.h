@@ -1,0 +1,40 @@
+#pragma once
+// From an optimum to a result: errors, limits, intervals, what the image shows and what it does not, and words for all
+// of it.
+
+#include "fit/errors/left_out.h"
+#include "fit/errors/rivals.h"
+#include "fit/errors/statistics.h"
+
+namespace birefit::estimation {
+
+/// What the standard errors are made of.
+struct Covariances {
+  Eigen::MatrixXd factor;  ///< triangular, of all whitened rows
+  Inverse of_noise;        ///< by the weights alone
+  Inverse with_misfit;     ///< and what propagation errs by, and what the residual holds along the parameters
+  double along = 1;        ///< largest factor on a standard error by the latter
+};
+/// `propagation`: LeftOut::propagation.
+Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);
+
+/// Everything that is to be said of a fit. `beaten`: another branch has won, so that this one was not finished.
+FitResult report(const Task& task, Optimum& optimum, Minima minima, Rivals rivals, const LeftOut& left_out,
+                 Covariances covariances, bool beaten);
+
+// Parts of the report, each of which fills its members of the result.
+
+/// Values, standard errors, limits, intervals, with the result's covariance and interval_degrees_of_freedom. Moves the
+/// problem and brings it back.
+void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noise, FitResult& result);
+/// What the fit takes as exact, and what the estimates owe to it.
+void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result);
+/// Does the model describe the images at all? False: an image without structure is as good, compared in units of the
+/// misfit (an F test), with what the freedom of the model and the number of `places` the scan looked at gain by chance.
+/// A model that is better than that and yet leaves most of what there is to see is not the sample's, whatever its
+/// parameters' errors: result.described.
+bool judge_description(const Task& task, const Optimum& optimum, double chi_square, int places, FitResult& result);
+void report_micrographs(const Task& task, const Optimum& optimum, FitResult& result);
+void collect_warnings(const Task& task, const Optimum& optimum, FitResult& result);
+
+}  // namespace birefit::estimation

@@ -1,0 +1,157 @@
+// What each micrograph shows of the model, and what is to be warned of.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "fit/errors/report.h"
+#include "fit/weights/settle.h"
+
+namespace birefit::estimation {
+namespace {
+
+MicrographResult report_of(const Task& task, const Optimum& optimum, int g) {
+  const Micrograph& micrograph = task.micrograph(g);
+  const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+  MicrographResult out;
+  out.name = micrograph.name;
+  out.fitted = fitted_image(task, optimum.frames, g, optimum.theta);
+  out.sigma = frame.sigma;
+  out.noise = frame.noise;
+  out.plan = frame.plan;
+  out.used = static_cast<int>(frame.pixels.size());
+  out.outliers = optimum.left_out[static_cast<std::size_t>(g)].count;
+  out.chi_square = optimum.problem->frame_misfit(g).chi_square;
+  out.residual = Image(micrograph.values.width(), micrograph.values.height(), std::numeric_limits<double>::quiet_NaN());
+  double squares = 0, low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const auto& [x, y] : frame.pixels) {
+    const double fitted = out.fitted(x, y);
+    const double residual = micrograph.values(x, y) - fitted;
+    out.residual(x, y) = residual;
+    squares += residual * residual;
+    low = std::min(low, fitted);
+    high = std::max(high, fitted);
+  }
+  out.residual_rms = std::sqrt(squares / out.used);
+  out.signal_range = high - low;
+  return out;
+}
+
+void warn(FitResult& result, std::string text) {
+  std::vector<std::string>& warnings = result.warnings;
+  if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(std::move(text));
+}
+
+std::string in_spots(const Outliers& out) { return out.spots == 1 ? "one spot" : fmt::format("{} spots", out.spots); }
+
+/// Pixels that were left out because they stand out of the residual, or that make much of a misfit.
+void warn_of_outliers(const Task& task, const Optimum& optimum, int g, FitResult& result) {
+  const MicrographResult& micrograph = result.micrographs[static_cast<std::size_t>(g)];
+  if (micrograph.outliers > 0) {
+    const Outliers& out = optimum.left_out[static_cast<std::size_t>(g)];
+    warn(result, fmt::format("{}: {} pixels in {} ({:.2g} %) stand out of the residual and were left out, the largest "
+                             "around column {}, row {}.",
+                             micrograph.name, out.count, in_spots(out),
+                             100.0 * out.count / (out.count + micrograph.used), out.largest_column, out.largest_row));
+    return;
+  }
+  if (task.job.options.leave_out_outliers || !(micrograph.chi_square / std::max(1, micrograph.used) > 1.05)) return;
+  const Outliers out = outliers_of(task, optimum, g);
+  double theirs = 0;
+  for (const auto& [x, y] : optimum.frames[static_cast<std::size_t>(g)].pixels)
+    if (out.pixels(x, y)) theirs += std::pow(micrograph.residual(x, y) / micrograph.sigma(x, y), 2);
+  const double excess = micrograph.chi_square - micrograph.used;
+  if (out.count > 0 && out.count < kMostOutliers * micrograph.used && theirs > 0.2 * excess)
+    warn(result, fmt::format("{}: {} pixels in {}, the largest around column {}, row {}, make {:.0f} % of the misfit: "
+                             "dust or a scratch? Mask them, or set fit: {{outliers: leave_out}}.",
+                             micrograph.name, out.count, in_spots(out), out.largest_column, out.largest_row,
+                             100 * std::min(1.0, theirs / excess)));
+}
+
+void warn_of_misfit(const MicrographResult& micrograph, double range_of_all, double largest, FitResult& result) {
+  // A uniform frame has no range of its own: then that of all frames, then its own level, is the yardstick.
+  double range = micrograph.signal_range;
+  if (!(range > 1e-6 * range_of_all)) range = range_of_all;
+  if (!(range > 1e-9 * std::abs(largest))) range = std::abs(largest);
+  const double percent = range > 0 ? 100 * micrograph.residual_rms / range : 0,
+               reduced = micrograph.chi_square / std::max(1, micrograph.used);
+  if (!(reduced > 2)) return;
+  warn(result,
+       fmt::format("{}: the model does not describe the image within its noise (reduced chi-square {:.3g}, residual "
+                   "{:.2g} % of the signal range){}",
+                   micrograph.name, reduced, percent,
+                   percent > 15
+                       ? ": so large a misfit means that the model is wrong or incomplete; do not trust the values."
+                       : "; the errors allow for it as far as the residuals show it."));
+}
+
+/// The rows of one table together.
+struct Rows {
+  double number = 0, chi_square = 0, squares = 0, low = std::numeric_limits<double>::infinity(), high = -low;
+};
+
+void warn_of_misfit(const std::string& name, const Rows& rows, FitResult& result) {
+  const double percent =
+      rows.high > rows.low ? 100 * std::sqrt(rows.squares / rows.number) / (rows.high - rows.low) : 0;
+  if (rows.chi_square / rows.number > 2 && rows.number > 3)
+    warn(result,
+         fmt::format("{}: the model does not describe the signal within its noise (reduced chi-square {:.3g}, residual "
+                     "{:.2g} % of the "
+                     "signal's spread){}",
+                     name, rows.chi_square / rows.number, percent,
+                     percent > 5
+                         ? ": a curve this far off is another one, or its label is wrong; do not trust the values."
+                         : "; the errors allow for it as far as the residuals show it."));
+}
+
+}  // namespace
+
+void report_micrographs(const Task& task, const Optimum& optimum, FitResult& result) {
+  for (int g = 0; g < task.frames(); ++g) result.micrographs.push_back(report_of(task, optimum, g));
+  // A row of a table has no range of its own: the table's.
+  std::map<std::string, std::pair<double, double>> tables;
+  for (const MicrographResult& row : result.micrographs)
+    if (row.used == 1) {
+      auto& [low, high] = tables.try_emplace(table_of(row.name), row.fitted(0, 0), row.fitted(0, 0)).first->second;
+      low = std::min(low, row.fitted(0, 0));
+      high = std::max(high, row.fitted(0, 0));
+    }
+  for (MicrographResult& row : result.micrographs)
+    if (row.used == 1) {
+      const auto [low, high] = tables.at(table_of(row.name));
+      row.signal_range = high - low;
+    }
+}
+
+void collect_warnings(const Task& task, const Optimum& optimum, FitResult& result) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const MicrographResult& micrograph : result.micrographs)
+    for (const double value : micrograph.fitted.values()) low = std::min(low, value), high = std::max(high, value);
+  std::map<std::string, Rows> tables;
+  for (int g = 0; g < task.frames(); ++g) {
+    const MicrographResult& micrograph = result.micrographs[static_cast<std::size_t>(g)];
+    for (const std::string& warning : micrograph.plan.warnings) warn(result, warning);
+    if (micrograph.used == 1) {  // a row of a table (name:line): judged with the others of it
+      Rows& rows = tables[table_of(micrograph.name)];
+      const auto [x, y] = optimum.frames[static_cast<std::size_t>(g)].pixels[0];
+      const double value = task.micrograph(g).values(x, y);
+      rows.number += 1;
+      rows.chi_square += micrograph.chi_square;
+      rows.squares += micrograph.residual_rms * micrograph.residual_rms;
+      rows.low = std::min(rows.low, value);
+      rows.high = std::max(rows.high, value);
+      continue;
+    }
+    warn_of_outliers(task, optimum, g, result);
+    warn_of_misfit(micrograph, high - low, high, result);
+  }
+  for (const auto& [name, rows] : tables) warn_of_misfit(name, rows, result);
+  for (const ParameterEstimate& estimate : result.parameters)
+    if (estimate.prior_sd && estimate.stderr_ > 0.98 * *estimate.prior_sd)
+      warn(result, fmt::format("The image adds nothing to the prior on {}.", estimate.name));
+}
+
+}  // namespace birefit::estimation

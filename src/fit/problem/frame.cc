@@ -1,0 +1,99 @@
+#include "fit/problem/frame.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "fit/problem/light.h"
+#include "fit/weights/noise.h"
+
+namespace birefit::estimation {
+namespace {
+
+/// The config's start values, or where it is better informed, what an earlier fit knows.
+Theta start_of(const FitJob& job) {
+  Theta theta = job.parameters.values();
+  if (!job.prior) return theta;
+  for (std::size_t i = 0; i < job.prior->names.size(); ++i)
+    if (const ParameterRef ref = job.parameters.find(job.prior->names[i]); ref && job.parameters[ref].free)
+      theta[static_cast<std::size_t>(ref.index)] = std::clamp(job.prior->mean[static_cast<Eigen::Index>(i)],
+                                                              job.parameters[ref].lower, job.parameters[ref].upper);
+  return theta;
+}
+
+}  // namespace
+
+Start prepare(const Task& task) {
+  const FitJob& job = task.job;
+  if (job.micrographs.empty()) throw UserError(Where{}, "there is no image to fit");
+  Start start;
+  start.theta = start_of(job);
+  start.searched.resize(static_cast<Eigen::Index>(task.unknowns.searched.size()));
+  for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)
+    start.searched[static_cast<Eigen::Index>(j)] = start.theta[static_cast<std::size_t>(task.unknowns.searched[j])];
+  std::size_t used = 0;
+  for (const Micrograph& micrograph : job.micrographs) {
+    Frame frame;
+    frame.plan = plan(micrograph.scene, start.theta);
+    frame.noise = micrograph.noise ? *micrograph.noise : estimate_noise(micrograph);
+    frame.sigma = standard_deviation(micrograph, frame.noise, smoothed(micrograph));
+    frame.pixels = usable_pixels(micrograph, frame.sigma);
+    if (frame.pixels.empty())
+      throw UserError(Where{}, micrograph.name + " has no usable pixel", "check mask, roi_px and saturation_counts");
+    used += frame.pixels.size();
+    start.frames.push_back(std::move(frame));
+  }
+  if (used <= static_cast<std::size_t>(task.unknowns.size()))
+    throw UserError(Where{}, fmt::format("{} usable pixels cannot determine {} parameters", used, task.unknowns.size()),
+                    "check mask and roi_px");
+  return start;
+}
+
+bool are_rows(const Frames& frames) {
+  return std::all_of(frames.begin(), frames.end(), [](const Frame& frame) { return frame.pixels.size() == 1; });
+}
+
+bool by_waves(const Frames& frames) {
+  return std::any_of(frames.begin(), frames.end(), [](const Frame& frame) { return frame.plan.wave != nullptr; });
+}
+
+std::string table_of(const std::string& row) { return row.substr(0, row.rfind(':')); }
+
+std::vector<Misfit> misfit_of_prior(const Task& task, const Theta& theta) {
+  std::vector<Misfit> misfit(static_cast<std::size_t>(task.frames()));
+  if (task.job.prior && task.job.prior->frame_scatter)
+    for (int g = 0; g < task.frames(); ++g) {
+      Misfit& own = misfit[static_cast<std::size_t>(g)];
+      own.mean_sd = task.job.prior->frame_scatter->intensity_sd * std::abs(task.gain_of(g, theta));
+      own.mean_follows_shape = false;
+    }
+  return misfit;
+}
+
+std::unique_ptr<LeastSquares> problem_of(const Task& task, const Frames& frames, const std::vector<Misfit>& misfit) {
+  std::vector<PixelSet> sets;
+  std::vector<RenderPlan> plans;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Frame& frame = frames[static_cast<std::size_t>(g)];
+    sets.push_back(pixel_set(task.micrograph(g), frame.sigma, frame.pixels));
+    plans.push_back(frame.plan);
+  }
+  auto problem = std::make_unique<LeastSquares>(task.job, task.unknowns, std::move(plans), std::move(sets));
+  problem->set_misfit(misfit);
+  return problem;
+}
+
+Image fitted_image(const Task& task, const Frames& frames, int frame, const Theta& theta) {
+  const Micrograph& micrograph = task.micrograph(frame);
+  const RenderPlan& plan = frames[static_cast<std::size_t>(frame)].plan;
+  return lit(micrograph, theta, render(micrograph.scene, plan, theta, {}, task.job.options.threads).intensity);
+}
+
+Frames replanned(const Task& task, Frames frames, const Theta& theta) {
+  for (int g = 0; g < task.frames(); ++g)
+    frames[static_cast<std::size_t>(g)].plan = plan(task.micrograph(g).scene, theta);
+  return frames;
+}
+
+}  // namespace birefit::estimation

@@ -1,0 +1,49 @@
+#pragma once
+// How each micrograph of a fit is rendered and weighed.
+
+#include <memory>
+#include <vector>
+
+#include "fit/problem/task.h"
+
+namespace birefit::estimation {
+
+struct Frame {
+  RenderPlan plan;
+  NoiseModel noise;
+  Image sigma;    ///< standard deviation of every pixel's value, in its units
+  Pixels pixels;  ///< that take part
+};
+using Frames = std::vector<Frame>;
+
+/// Where a fit begins: plans, noise and pixels at the start values.
+struct Start {
+  Frames frames;
+  Theta theta;
+  Eigen::VectorXd searched;
+};
+
+/// Throws UserError for a job that no fit can be made of: no image, no usable pixel, fewer pixels than unknowns.
+Start prepare(const Task& task);
+
+/// Micrographs of one pixel each: rows of a table.
+bool are_rows(const Frames& frames);
+/// Some frame's picture is by wave optics.
+bool by_waves(const Frames& frames);
+/// Rows of a signal table are micrographs of one pixel named file:line.
+std::string table_of(const std::string& row);
+
+/// What is known of the misfit before a fit: of a single frame through the prior of a calibration, its mean has the
+/// misfit that the calibration's frames had.
+std::vector<Misfit> misfit_of_prior(const Task& task, const Theta& theta);
+
+/// The problem of all frames' pixels.
+std::unique_ptr<LeastSquares> problem_of(const Task& task, const Frames& frames, const std::vector<Misfit>& misfit);
+
+/// The values that the model has for a frame's whole image.
+Image fitted_image(const Task& task, const Frames& frames, int frame, const Theta& theta);
+
+/// Frames planned anew where `theta` is.
+Frames replanned(const Task& task, Frames frames, const Theta& theta);
+
+}  // namespace birefit::estimation

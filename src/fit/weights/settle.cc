@@ -1,0 +1,168 @@
+#include "fit/weights/settle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include <fmt/format.h>
+
+#include "fit/weights/noise.h"
+
+namespace birefit::estimation {
+namespace {
+
+/// A plan that resolves more than the one the solver worked with, or resolves it elsewhere.
+bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
+  if (now.method != before.method || (now.disc.empty() && now.steps > before.steps) ||
+      now.mesh.size() > before.mesh.size() || now.radial_panels > before.radial_panels ||
+      now.centre_panels > before.centre_panels ||
+      !std::equal(now.part_panels.begin(), now.part_panels.end(), before.part_panels.begin(), before.part_panels.end(),
+                  std::less_equal<>()) ||
+      (before.fringe_means && !now.fringe_means))
+    return true;
+  if (outgrown(now, before)) return true;
+  const double moved = std::hypot(now.sampling_center_x_px - before.sampling_center_x_px,
+                                  now.sampling_center_y_px - before.sampling_center_y_px);
+  if (now.samples != before.samples && moved > before.sampling_bin_px) return true;
+  for (std::size_t i = 0; i < now.samples.size(); ++i)
+    if (now.samples[i] > (i < before.samples.size() ? before.samples[i] : 1)) return true;
+  return false;
+}
+
+/// The noise of the frames whose residual is clearly quieter than their image was. True where one is.
+bool lower_noise(const Task& task, Optimum& optimum) {
+  // What the image's own differences call noise may be fringes. Those of the residual may hold misfit: both are upper
+  // bounds, and the fit takes the residual's when it is clearly lower.
+  constexpr double kClearly = 0.8;
+  bool lower = false;
+  for (int g = 0; g < task.frames() && !optimum.stopped; ++g) {
+    Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+    if (!frame.noise.estimated) continue;
+    const Micrograph& micrograph = task.micrograph(g);
+    const Image image = fitted_image(task, optimum.frames, g, optimum.theta);
+    const NoiseModel again = estimate_noise(micrograph, &image);
+    if (mean_variance(micrograph, again, image) >= kClearly * mean_variance(micrograph, frame.noise, image)) continue;
+    frame.noise = again;
+    frame.sigma = standard_deviation(micrograph, again, image);
+    lower = true;
+  }
+  return lower;
+}
+
+}  // namespace
+
+Optimum with_settled_weights(const Task& task, Optimum optimum) {
+  if (lower_noise(task, optimum)) {
+    rebuild(task, optimum);
+    optimum.iterations.clear();  // chi-square in other units; the report draws one curve
+    solve_again(task, optimum, "noise from the residual");
+  }
+  for (int pass = 0; pass < 3 && !optimum.stopped; ++pass) {
+    const bool by_signal = std::any_of(optimum.frames.begin(), optimum.frames.end(),
+                                       [](const Frame& f) { return f.noise.counts_per_photon != 0; });
+    if (pass > 0 && !by_signal) break;  // the weights do not depend on the signal
+    for (int g = 0; g < task.frames(); ++g) {
+      Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+      frame.sigma =
+          standard_deviation(task.micrograph(g), frame.noise, fitted_image(task, optimum.frames, g, optimum.theta));
+    }
+    const Candidate before{optimum.searched, 0, projected_information(*optimum.problem)};
+    rebuild(task, optimum);
+    solve_again(task, optimum, "reweighted");
+    constexpr double kStill = 0.02;  // standard errors
+    if (separation(before, optimum.searched) < kStill) break;
+  }
+  return optimum;
+}
+
+Optimum with_settled_plans(const Task& task, Optimum optimum) {
+  for (int round = 0; round < 2 && !optimum.stopped; ++round) {
+    bool grown = false;
+    for (int g = 0; g < task.frames(); ++g) {
+      RenderPlan& planned = optimum.frames[static_cast<std::size_t>(g)].plan;
+      try {
+        RenderPlan now = plan(task.micrograph(g).scene, optimum.theta);
+        if (!asks_for_more(now, planned)) continue;
+        planned = std::move(now);
+        grown = true;
+      } catch (const UserError& error) {
+        // Bounds that each are possible need not be so together.
+        optimum.possible = false;
+        optimum.warnings.push_back("The search ended where the scene cannot be: " + error.problems().front().what +
+                                   ". Narrower bounds keep it away from there.");
+        return optimum;
+      }
+    }
+    if (!grown) break;
+    task.say("the model needs finer steps here: solving once more");
+    rebuild(task, optimum);
+    solve_again(task, optimum, "replanned");
+  }
+  return optimum;
+}
+
+Outliers outliers_of(const Task& task, const Optimum& optimum, int g) {
+  const Micrograph& micrograph = task.micrograph(g);
+  const Image& sigma = optimum.frames[static_cast<std::size_t>(g)].sigma;
+  const Image fitted = fitted_image(task, optimum.frames, g, optimum.theta);
+  Image whitened(fitted.width(), fitted.height());
+  Mask used(fitted.width(), fitted.height(), 0);
+  for (const auto& [x, y] : usable_pixels(micrograph, sigma)) {
+    used(x, y) = 1;
+    whitened(x, y) = (micrograph.values(x, y) - fitted(x, y)) / sigma(x, y);
+  }
+  return find_outliers(whitened, used);
+}
+
+namespace {
+
+/// Judges a frame's pixels anew; true where others are left out than before.
+bool leave_out(const Task& task, Optimum& optimum, int g, bool first_round) {
+  const Micrograph& micrograph = task.micrograph(g);
+  Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+  Outliers& before = optimum.left_out[static_cast<std::size_t>(g)];
+  Outliers found = outliers_of(task, optimum, g);
+  const Pixels usable = usable_pixels(micrograph, frame.sigma);
+  // So much cannot be dust: then the model is wrong, and leaving out what shows it would hide that.
+  if (found.count > kMostOutliers * static_cast<double>(usable.size())) {
+    if (first_round || before.count > 0)
+      optimum.warnings.push_back(
+          fmt::format("{}: {:.2g} % of the pixels stand out of the residual, more than dust would: none was left out. "
+                      "Mask what is foreign, or change the model.",
+                      micrograph.name, 100.0 * found.count / static_cast<double>(usable.size())));
+    found = {};
+  }
+  if (found.count == before.count && (found.count == 0 || found.pixels.values() == before.pixels.values()))
+    return false;
+  frame.pixels.clear();
+  for (const auto& [x, y] : usable)
+    if (found.count == 0 || !found.pixels(x, y)) frame.pixels.push_back({x, y});
+  if (frame.noise.estimated) {  // a scratch looks like noise
+    Micrograph seen = micrograph;
+    for (std::size_t i = 0; found.count > 0 && i < seen.mask.values().size(); ++i)
+      if (found.pixels.values()[i]) seen.mask.values()[i] = 0;
+    const Image fitted = fitted_image(task, optimum.frames, g, optimum.theta);
+    frame.noise = estimate_noise(seen, &fitted);
+    frame.sigma = standard_deviation(seen, frame.noise, fitted);
+  }
+  before = std::move(found);
+  return true;
+}
+
+}  // namespace
+
+Optimum with_settled_outliers(const Task& task, Optimum optimum) {
+  optimum.left_out.assign(static_cast<std::size_t>(task.frames()), {});
+  if (!task.job.options.leave_out_outliers || are_rows(optimum.frames)) return optimum;
+  constexpr int kMostRounds = 10;
+  for (int round = 0; round < kMostRounds && !optimum.stopped; ++round) {
+    bool changed = false;
+    for (int g = 0; g < task.frames(); ++g) changed = leave_out(task, optimum, g, round == 0) || changed;
+    if (!changed) break;
+    rebuild(task, optimum);
+    solve_again(task, optimum, "without outliers");
+  }
+  return optimum;
+}
+
+}  // namespace birefit::estimation
