@@ -16,11 +16,12 @@
 
 namespace birefit {
 
-/// Variance of one pixel's counts: read_counts^2 + counts_per_photon * max(signal counts, 0).
+/// Variance of one pixel's counts: read_counts^2 + counts_per_photon * max(signal counts - black_counts, 0).
 struct NoiseModel {
-  double read_counts = 0;
-  double counts_per_photon = 0;
-  bool estimated = false;  ///< from the image itself
+  double read_counts = 0;        ///< >= 0
+  double counts_per_photon = 0;  ///< >= 0
+  bool estimated = false;        ///< from the image itself
+  double black_counts = 0;       ///< the signal up to which there is read noise alone: a camera's black level
 };
 
 /// What light adds across an image: `coefficient`, in units of the values, times a shape; to the gain (uneven illumination, vignetting) or

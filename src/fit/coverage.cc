@@ -63,7 +63,7 @@ Image simulated(const Micrograph& micrograph, const MicrographResult& of, std::m
     return values;
   }
   const Image sd = standard_deviation(micrograph, of.noise, of.fitted);
-  const bool photons = of.noise.counts_per_photon > 0 && micrograph.variance_scale.empty();
+  const bool photons = of.noise.counts_per_photon > 0 && of.noise.black_counts == 0 && micrograph.variance_scale.empty();
   std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < values.size(); ++i) {
     double& value = values.values()[i];

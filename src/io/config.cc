@@ -225,10 +225,13 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   positive.lower_open = true;
   settings.saturation_counts = reader.plain(block, "saturation_counts", positive);
   if (block.find("noise")) {
-    const Block noise = reader.block(block, "noise", {"read_counts", "counts_per_photon"}, true);
+    const Block noise = reader.block(block, "noise", {"read_counts", "counts_per_photon", "black_counts"}, true);
     NoiseModel model;
     model.read_counts = reader.plain(noise, "read_counts", counts).value_or(0);
     model.counts_per_photon = reader.plain(noise, "counts_per_photon", counts).value_or(0);
+    NumberSpec level = counts;
+    level.lower = -1e9;
+    model.black_counts = reader.plain(noise, "black_counts", level).value_or(0);
     const bool given = noise.find("read_counts") || noise.find("counts_per_photon");
     if (noise.node && !given) reader.missing(noise, "read_counts or counts_per_photon", "leave noise out to estimate it");
     else if (noise.node && model.read_counts == 0 && model.counts_per_photon == 0)

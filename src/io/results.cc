@@ -141,8 +141,10 @@ std::string log_text(const Config& config, const FitResult& result) {
     if (!config.signals.empty() && row) continue;  // the first row of a table speaks for the others
     text += fmt::format("\nmicrograph {}\n  {} pixels used, chi-square {:.6g}, residual rms {:.4g}\n", m.name, m.used,
                         m.chi_square, m.residual_rms);
-    text += fmt::format("  noise: read {:.4g} counts, {:.4g} counts per photon{}\n", m.noise.read_counts,
-                        m.noise.counts_per_photon, m.noise.estimated ? " (estimated from the image)" : "");
+    text += fmt::format("  noise: read {:.4g} counts, {:.4g} counts per photon{}{}\n", m.noise.read_counts,
+                        m.noise.counts_per_photon,
+                        m.noise.black_counts != 0 ? fmt::format(" above {:.4g} counts", m.noise.black_counts) : "",
+                        m.noise.estimated ? " (estimated from the image)" : "");
     text += fmt::format("  method {} ({}), numerical error {:.2g}, model error {:.2g}\n", m.plan.method, m.plan.physics,
                         m.plan.numerical_error, m.plan.model_error);
     for (const std::string& reason : m.plan.reasons) text += "    " + reason + "\n";
@@ -251,6 +253,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
                            {"noise",
                             {{"read_counts", number(m.noise.read_counts)},
                              {"counts_per_photon", number(m.noise.counts_per_photon)},
+                             {"black_counts", number(m.noise.black_counts)},
                              {"estimated", m.noise.estimated}}},
                            {"pixels", pixels_json(counts)},
                            {"model", plan_json(m.plan)}});

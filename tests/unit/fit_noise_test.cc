@@ -16,6 +16,11 @@ struct Truth {
   double read, counts_per_photon;
 };
 
+double variance_at(const NoiseModel& noise, double signal) {
+  const double light = std::max(0.0, signal - noise.black_counts);
+  return noise.read_counts * noise.read_counts + noise.counts_per_photon * light;
+}
+
 /// Fringes of the given period along the diagonal, 100 to 3100 counts, Gaussian read and photon noise, rounded.
 Micrograph fringes(const Truth& truth, double period, unsigned seed, bool rounded = true) {
   std::mt19937_64 random(seed);
@@ -43,7 +48,7 @@ TEST(NoiseEstimate, FindsReadAndPhotonNoiseUnderFringes) {
       // a robust variance to about 3 %; three of that.
       for (const double signal : {300.0, 1600.0, 3000.0}) {
         const double expected = truth.read * truth.read + truth.counts_per_photon * signal;
-        const double found = noise.read_counts * noise.read_counts + noise.counts_per_photon * signal;
+        const double found = variance_at(noise, signal);
         EXPECT_NEAR(found, expected, 0.1 * expected) << truth.read << ' ' << truth.counts_per_photon << ' ' << period;
       }
       EXPECT_NEAR(noise.counts_per_photon, truth.counts_per_photon, 0.1 * truth.counts_per_photon + 0.03);
@@ -60,7 +65,7 @@ TEST(NoiseEstimate, IgnoresDustAndMaskedPixels) {
   }
   const NoiseModel noise = estimate_noise(micrograph);
   // 150 specks spoil 25 differences each, 6 % of all: the median moves by about that.
-  EXPECT_NEAR(std::sqrt(noise.read_counts * noise.read_counts + 1500 * noise.counts_per_photon), 20, 0.15 * 20);
+  EXPECT_NEAR(std::sqrt(variance_at(noise, 1500)), 20, 0.15 * 20);
 }
 
 TEST(NoiseEstimate, NeverFallsBelowTheRoundingOfCounts) {
@@ -78,9 +83,154 @@ TEST(NoiseEstimate, IsInCountsWhenValuesAreTransmission) {
   for (double& value : micrograph.values.values()) value /= kBright;
   const NoiseModel noise = estimate_noise(micrograph);
   const double expected = truth.read * truth.read + truth.counts_per_photon * 1600;
-  EXPECT_NEAR(noise.read_counts * noise.read_counts + noise.counts_per_photon * 1600, expected, 0.1 * expected);
+  EXPECT_NEAR(variance_at(noise, 1600), expected, 0.1 * expected);
   const Image sd = standard_deviation(micrograph, {truth.read, truth.counts_per_photon, false}, Image(256, 256, 0.4));
   EXPECT_NEAR(sd(100, 100), std::sqrt(expected) / kBright, 1e-12);
+}
+
+/// One camera and one picture: what is random about them, and what the noise of a pixel then is.
+struct Camera {
+  double step, black, read, counts_per_photon, low, high, period, bright = 0;  // counts; bright: parallel - dark
+  bool clipped = false;                                                          // at code 0
+  double signal(int x, int y) const {
+    const double s = std::sin(std::numbers::pi * (0.8 * x + 0.6 * y) / period);
+    return low + (high - low) * s * s;
+  }
+  /// The camera's own and that of rounding.
+  double sd(double signal) const {
+    const double light = std::max(0.0, signal - black);
+    return std::sqrt(read * read + counts_per_photon * light + step * step / 12);
+  }
+  Micrograph picture(unsigned seed) const {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    constexpr int kSize = 256;
+    Micrograph micrograph;
+    micrograph.values = Image(kSize, kSize);
+    micrograph.mask = Mask(kSize, kSize, 1);
+    if (bright > 0) micrograph.variance_scale = Image(kSize, kSize, 0);
+    for (int y = 0; y < kSize; ++y)
+      for (int x = 0; x < kSize; ++x) {
+        const double s = signal(x, y), light = std::max(0.0, s - black);
+        const double sd = std::sqrt(read * read + counts_per_photon * light);
+        double value = step * std::round((s + sd * normal(random)) / step);
+        if (clipped) value = std::max(0.0, value);
+        micrograph.values(x, y) = value;
+        if (bright <= 0) continue;
+        const double lamp = bright * (1 - 0.3 * x / kSize);  // brighter on one side
+        micrograph.values(x, y) /= lamp;
+        micrograph.variance_scale(x, y) = 1 / (lamp * lamp);
+      }
+    return micrograph;
+  }
+};
+
+/// Noise of any kind, a black level, clipping, 5 to 16 bits, counts or transmission. With less noise than a third of a
+/// code the rounding of a flat place is one number, not a scatter.
+Camera any_camera(std::mt19937_64& random) {
+  const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+  Camera c{};
+  const double codes = std::pow(2.0, std::floor(uniform(5, 17)));
+  const bool transmission = uniform(0, 1) < 0.3;
+  c.step = !transmission && uniform(0, 1) < 0.3 ? 3 : 1;  // a stretched picture leaves out codes
+  const double top = c.step * (codes - 1);
+  c.black = transmission || uniform(0, 1) < 0.5 ? 0 : uniform(0, 0.2) * top;  // calibration takes it off
+  c.low = c.black + uniform(0, 0.05) * top;
+  c.high = c.low + uniform(0.3, 0.7) * top;
+  c.read = std::max(0.35 * c.step, uniform(0, 0.02) * top);
+  c.counts_per_photon = uniform(0, 1) < 0.3 ? 0 : uniform(0, 1) * 0.0004 * top;
+  c.period = uniform(14, 60);
+  c.clipped = uniform(0, 1) < 0.4;
+  if (c.clipped) c.low -= c.black, c.high -= c.black, c.black = 0;
+  if (c.clipped) c.low -= uniform(0, 0.3) * (c.high - c.low);  // a dark frame too bright was taken off
+  if (transmission) c.bright = uniform(1, 2) * c.high;
+  return c;
+}
+
+TEST(NoiseEstimate, IsRightAtEveryLevelForAnyCamera) {
+  std::mt19937_64 random(20250117);
+  for (int draw = 0; draw < 60; ++draw) {
+    const Camera camera = any_camera(random);
+    const Micrograph micrograph = camera.picture(1000 + static_cast<unsigned>(draw));
+    const NoiseModel noise = estimate_noise(micrograph);
+    for (const double share : {0.0, 0.1, 0.3, 0.6, 0.9, 1.0}) {
+      const double signal = camera.low + share * (camera.high - camera.low), expected = camera.sd(signal);
+      const double found = std::sqrt(variance_at(noise, signal));
+      // Of a cut picture the noise shows where whole neighbourhoods are above the cut; below, it is not to be too low.
+      if (camera.clipped && signal < 0.5 * camera.high) {
+        if (signal > 0) EXPECT_GT(found, 0.5 * expected) << "draw " << draw;
+        continue;
+      }
+      // A fringe's dark end has at least 5 % of the pixels: 3300 differences, of which a seventh are independent, know
+      // a standard deviation by its median to 1.17 / sqrt(470) = 5 %, and a line through all levels better. Twice that.
+      EXPECT_NEAR(found, expected, 0.1 * expected)
+          << "draw " << draw << ", step " << camera.step << ", black " << camera.black << ", read " << camera.read
+          << ", per photon " << camera.counts_per_photon << ", " << camera.low << " to " << camera.high << ", period "
+          << camera.period << ", clipped " << camera.clipped << ", transmission " << camera.bright << ", share "
+          << share;
+    }
+  }
+}
+
+TEST(NoiseEstimate, KnowsRoundingWhereNoiseIsFarBelowACode) {
+  std::mt19937_64 random(11);
+  for (int draw = 0; draw < 20; ++draw) {
+    Camera camera = any_camera(random);
+    if (camera.clipped) continue;
+    camera.read = 0.1 * camera.step, camera.counts_per_photon = 0;
+    camera.period = 60;  // of 65536 codes, finer fringes leave more than a code in differences
+    const NoiseModel noise = estimate_noise(camera.picture(2000 + static_cast<unsigned>(draw)));
+    const double found = std::sqrt(variance_at(noise, camera.high));
+    // At one place the error of rounding is anything up to half a code, on the whole 0.29 codes.
+    EXPECT_GT(found, camera.step * 0.29 * (1 - 1e-2)) << draw;
+    EXPECT_LT(found, camera.step * 0.5) << draw;
+  }
+}
+
+/// Noise that grows faster than light (a pattern of the sensor, a scratched sample) puts a straight line's read noise
+/// below zero: no level may weigh more than four times what its own scatter justifies.
+TEST(NoiseEstimate, NeverEndsAtTheFloorWhereThePictureScatters) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  for (const double pattern : {0.02, 0.05, 0.2}) {
+    Micrograph micrograph;
+    micrograph.values = Image(200, 200);
+    micrograph.mask = Mask(200, 200, 1);
+    const auto sd = [&](double s) { return std::hypot(45.0, pattern * s); };
+    for (int y = 0; y < 200; ++y)
+      for (int x = 0; x < 200; ++x) {
+        const double s = 20 + 4000 * std::pow(std::sin(0.05 * x), 2);
+        micrograph.values(x, y) = std::round(s + sd(s) * normal(random));
+      }
+    const NoiseModel noise = estimate_noise(micrograph);
+    for (const double s : {20.0, 200.0, 1000.0, 4000.0}) {
+      const double found = std::sqrt(variance_at(noise, s));
+      EXPECT_GT(found, 0.5 * sd(s)) << pattern << ' ' << s;
+      EXPECT_LT(found, 4 * sd(s)) << pattern << ' ' << s;
+    }
+  }
+}
+
+/// Of a background cut off at code 0 half of the pixels scatter no more: the others tell the noise.
+TEST(NoiseEstimate, IsThatOfTheOthersWhereHalfOfThePixelsAreCutOff) {
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  for (const double background : {-300.0, -30.0, 0.0}) {
+    Micrograph micrograph;
+    micrograph.values = Image(256, 256);
+    micrograph.mask = Mask(256, 256, 1);
+    for (int y = 0; y < 256; ++y)
+      for (int x = 0; x < 256; ++x) {
+        const double r = std::hypot(x - 128, y - 128);
+        const double s = r < 90 ? 2000 * std::pow(std::sin(0.002 * (90 * 90 - r * r) / 4), 2) + 100 : background;
+        micrograph.values(x, y) = std::max(0.0, std::round(s + 20 * normal(random)));
+      }
+    const NoiseModel noise = estimate_noise(micrograph);
+    for (const double s : {200.0, 1000.0, 2000.0})
+      // The fringes of 10 pixels' period at the edge add to the median: 10 % of noise, 5 % of fringes.
+      EXPECT_NEAR(std::sqrt(variance_at(noise, s)), 20, 0.15 * 20)
+          << background << ' ' << s;
+  }
 }
 
 }  // namespace
