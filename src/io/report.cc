@@ -588,9 +588,12 @@ std::string input_table(const FitResult& result) {
   std::vector<std::size_t> shown;
   for (std::size_t j = 0; j < result.parameters.size() && shown.size() < kMostParameters; ++j)
     if (!result.parameters[j].linear && result.parameters[j].unit != "px" && std::isfinite(result.parameters[j].stderr_)) shown.push_back(j);
-  if (result.inputs.empty() || shown.empty()) return {};
-  std::string out =
-      "<h2>Taken as exact</h2>\n<p>What the estimates would change by, to first order, if an input were otherwise; in brackets over the standard error. An input with a "
+  if (shown.empty()) return {};
+  std::string out = result.inputs.empty() && result.taken_as_exact.empty() ? "" : "<h2>Taken as exact</h2>\n";
+  if (!result.taken_as_exact.empty()) out += list(result.taken_as_exact);
+  if (result.inputs.empty()) return out;
+  out +=
+      "<p>What the estimates would change by if an input were otherwise; in brackets over the standard error. An input with a "
       "<code>prior_sd</code> is fitted, and its uncertainty counted.</p>\n<div class=\"scroll\"><table>\n<tr><th>input</th><th>value</th><th>more by</th>";
   for (const std::size_t j : shown) out += "<th>" + escape_html(short_name(result.parameters[j].name)) + "</th>";
   out += "</tr>\n";

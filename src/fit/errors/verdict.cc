@@ -149,10 +149,12 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
     }
 }
 
-std::string verdict(const FitResult& result, bool signal) {
-  std::vector<std::string> sentences;
-  const bool rows = std::all_of(result.micrographs.begin(), result.micrographs.end(),
-                                [](const MicrographResult& m) { return m.used == 1; });
+namespace {
+
+using Sentences = std::vector<std::string>;
+
+/// How the fit ended, and what the data do not tell.
+void say_state(const FitResult& result, bool signal, bool rows, Sentences& sentences) {
   if (result.interrupted)
     sentences.push_back("The fit was interrupted: these are the best values so far, not a result.");
   else if (!result.converged)
@@ -181,6 +183,9 @@ std::string verdict(const FitResult& result, bool signal) {
     sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),
                                     others.size() == 1 ? "um" : "a", joined(others)));
   }
+}
+
+void say_bounds(const FitResult& result, Sentences& sentences) {
   for (const ParameterEstimate& estimate : result.parameters) {
     if (!estimate.at_bound && estimate.limit.empty()) continue;
     const std::string name = short_name(estimate.name), unit = unit_suffix(estimate);
@@ -200,15 +205,11 @@ std::string verdict(const FitResult& result, bool signal) {
           fmt::format("{}{} is at most {:.4g}{} with 95 % confidence: the data do not tell it from {:.6g}{}.", below,
                       name, estimate.limit_value, unit, estimate.lower, unit));
   }
-  std::vector<std::string> values;
+}
+
+/// True where one is: its sentence comes before the values.
+bool say_contradictions(const FitResult& result, Sentences& sentences) {
   bool contradicted = false;
-  if (signal)
-    for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
-      const ParameterEstimate& estimate = result.parameters[j];
-      if (estimate.linear || !std::isfinite(estimate.stderr_) || estimate.at_bound || !estimate.limit.empty()) continue;
-      values.push_back(fmt::format("{} = {}{}", name_of(result, j), with_error(estimate.value, estimate.stderr_),
-                                   unit_suffix(estimate)));
-    }
   for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
     const ParameterEstimate& p = result.parameters[j];
     if (!p.prior_value || !p.prior_sd || !std::isfinite(p.stderr_)) continue;
@@ -225,6 +226,18 @@ std::string verdict(const FitResult& result, bool signal) {
                     name_of(result, j), with_error(p.value, p.stderr_), with_error(*p.prior_value, *p.prior_sd),
                     unit_suffix(p), away));
   }
+  return contradicted;
+}
+
+void say_values(const FitResult& result, bool signal, Sentences& sentences) {
+  std::vector<std::string> values;
+  if (signal)
+    for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
+      const ParameterEstimate& estimate = result.parameters[j];
+      if (estimate.linear || !std::isfinite(estimate.stderr_) || estimate.at_bound || !estimate.limit.empty()) continue;
+      values.push_back(fmt::format("{} = {}{}", name_of(result, j), with_error(estimate.value, estimate.stderr_),
+                                   unit_suffix(estimate)));
+    }
   if (!values.empty()) sentences.push_back(joined(values) + " (standard errors: " + result.covariance_kind + ").");
   for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
     const ParameterEstimate& p = result.parameters[j];
@@ -232,14 +245,10 @@ std::string verdict(const FitResult& result, bool signal) {
       sentences.push_back(fmt::format("The 95 % interval of {} is {:.4g} to {:.4g}{}, by its profile likelihood.",
                                       name_of(result, j), p.interval95_low, p.interval95_high, unit_suffix(p)));
   }
-  if (result.has_answer())
-    sentences.push_back(fmt::format(
-        "Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
-        result.reduced_chi_square > 2 && contradicted ? ", that contradiction included"
-        : result.reduced_chi_square > 2
-            ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise"
-            : ""));
-  // The inputs whose error would be the estimates'.
+}
+
+/// The inputs whose error would be the estimates'.
+void say_inputs(const FitResult& result, bool signal, Sentences& sentences) {
   std::vector<std::string> inputs;
   for (const InputEffect& input : result.inputs) {
     int most = -1;
@@ -260,6 +269,26 @@ std::string verdict(const FitResult& result, bool signal) {
                                           : fmt::format("{:+.2g}{}", shift, unit_suffix(p))));
   }
   if (signal && !inputs.empty()) sentences.push_back("Taken as exact: " + joined(inputs) + ".");
+}
+
+}  // namespace
+
+std::string verdict(const FitResult& result, bool signal) {
+  const bool rows = std::all_of(result.micrographs.begin(), result.micrographs.end(),
+                                [](const MicrographResult& m) { return m.used == 1; });
+  Sentences sentences;
+  say_state(result, signal, rows, sentences);
+  say_bounds(result, sentences);
+  const bool contradicted = say_contradictions(result, sentences);
+  say_values(result, signal, sentences);
+  if (result.has_answer())
+    sentences.push_back(fmt::format(
+        "Reduced chi-square {:.3g}{}.", result.reduced_chi_square,
+        result.reduced_chi_square > 2 && contradicted ? ", that contradiction included"
+        : result.reduced_chi_square > 2
+            ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise"
+            : ""));
+  say_inputs(result, signal, sentences);
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
   return text;

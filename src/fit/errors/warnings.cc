@@ -107,6 +107,31 @@ void warn_of_misfit(const std::string& name, const Rows& rows, FitResult& result
                          : "; the errors allow for it as far as the residuals show it."));
 }
 
+/// What is said of several micrographs in the same words ("NAME: words") is one line.
+std::vector<std::string> with_shared_lines(const Task& task, const std::vector<std::string>& warnings) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> said;  // words, of whom; of nobody: a line as it is
+  for (const std::string& warning : warnings) {
+    const auto of = std::find_if(task.job.micrographs.begin(), task.job.micrographs.end(),
+                                 [&](const Micrograph& m) { return warning.starts_with(m.name + ": "); });
+    const bool named = of != task.job.micrographs.end();
+    const std::string words = named ? warning.substr(of->name.size() + 2) : warning;
+    const auto same = std::find_if(said.begin(), said.end(), [&](const auto& line) {
+      return named && !line.second.empty() && line.first == words;
+    });
+    if (same == said.end())
+      said.push_back({words, named ? std::vector<std::string>{of->name} : std::vector<std::string>{}});
+    else
+      same->second.push_back(of->name);
+  }
+  std::vector<std::string> lines;
+  for (const auto& [words, names] : said)
+    lines.push_back(names.empty() ? words
+                    : names.size() == 1
+                        ? names.front() + ": " + words
+                        : fmt::format("{} images ({} .. {}): {}", names.size(), names.front(), names.back(), words));
+  return lines;
+}
+
 }  // namespace
 
 void report_micrographs(const Task& task, const Optimum& optimum, FitResult& result) {
@@ -156,6 +181,7 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
   for (const ParameterEstimate& estimate : result.parameters)
     if (estimate.prior_sd && estimate.stderr_ > 0.98 * *estimate.prior_sd)
       warn(result, fmt::format("The image adds nothing to the prior on {}.", estimate.name));
+  result.warnings = with_shared_lines(task, result.warnings);
 }
 
 }  // namespace birefit::estimation

@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Pictures that once were answered wrongly, with exit code 0, or not at all; made by programs that share no code with this one
+# (tests/data/cases). usage: cases.sh BIREFIT SOURCE_DIR
+set -u
+birefit=$(realpath "$1")
+cases=$2/tests/data/cases
+failures=0
+fail() { echo "FAIL $1"; failures=$((failures + 1)); }
+
+fit_case() { "$birefit" fit "$cases/$1/config.yaml" --out "out_$1" > "$1.txt" 2> "$1.err"; }
+# A parameter, by the end of its name, lies within five standard errors of the truth: "name = value +/- error ..".
+holds() {  # CASE NAME TRUTH
+  awk -v name="$2" -v truth="$3" '
+    $1 ~ name "$" && $2 == "=" && $4 == "+/-" {
+      found = 1
+      off = $3 - truth
+      inside = $5 > 0 && off * off < 25 * $5 * $5
+    }
+    END { exit !(found && inside) }' "$1.txt" || fail "$1: $2 = $3 is not $(grep -m1 "$2 *=" "$1.txt")"
+}
+
+# The better of two minima that are 35 degrees of twist apart, and one 40 % of the birefringence away.
+fit_case twisted_1 || fail 'twisted_1: no answer'
+holds twisted_1 twist_deg 83.982
+holds twisted_1 birefringence 0.207816
+fit_case twisted_2 || fail 'twisted_2: no answer'
+holds twisted_2 twist_deg 101.904
+holds twisted_2 birefringence 0.188238
+
+# A pixel size 2 % too large: what is taken as exact says that the diameter goes along with it, whatever the residual is.
+fit_case pixel_size || fail 'pixel_size: no answer'
+grep -o 'more of micrograph.pixel_size_um makes diameter_um +[0-9.]*' pixel_size.txt | awk '{ by = $NF } END { exit !(by > 0.8 && by < 1.2) }' ||
+  fail "pixel_size: $(grep -o 'Taken as exact.*' pixel_size.txt)"
+
+[ $failures -eq 0 ] && echo 'all as required' || echo "$failures failures"
+exit $((failures > 0))
