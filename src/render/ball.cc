@@ -375,25 +375,17 @@ class BallImage final : public PixelModel<S> {
   S intensity(const P& column, const P& row) const override {
     const auto place = view_.at(column, row);
     const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
-    if (birefit::none(inside)) return S(0.0);
-    return select(inside, through(place, inside), S(0.0));
+    const S beside = passing_.at(view_, place);
+    if (birefit::none(inside)) return beside;
+    return beside + select(inside, through(place, inside), S(0.0));
   }
-  int edges() const override { return shell_in(optics_) ? 2 : 1; }
-  P beyond_edge(int edge, const P& column, const P& row) const override {
+  bool has_edge() const override { return shell_in(optics_) != nullptr; }
+  P beyond_edge(const P& column, const P& row) const override {
     const auto place = view_.at(column, row);
-    const P fraction = place.rho_um * plain(inverse_edge_);
-    if (edge == 0) return P(1.0) - fraction * fraction;
     P core_x, core_y;
     seen_at_core(root(max_of(P(1.0) - place.rho_um * plain(inverse_edge_), P(0.0))), P(place.x * place.inverse_rho), P(place.y * place.inverse_rho), core_x, core_y);
     return select(place.rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));  // beyond the sphere's rim there is none
   }
-  std::optional<EdgeCircle> circle(int edge) const override {
-    if (edge > 0) return {};
-    return view_.circle(edge_um_);
-  }
-  S rim(const P& column, const P& row) const override { return view_.within(column, row, inverse_edge_, by_inverse_edge_); }
-  bool has_passing_light() const override { return !passing_.dark(); }
-  S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
   /// Light at a place of a PolarTable.
