@@ -156,17 +156,17 @@ sed 's/fit: \[1000, 2500\]/fit: [1000, 1450]/' series.yaml > pinned.yaml
 
 # ---- text of others is drawn, never run --------------------------------------------------------------------------------
 
-sed 's/along: time_s/along: "t`touch RUN_BY_COLUMN`"/' series.yaml > named.yaml
+sed 's/along: time_s/along: "t`touch RunByColumn`"/' series.yaml > named.yaml
 sed -i 's/files: "frames/files: "few/; s/frames.csv/few.csv/' named.yaml
 mkdir few && cp frames/f1.tif frames/f2.tif frames/f3.tif few/
-{ echo 'file,t`touch RUN_BY_COLUMN`,sample.crystal.bias_v'; sed -n '2,4p' frames.csv; } > few.csv
+{ echo 'file,t`touch RunByColumn`,sample.crystal.bias_v'; sed -n '2,4p' frames.csv; } > few.csv
 "$birefit" series named.yaml --threads 1 --quiet --out named > stdout.txt 2> stderr.txt || fail "a column with backticks: $(cat stderr.txt)"
-[ -e RUN_BY_COLUMN ] && fail "a column's name was run as a command"
-grep -q 'touch RUN_BY_COLUMN' named/series.svg || fail "a column's name is not on its axis"
-"$birefit" series named.yaml --threads 1 --quiet --out $'lines\nsystem "touch RUN_BY_FOLDER"\n#' > stdout.txt 2> stderr.txt || fail "a folder with line ends: $(cat stderr.txt)"
-[ -e RUN_BY_FOLDER ] && fail "a folder's name was run as a command"
+[ -e RunByColumn ] && fail "a column's name was run as a command"
+grep -q 'touch RunByColumn' named/series.svg || fail "a column's name is not on its axis"
+"$birefit" series named.yaml --threads 1 --quiet --out $'lines\nsystem "touch RunByFolder"\n#' > stdout.txt 2> stderr.txt || fail "a folder with line ends: $(cat stderr.txt)"
+[ -e RunByFolder ] && fail "a folder's name was run as a command"
 [ -e lines ] && fail 'the picture went to a part of the folder name'
-cmp -s named/series.svg $'lines\nsystem "touch RUN_BY_FOLDER"\n#/series.svg' || fail 'the picture is not in its folder'
+cmp -s named/series.svg $'lines\nsystem "touch RunByFolder"\n#/series.svg' || fail 'the picture is not in its folder'
 
 [ $failures -eq 0 ] && echo 'all as required' || echo "$failures failures"
 exit $((failures > 0))
