@@ -159,7 +159,7 @@ class EdgePixel {
   void add_piece(double from, double to, bool break_before, bool break_after, int n, WeightedPoints& points, std::vector<Line>& at_rim) const {
     const double length = to - from;
     if (length < kNothing) return;
-    const PixelRule& rule = rule_of(lines_on(n, length));
+    const PixelRule& rule = rule_of(n);
     std::array<Line, kMostPoints> lines;
     const std::size_t count = rule.x.size();
     for (std::size_t i = 0; i < count; ++i) {
@@ -243,7 +243,6 @@ class EdgePixel {
   }
   /// Points on a part of a line, by its length in t (or in s).
   static int nodes(int n, double length) { return std::min(2 * n, 1 + static_cast<int>(std::ceil(1.25 * n * length))); }
-  static int lines_on(int n, double length) { return std::min(n, 2 + static_cast<int>(std::ceil(n * length))); }
 
   /// Light need not vanish at the rim: a rim that moves outwards brings in what is seen there. (At a core's edge light is continuous: what one side gains
   /// the other loses.)

@@ -38,21 +38,24 @@ int fewest_points(const std::vector<std::array<double, 2>>& pixels, int n, int m
 }  // namespace
 
 void measure_points(const Scene& scene, const PixelModel<Pack>& model, RenderPlan& plan) {
-  const double target = 0.25 * scene.intensity_accuracy;
+  const double target = 0.125 * scene.intensity_accuracy;
   double worst = 0;
   // Pixel grids may lie anywhere about the sample: pilots are no pixels of this one.
   const auto place = [&](double radius, double turn) {
     const double azimuth = 2 * std::numbers::pi * turn;
     return std::array<double, 2>{plan.sampling_center_x_px + radius * std::cos(azimuth), plan.sampling_center_y_px + radius * std::sin(azimuth)};
   };
-  constexpr int kPilots = 8, kMostRings = 1024;
+  constexpr int kPilots = 16, kMostRings = 1024;
+  constexpr double kBeyond = 0.3;
   const int bins = static_cast<int>(plan.samples.size()), together = 1 + bins / kMostRings;
   for (int first = 0; first < bins; first += together) {
     const int last = std::min(first + together, bins);
     int& n = *std::max_element(plan.samples.begin() + first, plan.samples.begin() + last);
     std::vector<std::array<double, 2>> pixels;
     for (int k = 0; k < kPilots; ++k) {
-      const auto pixel = place(plan.sampling_bin_px * (first + (last - first) * (k + 0.5) / kPilots), even_x(first * kPilots + k));
+      // A little beyond the ring on either side: of one that edge pixels all but fill, too few would be left.
+      const double bin = first - kBeyond + (last - first + 2 * kBeyond) * (k + 0.5) / kPilots;
+      const auto pixel = place(plan.sampling_bin_px * std::max(0.0, bin), even_x(first * kPilots + k));
       if (!is_edge_pixel(model, pixel[0], pixel[1])) pixels.push_back(pixel);
     }
     if (pixels.empty()) continue;
@@ -61,7 +64,7 @@ void measure_points(const Scene& scene, const PixelModel<Pack>& model, RenderPla
     worst = std::max(worst, left);
     if (needed > n) std::fill(plan.samples.begin() + first, plan.samples.begin() + last, needed);
   }
-  constexpr int kAtEdges = 48, kTries = 20000;
+  constexpr int kAtEdges = 64, kTries = 20000;
   std::vector<std::array<double, 2>> pixels;
   for (int e = 0; e < model.edges(); ++e) {
     const auto circle = model.circle(e);
@@ -72,6 +75,10 @@ void measure_points(const Scene& scene, const PixelModel<Pack>& model, RenderPla
       pixels.push_back(pixel);
       ++found;
     }
+    // Pixels that a circle touches from within are few, and the hardest: along the axes.
+    constexpr int kTouched = 32;
+    for (int k = 0; circle && k < kTouched; ++k)
+      pixels.push_back(place(std::max(0.0, circle->radius + 1.4 * (even_y(k) - 0.5)), 0.25 * (k % 4) + 0.16 * (even_x(k) - 0.5) / std::max(1.0, circle->radius)));
   }
   if (!pixels.empty()) {
     double left = 0;

@@ -119,13 +119,14 @@ struct SquareInCircle {
   double area = 0, by_x = 0, by_y = 0, by_radius = 0;
   SquareInCircle(double x, double y, double radius) {
     const double r2 = radius * radius, left = x - 0.5, right = x + 0.5, low = y - 0.5, high = y + 0.5;
-    const auto half_chord = [&](double a) { return std::sqrt(std::max(0.0, r2 - a * a)); };
+    const auto half_chord = [&](double a) { return std::sqrt(std::max(0.0, (radius - a) * (radius + a))); };
     // The integral from 0 to b of min(height, half_chord), odd in either.
     const auto below = [&](double b, double height) {
       const double sign = (b < 0 ? -1 : 1) * (height < 0 ? -1 : 1), h = std::min(std::abs(height), radius), to = std::min(std::abs(b), radius), flat = half_chord(h);
       if (to <= flat) return sign * h * to;
-      const auto under = [&](double c) { return 0.5 * (c * half_chord(c) + r2 * std::asin(std::min(1.0, c / radius))); };
-      return sign * (h * flat + under(to) - under(flat));
+      // Two triangles and the sector between them; by small angles, where a large circle all but touches a side.
+      const double at_end = half_chord(to);
+      return sign * 0.5 * (h * flat + to * at_end + r2 * (std::atan2(h, flat) - std::atan2(at_end, to)));
     };
     area = below(right, high) - below(left, high) - below(right, low) + below(left, low);
     // What a side that moves outwards takes in is as much of it as lies within the circle; all of the area's change by the radius follows, as areas go
