@@ -126,6 +126,7 @@ FitResult report(const Task& task, Optimum& optimum, Minima minima, Rivals rival
   if (!signal) result.identifiable = false;
   report_micrographs(task, optimum, result);
   collect_warnings(task, optimum, result);
+  compare_strips(task, optimum, result);
   if (task.unknowns.size() == 0)
     result.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
   result.evaluations = optimum.evaluations + optimum.problem->evaluations();
