@@ -178,6 +178,36 @@ double row_correlation(const Task& task, const Theta& theta, const FrameSums& fr
   return (1 + r) / (1 - r);
 }
 
+/// Twice the negative logarithm of the likelihood of the frames' means: with a lamp's jitter at its best, its prior
+/// included, and with a scatter of any size that the means alone tell.
+double deviance_by_lamp(const FrameSums& frames, const std::vector<double>& ratio) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= kLampPlaces; ++i) {
+    const double jitter = kMostJitter * i / kLampPlaces;
+    double sum = (jitter / kLampJitter) * (jitter / kLampJitter) + sum_of_squares(frames, ratio, jitter);
+    for (const double r : ratio) sum += std::log1p(std::pow(jitter * r, 2));
+    least = std::min(least, sum);
+  }
+  return least;
+}
+double deviance_by_scatter(const Task& task, const Theta& theta, const FrameSums& frames) {
+  std::vector<double> ratio;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int g = 0; g < task.frames(); ++g) {
+    ratio.push_back(std::abs(task.gain_of(g, theta)) / frames[static_cast<std::size_t>(g)].mean_noise_sd);
+    if (ratio.back() > 0) smallest = std::min(smallest, 1 / ratio.back());
+  }
+  constexpr double kStep = 1.05;
+  double least = std::numeric_limits<double>::infinity();
+  const double most = smallest * std::sqrt(sum_of_squares(frames, ratio, 0));
+  for (double sd = 0.1 * smallest; sd < most; sd *= kStep) {
+    double sum = sum_of_squares(frames, ratio, sd);
+    for (const double r : ratio) sum += std::log1p(std::pow(sd * r, 2));
+    least = std::min(least, sum);
+  }
+  return least;
+}
+
 std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, MisfitFound& found) {
   std::vector<Misfit> misfit = misfit_of_prior(task, optimum.theta);
   FrameSums frames;
@@ -192,10 +222,12 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   if (!own_scatter) return misfit;
   const std::vector<double> ratio = lamp_over_noise(task, optimum.frames, frames);
   found.lamp_jitter = lamp_jitter(frames, freedom, ratio);
-  // What scatters by more than a lamp does is not the lamp.
+  // What scatters by more than a lamp does is not the lamp, nor need it be where frames are not described either.
   constexpr double kSignificant = 0.999;
   const double significant = chi_square_quantile(kSignificant, dof);
-  if (sum_of_squares(frames, ratio, found.lamp_jitter) > significant) found.lamp_jitter = 0;
+  if (sum_of_squares(frames, ratio, found.lamp_jitter) > significant ||
+      (found.beyond_noise && deviance_by_scatter(task, optimum.theta, frames) < deviance_by_lamp(frames, ratio)))
+    found.lamp_jitter = 0;
   found.lamp_share = 0;
   for (const double r : ratio)
     found.lamp_share = std::max(found.lamp_share, 1 - 1 / (1 + std::pow(found.lamp_jitter * r, 2)));
@@ -229,30 +261,9 @@ double deviance(const Task& task, const Frames& setup, const LeastSquares& probl
     shapes += (frames.back().chi_square - mean) / problem.misfit()[static_cast<std::size_t>(g)].shape_variance;
     squares += mean;
   }
-  const std::vector<double> ratio = lamp_over_noise(task, setup, frames);
-  double least = squares;
-  for (int i = 0; i <= kLampPlaces; ++i) {
-    const double jitter = kMostJitter * i / kLampPlaces;
-    double sum = (jitter / kLampJitter) * (jitter / kLampJitter) + sum_of_squares(frames, ratio, jitter);
-    for (const double r : ratio) sum += std::log1p(std::pow(jitter * r, 2));
-    least = std::min(least, sum);
-  }
-  // A scatter that is no lamp's: of any size, which the means alone tell.
-  std::vector<double> of_scatter;
-  double smallest = std::numeric_limits<double>::infinity();
-  for (int g = 0; g < task.frames(); ++g) {
-    of_scatter.push_back(std::abs(task.gain_of(g, problem.theta())) /
-                         frames[static_cast<std::size_t>(g)].mean_noise_sd);
-    if (of_scatter.back() > 0) smallest = std::min(smallest, 1 / of_scatter.back());
-  }
-  constexpr double kStep = 1.05;
-  const double most = smallest * std::sqrt(squares);
-  for (double sd = 0.1 * smallest; sd < most; sd *= kStep) {
-    double sum = sum_of_squares(frames, of_scatter, sd);
-    for (const double r : of_scatter) sum += std::log1p(std::pow(sd * r, 2));
-    least = std::min(least, sum);
-  }
-  return shapes + least + problem.prior_chi_square();
+  const double of_means = std::min(deviance_by_lamp(frames, lamp_over_noise(task, setup, frames)),
+                                   deviance_by_scatter(task, problem.theta(), frames));
+  return shapes + std::min(squares, of_means) + problem.prior_chi_square();
 }
 
 Optimum with_settled_misfit(const Task& task, Optimum optimum) {
@@ -261,8 +272,13 @@ Optimum with_settled_misfit(const Task& task, Optimum optimum) {
     optimum.problem->set_misfit(misfit_of_prior(task, optimum.theta));
     solve_again(task, optimum, "frames weighed");
   }
+  constexpr double kSettled = 0.002;
+  // Of a shape's variance, a tenth of which moves an error bar by a twentieth.
+  constexpr double kShapeSettled = 0.1;
+  const auto still = [](double now, double then, double share) { return std::abs(now - then) <= share * now; };
   for (int pass = 0; pass < 8; ++pass) {
     const MisfitFound before = optimum.misfit;
+    const std::vector<Misfit> weights = optimum.problem->misfit();
     optimum.problem->set_misfit(assess_misfit(task, optimum, optimum.misfit));
     // Weights common to all rows of a single image move no minimum; against a prior or between frames they do.
     const bool moves = task.frames() > 1 || optimum.problem->prior_rows() > 0;
@@ -271,10 +287,13 @@ Optimum with_settled_misfit(const Task& task, Optimum optimum) {
       break;
     }
     solve_again(task, optimum, "misfit weighed");
-    constexpr double kSettled = 0.002;
-    const auto still = [&](double now, double then) { return std::abs(now - then) <= kSettled * now; };
-    if (pass > 0 && still(optimum.misfit.frame_sd, before.frame_sd) &&
-        still(optimum.misfit.lamp_jitter, before.lamp_jitter))
+    // Against a prior a shape's weight may take the fit to where the shape is another.
+    const bool shapes_still = std::equal(weights.begin(), weights.end(), optimum.problem->misfit().begin(),
+                                         [&](const Misfit& then, const Misfit& now) {
+                                           return still(now.shape_variance, then.shape_variance, kShapeSettled);
+                                         });
+    if (pass > 0 && shapes_still && still(optimum.misfit.frame_sd, before.frame_sd, kSettled) &&
+        still(optimum.misfit.lamp_jitter, before.lamp_jitter, kSettled))
       break;
   }
   return optimum;
