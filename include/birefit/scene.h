@@ -199,11 +199,12 @@ struct Plate {
 };
 
 /// Cubic crystal bar made birefringent by a transverse field. Retardance of a pixel = pi E d / half_wave_voltage_v with
-/// E d the local field times the electrode distance. Uniform: E d = bias_v. Varying: E d = bias_v (1 + sum_j c_j P_j(t)),
+/// E d the local field times the electrode distance. Uniform: E d = bias_v + built_in_bias_v = V. Varying: E d = V (1 + sum_j c_j P_j(t)),
 /// t in [-1, 1] across the electrodes, P_j Legendre polynomials j = 1, 2, ..: the integral over the bar is the bias.
 struct Crystal {
   ParameterRef half_wave_voltage_v;
   ParameterRef bias_v;                 ///< sign not observable
+  ParameterRef built_in_bias_v;        ///< what the field across the bar has without a bias, counted along it; not given: 0
   bool field_along_y = true;           ///< else along x
   ParameterRef slow_axis_deg;          ///< azimuth of the induced axis; 45 degrees from the field by default
   std::vector<ParameterRef> field_legendre;  ///< c_1, c_2, ..; empty = uniform

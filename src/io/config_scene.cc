@@ -357,7 +357,7 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
   Crystal crystal;
   const Block block = reader.block(
       parent, "crystal",
-      {"half_wave_voltage_v", "bias_v", "field_along", "slow_axis_deg", "field_legendre", "electrodes_px"}, true);
+      {"half_wave_voltage_v", "bias_v", "built_in_bias_v", "field_along", "slow_axis_deg", "field_legendre", "electrodes_px"}, true);
   NumberSpec half_wave;
   half_wave.unit = "V";
   half_wave.lower = 0;
@@ -371,6 +371,11 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
   bias.upper = 1e7;
   bias.physical_lower = 0;
   crystal.bias_v = reader.number(block, "bias_v", bias);
+  NumberSpec built_in;  // against the bias as well
+  built_in.unit = "V";
+  built_in.lower = -1e7;
+  built_in.upper = 1e7;
+  if (block.find("built_in_bias_v")) crystal.built_in_bias_v = reader.number(block, "built_in_bias_v", built_in);
   if (!block.find("field_along")) reader.missing(block, "field_along", "x or y, the direction of the field in the image");
   crystal.field_along_y = reader.choice(block, "field_along", {"x", "y"}).value_or("y") == "y";
   crystal.slow_axis_deg = reader.number(block, "slow_axis_deg", angle(), crystal.field_along_y ? 135 : 45);

@@ -56,6 +56,7 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
   } else if (auto* crystal = std::get_if<Crystal>(&scene.sample)) {
     f(crystal->half_wave_voltage_v);
     f(crystal->bias_v);
+    f(crystal->built_in_bias_v);
     f(crystal->slow_axis_deg);
     for (auto& coefficient : crystal->field_legendre) f(coefficient);
     f(crystal->electrode_low_px);

@@ -11,7 +11,8 @@ class CrystalModel final : public PixelModel<S> {
  public:
   CrystalModel(const Scene& scene, const Values<S>& value) : along_y_(std::get<Crystal>(scene.sample).field_along_y) {
     const Crystal& crystal = std::get<Crystal>(scene.sample);
-    phase_ = std::numbers::pi * value(crystal.bias_v) / value(crystal.half_wave_voltage_v);
+    const S across = value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0);
+    phase_ = std::numbers::pi * across / value(crystal.half_wave_voltage_v);
     for (ParameterRef ref : crystal.field_legendre) legendre_.push_back(value(ref));
     const int size = along_y_ ? scene.view.height : scene.view.width;
     low_ = value.get(crystal.electrode_low_px, -0.5);

@@ -816,7 +816,8 @@ std::vector<double> phases(const Scene& scene, const Theta& theta) {
   } else if (const auto* crystal = std::get_if<Crystal>(&scene.sample)) {
     double field = 1;
     for (ParameterRef c : crystal->field_legendre) field += value(c);
-    result.push_back(kPi * value(crystal->bias_v) / value(crystal->half_wave_voltage_v) * field);
+    result.push_back(kPi * (value(crystal->bias_v) + value.get(crystal->built_in_bias_v, 0)) /
+                     value(crystal->half_wave_voltage_v) * field);
   } else if (std::holds_alternative<StressedDisc>(scene.sample)) {
     const DiscOptics<double> o(scene, value);
     for (const auto& [x, y] : {std::pair{0.0, 0.0}, {0.0, 0.4}, {0.4, 0.0}, {0.3, 0.6}, {-0.3, 0.6}, {0.5, -0.5}, {0.0, -0.8}, {-0.7, 0.1}}) {
@@ -885,7 +886,8 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
     result.method = "closed_form";
     result.reasons.push_back("a crystal between electrodes is one retarder per pixel: sin^2 in closed form");
     const Crystal& crystal = std::get<Crystal>(scene.sample);
-    note_illumination(scene, value, std::abs(kPi * value(crystal.bias_v) / value(crystal.half_wave_voltage_v)), result);
+    const double across = value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0);
+    note_illumination(scene, value, std::abs(kPi * across / value(crystal.half_wave_voltage_v)), result);
   } else if (std::holds_alternative<StressedDisc>(scene.sample)) {
     result = plan_disc(scene, value);
   } else if (std::holds_alternative<SampledVolume>(scene.sample)) {
