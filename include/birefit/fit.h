@@ -2,6 +2,7 @@
 // Estimating the free parameters of scenes from micrographs: what goes in (FitJob), what comes out (FitResult).
 // Method and statistics: docs/methods.md, "The fit".
 
+#include <array>
 #include <atomic>
 #include <functional>
 #include <memory>
@@ -54,6 +55,7 @@ struct FitOptions {
   int scan_pixels = 4000;      ///< at most, of the coarse scan, spread over all micrographs
   int scan_candidates = 12;    ///< starts polished after the scan, of four times as many looked at; more where the image is described badly
   bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
+  bool zones_follow = true;    ///< what a disc takes out around its forces and rim follows the parameters; false: masks as they are
   bool choose_waves = false;   ///< Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
   double max_seconds = 60;
   bool choose_rays = false;    ///< straight or curved rays (Scene::rays) by what curved ones would change
@@ -129,6 +131,7 @@ struct MicrographResult {
   Image residual;   ///< values - fitted; NaN where not used
   Image sigma;      ///< standard deviation used for whitening
   int used = 0;     ///< pixels
+  int outside = 0;  ///< usable pixels that the sample takes out: around a disc's forces, along its rim and beyond
   int outliers = 0; ///< pixels left out because they stood out of the residual (FitOptions::leave_out_outliers)
   double chi_square = 0;
   double residual_rms = 0;        ///< units of the values
@@ -142,6 +145,14 @@ struct InputEffect {
   std::string name, unit;
   double value = 0, step = 0;  ///< step: 1 deg, 1 px, else 1 % of the value
   std::vector<double> shift;   ///< of FitResult::parameters, to first order
+};
+
+/// A strip of a bar, plate or disc by itself, the rest of the image left out.
+struct Strip {
+  std::array<int, 4> roi_px{};    ///< columns and rows x0, y0, x1, y1, ends exclusive
+  double frame_scatter = 0;       ///< standard deviation of its frames' mean residuals, of the model intensity; 0 of one frame
+  double reduced_chi_square = 0;  ///< about the fit of the whole, by noise alone
+  std::vector<double> value, stderr_;  ///< searched parameters as the strip has them, to first order; errors with its own misfit
 };
 
 /// The scan before the solver: objective along one parameter (for the report's chart).
@@ -197,6 +208,8 @@ struct FitResult {
   std::vector<BranchResult> branches;  ///< empty unless the job had several
   std::vector<FisherDirection> directions;
   std::vector<InputEffect> inputs;     ///< those that shift a searched parameter by a tenth of its standard error or more; largest first
+  std::vector<Strip> strips;           ///< empty where strips agree, or the sample has none
+  std::optional<std::array<int, 4>> trusted_px;  ///< the strips that both agree between frames and are described best; a proposal
   std::vector<MicrographResult> micrographs;
   std::vector<ScanTrace> scans;
   std::vector<ProfileTrace> profiles;  ///< of the parameters whose interval is `profiled`

@@ -13,6 +13,7 @@
 #include "fit/problem/least_squares.h"
 #include "fit/problem/light.h"
 #include "fit/weights/noise.h"
+#include "fit/zone.h"
 
 namespace birefit {
 namespace {
@@ -49,14 +50,14 @@ Planned planned(const FitJob& job) {
     const auto [low, high] = std::minmax_element(light.values().begin(), light.values().end());
     const double range = *high - *low;
     const bool taken = !m.values.empty();
+    if (!taken && m.mask.empty()) m.mask = Mask(light.width(), light.height(), 1);
+    m.mask = fitted_pixels(m, theta);
     if (taken) {  // the image's own level; which fringe is where does not matter for that
       const double dark = quantile(m, 0.005), bright = quantile(m, 0.995);
       if (m.gain && p.job.parameters[m.gain].free && range > 0)
         p.job.parameters[m.gain].value = (bright - dark) / range;
       if (m.offset && p.job.parameters[m.offset].free && !p.job.parameters[m.offset].prior_sd)
         p.job.parameters[m.offset].value = dark - *low * (m.gain ? p.job.parameters[m.gain].value : 1);
-    } else if (m.mask.empty()) {
-      m.mask = Mask(light.width(), light.height(), 1);
     }
     const double gain = m.gain ? p.job.parameters[m.gain].value : 1;
     Micrograph signal = m;

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "fit/errors/left_out.h"
+#include "fit/zone.h"
 #include "render/wave.h"
 
 namespace birefit {
@@ -175,6 +176,7 @@ Waves waves_of(const FitJob& job) {
 }  // namespace
 
 FitResult fit(const FitJob& job) {
+  if (std::optional<FitResult> followed = fit_following_zones(job, fit)) return *std::move(followed);
   if (!job.options.choose_waves) return fit_by_given_waves(job);
   FitJob chosen = job;
   chosen.options.choose_waves = false;

@@ -956,7 +956,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       if (!sound || !reader.problems.empty() || !starts) continue;
       resolve_automatic(reader, micrograph.scene, &micrograph.values, &micrograph.mask, micrograph.name);
       check_overlap(reader, micrograph.scene, micrograph.name);
-      mask_stressed_disc(reader, micrograph);
+      check_stressed_disc(reader, micrograph);
     }
     if (calibration && calibration->has_crossed && settings.offset_automatic) {
       Parameter& offset = reader.table[settings.offset];

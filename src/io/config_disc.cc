@@ -1,9 +1,5 @@
 #include "io/config_disc.h"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
 #include "render/disc.h"
 
 namespace birefit {
@@ -80,32 +76,19 @@ StressedDisc read_stressed_disc(ConfigReader& reader, const Block& parent) {
   return disc;
 }
 
-void mask_stressed_disc(ConfigReader& reader, Micrograph& micrograph) {
+void check_stressed_disc(ConfigReader& reader, const Micrograph& micrograph) {
   const auto* disc = std::get_if<StressedDisc>(&micrograph.scene.sample);
   if (!disc || !reader.problems.empty()) return;
-  const auto value = [&](ParameterRef ref) { return reader.table[ref].value; };
+  const DiscZone zone(micrograph.scene, reader.table.values());
   const View& view = micrograph.scene.view;
-  const double radius_um = 0.5 * value(disc->diameter_um), radius_px = radius_um / view.pixel_size_um;
-  const DiscMargins margins = disc_margins(*disc, radius_um);
-  const double load = (value(disc->load_azimuth_deg) + value(view.rotation_deg)) * std::numbers::pi / 180;
-  const double cx = value(view.center_x_px), cy = value(view.center_y_px), ux = std::cos(load), uy = std::sin(load);
-  long left = 0;
   for (int row = 0; row < view.height; ++row)
-    for (int column = 0; column < view.width; ++column) {
-      if (!micrograph.mask(column, row)) continue;
-      const double x = (column - cx) / radius_px, y = (cy - row) / radius_px;
-      const double to_force = std::min(std::hypot(x - ux, y - uy), std::hypot(x + ux, y + uy));
-      if (std::hypot(x, y) <= 1 - margins.rim && to_force >= margins.contact) {
-        ++left;
-        continue;
-      }
-      micrograph.mask(column, row) = 0;
-      ++micrograph.outside_roi;
-    }
-  const Parameter& diameter = reader.table[disc->diameter_um];
-  if (left == 0)
-    reader.problems.add(diameter.where, "no pixel of " + micrograph.name + " is left inside a disc of " + show(radius_px) + " pixels radius at [" + show(cx) + ", " +
-                                            show(cy) + "]", "check diameter_um, pixel_size_um, center_px, contact_radius_um and rim_um");
+    for (int column = 0; column < view.width; ++column)
+      if (micrograph.mask(column, row) && zone.fitted(column, row)) return;
+  const auto value = [&](ParameterRef ref) { return show(reader.table[ref].value); };
+  reader.problems.add(reader.table[disc->diameter_um].where,
+                      "no pixel of " + micrograph.name + " is left inside a disc of " + show(zone.radius_px()) +
+                          " pixels radius at [" + value(view.center_x_px) + ", " + value(view.center_y_px) + "]",
+                      "check diameter_um, pixel_size_um, center_px, contact_radius_um and rim_um");
 }
 
 }  // namespace birefit

@@ -7,8 +7,8 @@
 namespace birefit {
 
 StressedDisc read_stressed_disc(ConfigReader& reader, const Block& sample);
-/// Leaves out of a fit what the two forces and the disc's edge spoil, and what is outside; by the starts of centre, diameter
-/// and direction. Counted as outside the region. A problem when nothing is left.
-void mask_stressed_disc(ConfigReader& reader, Micrograph& micrograph);
+/// A problem when the rim and what is left out around the forces leave no pixel to fit, by the starts of centre, diameter
+/// and direction.
+void check_stressed_disc(ConfigReader& reader, const Micrograph& micrograph);
 
 }  // namespace birefit

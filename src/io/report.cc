@@ -850,7 +850,7 @@ std::string data_section(const Config& config, const FitResult& result) {
         "<tr><td class=\"name "
         "file\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td>{}{}</td><td>{}</td></tr>\n",
-        escape_html(m.name), m.used, input.masked_by_user, input.outside_roi, input.saturated, input.dead,
+        escape_html(m.name), m.used, input.masked_by_user, input.outside_roi + m.outside, input.saturated, input.dead,
         input.non_finite, m.outliers, m.used > 0 ? plain(m.chi_square / m.used) : "\u2013", plain(m.noise.read_counts),
         m.noise.estimated ? "*" : "", plain(m.noise.counts_per_photon));
   }

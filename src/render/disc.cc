@@ -1,5 +1,9 @@
 #include "render/disc.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "transport/method.h"
 
 namespace birefit {
@@ -24,6 +28,25 @@ DiscOptics<S>::DiscOptics(const Scene& scene, const Values<S>& value) {
 
 DiscMargins disc_margins(const StressedDisc& disc, double radius_um) {
   return {disc.contact_radius_um > 0 ? disc.contact_radius_um / radius_um : 0.1, disc.rim_um > 0 ? disc.rim_um / radius_um : 0.02};
+}
+
+DiscZone::DiscZone(const Scene& scene, const Theta& theta) {
+  const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+  const auto value = [&](ParameterRef ref, double otherwise = 0) {
+    return ref ? theta[static_cast<std::size_t>(ref.index)] : otherwise;
+  };
+  const double radius_um = 0.5 * value(disc.diameter_um);
+  margins_ = disc_margins(disc, radius_um);
+  radius_px_ = radius_um / scene.view.pixel_size_um;
+  center_x_px_ = value(scene.view.center_x_px), center_y_px_ = value(scene.view.center_y_px);
+  const double load = (value(disc.load_azimuth_deg, 90) + value(scene.view.rotation_deg)) * std::numbers::pi / 180;
+  load_cos_ = std::cos(load), load_sin_ = std::sin(load);
+}
+
+bool DiscZone::fitted(double column, double row) const {
+  const double x = (column - center_x_px_) / radius_px_, y = (center_y_px_ - row) / radius_px_;
+  const double to_force = std::min(std::hypot(x - load_cos_, y - load_sin_), std::hypot(x + load_cos_, y + load_sin_));
+  return std::hypot(x, y) <= 1 - margins_.rim && to_force >= margins_.contact;
 }
 
 namespace {

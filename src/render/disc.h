@@ -40,4 +40,19 @@ struct DiscMargins {
 };
 DiscMargins disc_margins(const StressedDisc& disc, double radius_um);
 
+/// Which pixels of a disc's image a fit uses, the disc being where `theta` puts it.
+class DiscZone {
+ public:
+  /// `scene` holds a StressedDisc.
+  DiscZone(const Scene& scene, const Theta& theta);
+  const DiscMargins& margins() const { return margins_; }
+  double radius_px() const { return radius_px_; }
+  /// Inside of the rim and clear of both forces.
+  bool fitted(double column, double row) const;
+
+ private:
+  DiscMargins margins_;
+  double radius_px_, center_x_px_, center_y_px_, load_cos_, load_sin_;
+};
+
 }  // namespace birefit
