@@ -75,7 +75,7 @@ PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t
     counts.saturated = m.saturated;
     counts.dead = m.dead;
     counts.non_finite = m.non_finite;
-    counts.outside_roi = m.outside_roi;
+    counts.outside_roi = m.outside_roi + (i < result.micrographs.size() ? result.micrographs[i].outside : 0);
   }
   return counts;
 }
@@ -83,6 +83,20 @@ PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t
 Json pixels_json(const PixelCounts& c) {
   return {{"used", c.used}, {"masked", c.masked},         {"saturated", c.saturated},
           {"dead", c.dead}, {"non_finite", c.non_finite}, {"outside_roi", c.outside_roi}, {"outliers", c.outliers}};
+}
+
+Json strips_json(const FitResult& result) {
+  Json strips = Json::array();
+  for (const Strip& strip : result.strips) {
+    Json values;
+    for (std::size_t j = 0; j < strip.value.size(); ++j)
+      values[result.parameters[j].name] = {{"value", number(strip.value[j])}, {"stderr", number(strip.stderr_[j])}};
+    strips.push_back({{"roi_px", strip.roi_px},
+                      {"frame_scatter", number(strip.frame_scatter)},
+                      {"reduced_chi_square", number(strip.reduced_chi_square)},
+                      {"parameters", values}});
+  }
+  return {{"list", strips}, {"trusted_roi_px", result.trusted_px ? Json(*result.trusted_px) : Json(nullptr)}};
 }
 
 double residual_fraction(const MicrographResult& m) {
@@ -263,6 +277,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["model"] = plan_json(model);
   json["evaluations"] = result.evaluations;
   json["seconds"] = number(result.seconds);
+  if (!result.strips.empty()) json["strips"] = strips_json(result);
   json["warnings"] = result.warnings;
   json["taken_as_exact"] = result.taken_as_exact;
   // File names and configs may hold bytes that are no UTF-8.

@@ -148,6 +148,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   if (!signal) result.identifiable = false;
   report_micrographs(task, optimum, result);
   collect_warnings(task, optimum, result);
+  compare_strips(task, optimum, result);
   if (task.unknowns.size() == 0)
     result.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
   result.evaluations = optimum.evaluations + optimum.problem->evaluations();

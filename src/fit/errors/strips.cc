@@ -1,0 +1,183 @@
+// Does every part of a bar, plate or disc tell the same? Strips of it, each fitted by itself from the fit of the whole.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "core/robust.h"
+#include "fit/errors/report.h"
+
+namespace birefit::estimation {
+namespace {
+
+constexpr int kStrips = 8;
+
+/// Along which axis strips follow each other: the field's in a bar (a bar's field varies along itself), else rows.
+/// Nothing where a sample has no parts that are alike.
+std::optional<bool> strips_of_rows(const Sample& sample) {
+  if (const auto* crystal = std::get_if<Crystal>(&sample)) {
+    if (!crystal->field_legendre.empty()) return std::nullopt;  // the variation is the model's own
+    return crystal->field_along_y;
+  }
+  if (const auto* plate = std::get_if<Plate>(&sample); plate && plate->ring_numbers.empty()) return true;
+  if (std::holds_alternative<StressedDisc>(sample)) return true;
+  return std::nullopt;
+}
+
+/// Ends of strips that hold alike numbers of the first frame's pixels.
+std::vector<int> strip_ends(const Pixels& pixels, bool rows) {
+  std::vector<int> at;
+  for (const auto& pixel : pixels) at.push_back(pixel[rows ? 1 : 0]);
+  std::sort(at.begin(), at.end());
+  std::vector<int> ends{at.front()};
+  for (int i = 1; i < kStrips; ++i) {
+    const int end = at[at.size() * static_cast<std::size_t>(i) / kStrips];
+    if (end > ends.back()) ends.push_back(end);
+  }
+  ends.push_back(at.back() + 1);
+  return ends;
+}
+
+/// Squares of the frames' mean residuals (of the model intensity) and of all residuals by noise, about a fit of the
+/// strip by itself, from the fit of the whole.
+std::optional<Strip> fitted_strip(const Task& task, const Optimum& optimum, bool rows, int begin, int end) {
+  std::vector<PixelSet> sets;
+  std::vector<RenderPlan> plans;
+  Strip strip;
+  int low = std::numeric_limits<int>::max(), high = 0;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+    Pixels part;
+    for (const auto& pixel : frame.pixels)
+      if (const int at = pixel[rows ? 1 : 0]; at >= begin && at < end) {
+        part.push_back(pixel);
+        low = std::min(low, pixel[rows ? 0 : 1]), high = std::max(high, pixel[rows ? 0 : 1] + 1);
+      }
+    constexpr std::size_t kFewest = 100;
+    if (part.size() < kFewest) return std::nullopt;
+    sets.push_back(pixel_set(task.micrograph(g), frame.sigma, std::move(part)));
+    plans.push_back(frame.plan);
+  }
+  strip.roi_px = rows ? std::array{low, begin, high, end} : std::array{begin, low, end, high};
+  LeastSquares problem(task.job, task.unknowns, std::move(plans), std::move(sets));
+  SolveOptions few;
+  few.max_iterations = 5;  // next to linear
+  few.interrupted = task.job.options.interrupted;
+  Eigen::VectorXd searched = optimum.searched;
+  problem.solve(searched, few);
+  // Its own misfit, shared by as many pixels as it is: of one image by the area, of several by the frames' scatter.
+  double chi_square = 0, squares = 0, pixels = 0, freedom = task.frames() - task.unknowns.size(), area = 1;
+  for (int g = 0; g < task.frames(); ++g) {
+    const LeastSquares::FrameMisfit misfit = problem.frame_misfit(g);
+    chi_square += misfit.chi_square, pixels += static_cast<double>(problem.pixels(g).value.size());
+    squares += std::pow(misfit.mean_residual / task.gain_of(g, problem.theta()), 2);
+    const Micrograph& micrograph = task.micrograph(g);
+    Image whitened(micrograph.values.width(), micrograph.values.height());
+    Mask mask(whitened.width(), whitened.height());
+    const Eigen::VectorXd residual = problem.noise_whitened_residual(g);
+    for (Eigen::Index i = 0; i < residual.size(); ++i) {
+      const auto [x, y] = problem.pixels(g).pixels[static_cast<std::size_t>(i)];
+      whitened(x, y) = residual[i], mask(x, y) = 1;
+    }
+    area = std::max(area, correlation_area(whitened, mask));
+  }
+  strip.reduced_chi_square = chi_square / std::max(1.0, pixels - task.unknowns.size());
+  if (freedom >= 1) strip.frame_scatter = std::sqrt(squares / freedom);
+  const Inverse inverse = invert_normal_equations(problem.factor());
+  const double scale = std::max(1.0, strip.reduced_chi_square) * std::min(area, pixels / task.frames());
+  for (Eigen::Index j = 0; j < searched.size(); ++j) {
+    const bool known = !inverse.undetermined[static_cast<std::size_t>(j)];
+    strip.value.push_back(searched[j]);
+    strip.stderr_.push_back(known ? std::sqrt(scale * inverse.covariance(j, j))
+                                  : std::numeric_limits<double>::infinity());
+  }
+  return strip;
+}
+
+/// Chi-square between the strips' values of one parameter, per degree of freedom.
+double disagreement(const std::vector<Strip>& strips, std::size_t j) {
+  double weights = 0, mean = 0, chi_square = 0, n = -1;
+  for (const Strip& s : strips)
+    if (const double w = 1 / (s.stderr_[j] * s.stderr_[j]); std::isfinite(w)) weights += w, mean += w * s.value[j], ++n;
+  for (const Strip& s : strips)
+    if (const double w = 1 / (s.stderr_[j] * s.stderr_[j]); std::isfinite(w))
+      chi_square += w * std::pow(s.value[j] - mean / weights, 2);
+  return n > 0 ? chi_square / n : 0;
+}
+
+/// The run of strips that are far better than the others by `measure`: below half of the median.
+std::vector<bool> clearly_better(const std::vector<Strip>& strips, double Strip::*measure) {
+  std::vector<double> values;
+  for (const Strip& s : strips) values.push_back(s.*measure);
+  const double middle = median(values);
+  std::vector<bool> better;
+  for (const Strip& s : strips) better.push_back(s.*measure < 0.5 * middle);
+  return better;
+}
+
+std::string range(const std::vector<Strip>& strips, double Strip::*measure, const std::vector<bool>& of, bool wanted) {
+  double low = std::numeric_limits<double>::infinity(), high = 0;
+  for (std::size_t i = 0; i < strips.size(); ++i)
+    if (of[i] == wanted) low = std::min(low, strips[i].*measure), high = std::max(high, strips[i].*measure);
+  return low < high ? fmt::format("{:.2g} to {:.2g}", low, high) : fmt::format("{:.2g}", low);
+}
+
+}  // namespace
+
+void compare_strips(const Task& task, const Optimum& optimum, FitResult& result) {
+  if (task.unknowns.searched.empty() || task.interrupted() || optimum.stopped) return;
+  const std::optional<bool> rows = strips_of_rows(task.micrograph(0).scene.sample);
+  constexpr double kDescribed = 2;  // a model that describes the image leaves strips nothing to differ by
+  if (!rows || !(result.reduced_chi_square > kDescribed)) return;
+  std::vector<Strip> strips;
+  const std::vector<int> ends = strip_ends(optimum.frames.front().pixels, *rows);
+  for (std::size_t i = 1; i < ends.size(); ++i)
+    if (std::optional<Strip> strip = fitted_strip(task, optimum, *rows, ends[i - 1], ends[i])) strips.push_back(*strip);
+  if (strips.size() < 4) return;
+  std::size_t worst = 0;
+  for (std::size_t j = 1; j < task.unknowns.searched.size(); ++j)
+    if (disagreement(strips, j) > disagreement(strips, worst)) worst = j;
+  // Seven strips against the eighth: by chance above this once in ten thousand.
+  constexpr double kBeyondChance = 4;
+  const double between = disagreement(strips, worst);
+  const bool scatters = strips.front().frame_scatter > 0;
+  const std::vector<bool> described = clearly_better(strips, &Strip::reduced_chi_square);
+  const std::vector<bool> steady = scatters ? clearly_better(strips, &Strip::frame_scatter) : described;
+  const bool stands_out = scatters && std::count(steady.begin(), steady.end(), true) > 0;
+  if (between < kBeyondChance && !stands_out) return;
+  const std::string what = *rows ? "rows" : "columns";
+  const std::size_t side = *rows ? 1 : 0;
+  const Parameter& parameter = task.searched(worst);
+  std::string words;
+  for (const Strip& s : strips)
+    words += fmt::format("{}{} to {} {:.4g} +- {:.2g}", words.empty() ? "" : ", ", s.roi_px[side],
+                         s.roi_px[side + 2] - 1, s.value[worst], s.stderr_[worst]);
+  words = fmt::format("Strips by themselves have {} ({}) of {}: they differ by {:.2g} times their errors squared.",
+                      parameter.name, what, words, between);
+  // A proposal needs both to point to the same strips, next to each other.
+  const auto first = std::find(steady.begin(), steady.end(), true), last = std::find(first, steady.end(), false);
+  const bool together = std::count(last, steady.end(), true) == 0;
+  if (stands_out && together && steady == described) {
+    const Strip &a = strips[static_cast<std::size_t>(first - steady.begin())],
+                &b = strips[static_cast<std::size_t>(last - steady.begin()) - 1];
+    std::array<int, 4> roi = a.roi_px;
+    for (const std::size_t i : {0, 1}) roi[i] = std::min(roi[i], b.roi_px[i]);
+    for (const std::size_t i : {2, 3}) roi[i] = std::max(roi[i], b.roi_px[i]);
+    result.trusted_px = roi;
+    words += fmt::format(
+        " In {} {} to {} the frames scatter by {} of the model intensity, elsewhere by {}, and reduced chi-square is "
+        "{} against {}: roi_px: [{}, {}, {}, {}] would leave these.",
+        what, roi[side], roi[side + 2] - 1, range(strips, &Strip::frame_scatter, steady, true),
+        range(strips, &Strip::frame_scatter, steady, false), range(strips, &Strip::reduced_chi_square, steady, true),
+        range(strips, &Strip::reduced_chi_square, steady, false), roi[0], roi[1], roi[2], roi[3]);
+  } else if (stands_out) {
+    words += " Where frames scatter least is not where the model describes them best: no part is to be preferred.";
+  }
+  result.strips = std::move(strips);
+  result.warnings.push_back(std::move(words));
+}
+
+}  // namespace birefit::estimation

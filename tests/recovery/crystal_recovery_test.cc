@@ -1,0 +1,104 @@
+// A biased crystal bar: charge in it that adds to the bias, and parts of it that tell different things. Truth: sin^2 of
+// the field across the bar, in code of its own.
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "birefit/fit.h"
+#include "independent_droplet.h"  // camera()
+#include "scene_builder.h"
+
+namespace birefit {
+namespace {
+using namespace testing;
+
+struct Bar {
+  double half_wave_v = 1500, built_in_v = 0;
+  double gain = 3000, offset = 200, read = 20;
+  int width = 80, height = 64;
+  int good_from = 0, good_to = 64;   ///< rows of a field as the model has it
+  double bad_field = 0;              ///< elsewhere: a field larger by up to this part, by chance from frame to frame
+};
+
+FitJob job_of(const Bar& bar, const std::vector<double>& volts, bool built_in_free, unsigned seed) {
+  TableBuilder b;
+  const ParameterRef half_wave = b.fitted("half_wave_voltage_v", 1400, 800, 2500);
+  const ParameterRef built_in = built_in_free ? b.fitted("built_in_bias_v", 100, -300, 1200) : ParameterRef{};
+  const ParameterRef axis = b.fixed("slow_axis_deg", 135), wavelength = b.fixed("wavelength_nm", 1550);
+  const ParameterRef polarizer = b.fixed("polarizer_deg", 0), analyzer = b.fixed("analyzer_deg", 90);
+  const ParameterRef gain = b.linear("gain", 1000), offset = b.linear("offset", 0);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> by_chance(-1, 1);
+  FitJob job;
+  for (std::size_t g = 0; g < volts.size(); ++g) {
+    Scene scene;
+    Crystal crystal;
+    crystal.half_wave_voltage_v = half_wave;
+    crystal.bias_v = b.fixed("bias" + std::to_string(g), volts[g]);
+    crystal.built_in_bias_v = built_in;
+    crystal.slow_axis_deg = axis;
+    scene.sample = crystal;
+    scene.microscope.wavelength_nm = wavelength;
+    scene.microscope.polarizer_deg = polarizer;
+    scene.microscope.analyzer_deg = analyzer;
+    scene.view.width = bar.width, scene.view.height = bar.height;
+    std::vector<double> mean;
+    const double upper = 1 + bar.bad_field * by_chance(random), lower = 1 + bar.bad_field * by_chance(random);
+    for (int row = 0; row < bar.height; ++row)
+      for (int column = 0; column < bar.width; ++column) {
+        const double t = bar.bad_field > 0 ? 1 + 0.3 * bar.bad_field * std::sin(0.9 * row + 0.3 * column) : 1;
+        const double field = row < bar.good_from ? upper * t : row >= bar.good_to ? lower * t : 1;
+        const double phase = std::numbers::pi / 2 * (volts[g] + bar.built_in_v) / bar.half_wave_v * field;
+        mean.push_back(bar.offset + bar.gain * std::pow(std::sin(phase), 2));
+      }
+    job.micrographs.push_back(micrograph_of(std::to_string(static_cast<int>(volts[g])), scene,
+                                            camera(mean, 1, bar.read, seed + 100 * static_cast<unsigned>(g), false),
+                                            gain, offset, {bar.read, 1}));
+  }
+  job.parameters = b.table;
+  job.options.threads = 1;
+  return job;
+}
+
+TEST(CrystalRecovery, FindsTheBiasThatIsBuiltIn) {
+  for (const double truth : {0.0, 150.0, 420.0, 900.0}) {
+    Bar bar;
+    bar.built_in_v = truth;
+    const FitResult r = fit(job_of(bar, {0, 200, 400, 600, 800, 1000}, true, 7));
+    EXPECT_TRUE(r.has_answer()) << truth << ": " << r.verdict;
+    const ParameterEstimate* built_in = find_estimate(r, "built_in_bias_v");
+    const ParameterEstimate* half = find_estimate(r, "half_wave_voltage_v");
+    EXPECT_LT(std::abs(built_in->value - truth), 5 * built_in->stderr_) << truth << ' ' << built_in->value;
+    EXPECT_LT(std::abs(half->value - bar.half_wave_v), 5 * half->stderr_) << truth << ' ' << half->value;
+    EXPECT_LE(built_in->interval95_low, built_in->value) << truth;
+    EXPECT_GE(built_in->interval95_high, built_in->value) << truth;
+  }
+}
+
+// One voltage tells (bias + built in) / half-wave voltage: with gain and offset free not even that.
+TEST(CrystalRecovery, OneVoltageDoesNotTellWhatIsBuiltIn) {
+  const FitResult r = fit(job_of({.built_in_v = 300}, {500}, true, 8));
+  EXPECT_FALSE(r.has_answer());
+  EXPECT_NE(r.verdict.find("built_in_bias_v"), std::string::npos) << r.verdict;
+}
+
+TEST(CrystalStrips, ProposesTheRowsThatFramesAndModelAgreeOn) {
+  Bar bar;
+  bar.good_from = 24, bar.good_to = 40, bar.bad_field = 0.3;
+  const FitResult r = fit(job_of(bar, {200, 400, 600, 800, 1000}, false, 9));
+  ASSERT_TRUE(r.trusted_px.has_value()) << r.verdict;
+  EXPECT_EQ((*r.trusted_px)[1], 24);
+  EXPECT_EQ((*r.trusted_px)[3], 40);
+}
+
+TEST(CrystalStrips, SaysNothingWhereAllRowsTellTheSame) {
+  const FitResult r = fit(job_of({}, {200, 400, 600, 800, 1000}, false, 10));
+  EXPECT_FALSE(r.trusted_px.has_value());
+  EXPECT_TRUE(r.strips.empty());
+}
+
+}  // namespace
+}  // namespace birefit
