@@ -55,7 +55,6 @@ struct FitOptions {
   int scan_pixels = 4000;      ///< at most, of the coarse scan, spread over all micrographs
   int scan_candidates = 12;    ///< starts polished after the scan, of four times as many looked at; more where the image is described badly
   bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
-  bool zones_follow = true;    ///< what a disc takes out around its forces and rim follows the parameters; false: masks as they are
   bool choose_waves = false;   ///< Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
   double max_seconds = 60;
   bool choose_rays = false;    ///< straight or curved rays (Scene::rays) by what curved ones would change

@@ -173,10 +173,8 @@ Waves waves_of(const FitJob& job) {
   return waves;
 }
 
-}  // namespace
-
-FitResult fit(const FitJob& job) {
-  if (std::optional<FitResult> followed = fit_following_zones(job, fit)) return *std::move(followed);
+/// By rays or by waves, as they matter.
+FitResult fit_by_chosen_waves(const FitJob& job) {
   if (!job.options.choose_waves) return fit_by_given_waves(job);
   FitJob chosen = job;
   chosen.options.choose_waves = false;
@@ -206,5 +204,9 @@ FitResult fit(const FitJob& job) {
   add_effort(better, by_rays);
   return better;
 }
+
+}  // namespace
+
+FitResult fit(const FitJob& job) { return fit_following_zones(job, fit_by_chosen_waves); }
 
 }  // namespace birefit

@@ -63,11 +63,10 @@ Mask fitted_pixels(const Micrograph& micrograph, const Theta& theta) {
   return disc_of(micrograph) ? outside_all(micrograph.mask, {DiscZone(micrograph.scene, theta)}) : micrograph.mask;
 }
 
-std::optional<FitResult> fit_following_zones(const FitJob& job, const std::function<FitResult(const FitJob&)>& fit) {
+FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(const FitJob&)>& fit) {
   const auto& given = job.micrographs;
-  if (!job.options.zones_follow || std::none_of(given.begin(), given.end(), disc_of)) return std::nullopt;
+  if (std::none_of(given.begin(), given.end(), disc_of)) return fit(job);
   FitJob now = job;
-  now.options.zones_follow = false;
   Theta theta = job.parameters.values();
   bool depends = false;
   for (std::size_t g = 0; g < given.size(); ++g) {

@@ -3,7 +3,6 @@
 // Where they are depends on parameters that the fit may search for, so that they have to follow these.
 
 #include <functional>
-#include <optional>
 
 #include "birefit/fit.h"
 
@@ -14,8 +13,8 @@ namespace birefit::estimation {
 Mask fitted_pixels(const Micrograph& micrograph, const Theta& theta);
 
 /// A fit whose zones follow its parameters: first without whatever a zone may cover within the bounds, then with the
-/// zones at the estimate, again from there until they stay. Nothing where no sample has a zone, or within itself
-/// (FitOptions::zones_follow). `fit`: what fits with the masks as they are.
-std::optional<FitResult> fit_following_zones(const FitJob& job, const std::function<FitResult(const FitJob&)>& fit);
+/// zones at the estimate, again from there until they stay. `fit`: what fits with the masks as they are, and all of it
+/// where no sample has a zone.
+FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(const FitJob&)>& fit);
 
 }  // namespace birefit::estimation

@@ -32,5 +32,10 @@ fit_case pixel_size || fail 'pixel_size: no answer'
 grep -o 'more of micrograph.pixel_size_um makes diameter_um +[0-9.]*' pixel_size.txt | awk '{ by = $NF } END { exit !(by > 0.8 && by < 1.2) }' ||
   fail "pixel_size: $(grep -o 'Taken as exact.*' pixel_size.txt)"
 
+# Forces 7.9 degrees from where the config has them: what is left out around them is left out where they are.
+fit_case disc_azimuth || fail 'disc_azimuth: no answer'
+holds disc_azimuth load_n 76.272
+holds disc_azimuth load_azimuth_deg 97.913
+
 [ $failures -eq 0 ] && echo 'all as required' || echo "$failures failures"
 exit $((failures > 0))

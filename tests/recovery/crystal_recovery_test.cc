@@ -68,7 +68,12 @@ TEST(CrystalRecovery, FindsTheBiasThatIsBuiltIn) {
     Bar bar;
     bar.built_in_v = truth;
     const FitResult r = fit(job_of(bar, {0, 200, 400, 600, 800, 1000}, true, 7));
-    EXPECT_TRUE(r.has_answer()) << truth << ": " << r.verdict;
+    // Frames about the voltage where light is brightest are a parabola: both numbers slide along it together.
+    const bool parabola = truth > 800;
+    EXPECT_NE(r.has_answer(), parabola) << truth << ": " << r.verdict;
+    if (parabola) {
+      EXPECT_NE(r.verdict.find("half_wave_voltage_v up"), std::string::npos) << r.verdict;
+    }
     const ParameterEstimate* built_in = find_estimate(r, "built_in_bias_v");
     const ParameterEstimate* half = find_estimate(r, "half_wave_voltage_v");
     EXPECT_LT(std::abs(built_in->value - truth), 5 * built_in->stderr_) << truth << ' ' << built_in->value;

@@ -13,7 +13,7 @@
 namespace birefit::estimation {
 namespace {
 
-constexpr int kStrips = 8;
+constexpr int kStrips = 16;
 
 /// Along which axis strips follow each other: the field's in a bar (a bar's field varies along itself), else rows.
 /// Nothing where a sample has no parts that are alike.
@@ -108,14 +108,25 @@ double disagreement(const std::vector<Strip>& strips, std::size_t j) {
   return n > 0 ? chi_square / n : 0;
 }
 
-/// The run of strips that are far better than the others by `measure`: below half of the median.
-std::vector<bool> clearly_better(const std::vector<Strip>& strips, double Strip::*measure) {
+/// Strips below a part of the median of all by `measure`.
+std::vector<bool> below_median(const std::vector<Strip>& strips, double Strip::*measure, double part) {
   std::vector<double> values;
   for (const Strip& s : strips) values.push_back(s.*measure);
   const double middle = median(values);
-  std::vector<bool> better;
-  for (const Strip& s : strips) better.push_back(s.*measure < 0.5 * middle);
-  return better;
+  std::vector<bool> below;
+  for (const Strip& s : strips) below.push_back(s.*measure < part * middle);
+  return below;
+}
+
+/// The longest run of strips next to each other of which something is true: from, and behind its last.
+std::array<std::size_t, 2> longest_run(const std::vector<bool>& of) {
+  std::array<std::size_t, 2> longest{0, 0};
+  for (std::size_t begin = 0; begin < of.size(); ++begin) {
+    std::size_t end = begin;
+    while (end < of.size() && of[end]) ++end;
+    if (end - begin > longest[1] - longest[0]) longest = {begin, end};
+  }
+  return longest;
 }
 
 std::string range(const std::vector<Strip>& strips, double Strip::*measure, const std::vector<bool>& of, bool wanted) {
@@ -140,13 +151,20 @@ void compare_strips(const Task& task, const Optimum& optimum, FitResult& result)
   std::size_t worst = 0;
   for (std::size_t j = 1; j < task.unknowns.searched.size(); ++j)
     if (disagreement(strips, j) > disagreement(strips, worst)) worst = j;
-  // Seven strips against the eighth: by chance above this once in ten thousand.
+  // Sixteen strips: by chance above this once in a million.
   constexpr double kBeyondChance = 4;
   const double between = disagreement(strips, worst);
+  // A region is proposed where frames scatter far less than elsewhere and the model describes them no worse. By chance
+  // three strips of sixteen next to each other are both once in a hundred pictures, as scatter of two degrees of
+  // freedom is below half of its median in one strip of six.
+  constexpr std::size_t kFewestSteady = 3;
   const bool scatters = strips.front().frame_scatter > 0;
-  const std::vector<bool> described = clearly_better(strips, &Strip::reduced_chi_square);
-  const std::vector<bool> steady = scatters ? clearly_better(strips, &Strip::frame_scatter) : described;
-  const bool stands_out = scatters && std::count(steady.begin(), steady.end(), true) > 0;
+  const std::vector<bool> steady = scatters ? below_median(strips, &Strip::frame_scatter, 0.5) : std::vector<bool>{};
+  const std::vector<bool> described = below_median(strips, &Strip::reduced_chi_square, 1);
+  std::vector<bool> both(steady);
+  for (std::size_t i = 0; i < both.size(); ++i) both[i] = steady[i] && described[i];
+  const auto run = longest_run(steady), trusted = longest_run(both);
+  const bool stands_out = run[1] - run[0] >= kFewestSteady;
   if (between < kBeyondChance && !stands_out) return;
   const std::string what = *rows ? "rows" : "columns";
   const std::size_t side = *rows ? 1 : 0;
@@ -155,24 +173,22 @@ void compare_strips(const Task& task, const Optimum& optimum, FitResult& result)
   for (const Strip& s : strips)
     words += fmt::format("{}{} to {} {:.4g} +- {:.2g}", words.empty() ? "" : ", ", s.roi_px[side],
                          s.roi_px[side + 2] - 1, s.value[worst], s.stderr_[worst]);
-  words = fmt::format("Strips by themselves have {} ({}) of {}: they differ by {:.2g} times their errors squared.",
-                      parameter.name, what, words, between);
-  // A proposal needs both to point to the same strips, next to each other.
-  const auto first = std::find(steady.begin(), steady.end(), true), last = std::find(first, steady.end(), false);
-  const bool together = std::count(last, steady.end(), true) == 0;
-  if (stands_out && together && steady == described) {
-    const Strip &a = strips[static_cast<std::size_t>(first - steady.begin())],
-                &b = strips[static_cast<std::size_t>(last - steady.begin()) - 1];
+  words = fmt::format("Strips by themselves have {} ({}) of {}", parameter.name, what, words);
+  words += between < kBeyondChance ? "." : fmt::format(": they differ by {:.2g} times their errors squared.", between);
+  if (trusted[1] - trusted[0] >= kFewestSteady) {
+    const Strip &a = strips[trusted[0]], &b = strips[trusted[1] - 1];
     std::array<int, 4> roi = a.roi_px;
     for (const std::size_t i : {0, 1}) roi[i] = std::min(roi[i], b.roi_px[i]);
     for (const std::size_t i : {2, 3}) roi[i] = std::max(roi[i], b.roi_px[i]);
     result.trusted_px = roi;
+    std::vector<bool> within(strips.size());
+    for (std::size_t i = trusted[0]; i < trusted[1]; ++i) within[i] = true;
     words += fmt::format(
         " In {} {} to {} the frames scatter by {} of the model intensity, elsewhere by {}, and reduced chi-square is "
         "{} against {}: roi_px: [{}, {}, {}, {}] would leave these.",
-        what, roi[side], roi[side + 2] - 1, range(strips, &Strip::frame_scatter, steady, true),
-        range(strips, &Strip::frame_scatter, steady, false), range(strips, &Strip::reduced_chi_square, steady, true),
-        range(strips, &Strip::reduced_chi_square, steady, false), roi[0], roi[1], roi[2], roi[3]);
+        what, roi[side], roi[side + 2] - 1, range(strips, &Strip::frame_scatter, within, true),
+        range(strips, &Strip::frame_scatter, within, false), range(strips, &Strip::reduced_chi_square, within, true),
+        range(strips, &Strip::reduced_chi_square, within, false), roi[0], roi[1], roi[2], roi[3]);
   } else if (stands_out) {
     words += " Where frames scatter least is not where the model describes them best: no part is to be preferred.";
   }
