@@ -82,6 +82,8 @@ void weigh_shapes(const Task& task, const Optimum& optimum, const FrameSums& fra
 /// Places at which the lamp's jitter is looked at, from none to the largest that still is a lamp's.
 constexpr int kLampPlaces = 400;
 constexpr double kMostJitter = 5 * kLampJitter;
+/// Frames show a scatter where their noise alone would make it less often than once in a hundred fits.
+constexpr double kShown = 0.99;
 
 /// Of the frames' means, in units of their noise and the lamp's jitter.
 double sum_of_squares(const FrameSums& frames, const std::vector<double>& ratio, double jitter) {
@@ -109,7 +111,7 @@ std::vector<double> lamp_over_noise(const Task& task, const Frames& setup, const
 /// and the restricted likelihood of the frames' means; where they do not show it, at most what widens an error bar by
 /// kUnseen.
 double lamp_jitter(const FrameSums& frames, const std::vector<double>& freedom, const std::vector<double>& ratio) {
-  constexpr double kUnseen = 1.2, kShown = 0.99;
+  constexpr double kUnseen = 1.2;
   const double most = *std::max_element(ratio.begin(), ratio.end());
   if (!(most > 0)) return 0;
   const double dof = std::accumulate(freedom.begin(), freedom.end(), 0.0);
@@ -225,9 +227,11 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   // What scatters by more than a lamp does is not the lamp, nor need it be where frames are not described either.
   constexpr double kSignificant = 0.999;
   const double significant = chi_square_quantile(kSignificant, dof);
-  if (sum_of_squares(frames, ratio, found.lamp_jitter) > significant ||
-      (found.beyond_noise && deviance_by_scatter(task, optimum.theta, frames) < deviance_by_lamp(frames, ratio)))
-    found.lamp_jitter = 0;
+  constexpr double kTellsWhich = 2;  // degrees of freedom: a single one tells of any scatter only that it is there
+  const bool of_model = found.beyond_noise && dof > kTellsWhich - 0.1 &&
+                        sum_of_squares(frames, ratio, 0) > chi_square_quantile(kShown, dof) &&
+                        deviance_by_scatter(task, optimum.theta, frames) < deviance_by_lamp(frames, ratio);
+  if (of_model || sum_of_squares(frames, ratio, found.lamp_jitter) > significant) found.lamp_jitter = 0;
   found.lamp_share = 0;
   for (const double r : ratio)
     found.lamp_share = std::max(found.lamp_share, 1 - 1 / (1 + std::pow(found.lamp_jitter * r, 2)));
@@ -288,10 +292,12 @@ Optimum with_settled_misfit(const Task& task, Optimum optimum) {
     }
     solve_again(task, optimum, "misfit weighed");
     // Against a prior a shape's weight may take the fit to where the shape is another.
-    const bool shapes_still = std::equal(weights.begin(), weights.end(), optimum.problem->misfit().begin(),
-                                         [&](const Misfit& then, const Misfit& now) {
-                                           return still(now.shape_variance, then.shape_variance, kShapeSettled);
-                                         });
+    const bool shapes_still =
+        optimum.problem->prior_rows() == 0 ||
+        std::equal(weights.begin(), weights.end(), optimum.problem->misfit().begin(),
+                   [&](const Misfit& then, const Misfit& now) {
+                     return still(now.shape_variance, then.shape_variance, kShapeSettled);
+                   });
     if (pass > 0 && shapes_still && still(optimum.misfit.frame_sd, before.frame_sd, kSettled) &&
         still(optimum.misfit.lamp_jitter, before.lamp_jitter, kSettled))
       break;
