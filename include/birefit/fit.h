@@ -11,43 +11,12 @@
 #include <vector>
 
 #include "birefit/image.h"
+#include "birefit/measurement.h"
 #include "birefit/parameters.h"
 #include "birefit/render.h"
 #include "birefit/scene.h"
 
 namespace birefit {
-
-/// Variance of one pixel's counts: read_counts^2 + counts_per_photon * max(signal counts - black_counts, 0).
-struct NoiseModel {
-  double read_counts = 0;        ///< >= 0
-  double counts_per_photon = 0;  ///< >= 0
-  bool estimated = false;        ///< from the image itself
-  double black_counts = 0;       ///< the signal up to which there is read noise alone: a camera's black level
-};
-
-/// What light adds across an image: `coefficient`, in units of the values, times a shape; to the gain (uneven illumination, vignetting) or
-/// to the offset (a tilted background).
-struct UnevenLight {
-  /// X right, Y up, from the middle of the image, 1 at its edge along the longer side; square: X^2 + Y^2.
-  enum class Shape { x, y, square };
-  ParameterRef coefficient;
-  Shape shape = Shape::x;
-  bool of_intensity = false;  ///< added to the gain
-};
-
-/// One image of a fit, in memory. Values are counts, or transmission when calibration frames were given.
-struct Micrograph {
-  std::string name;   ///< for reports: the file name
-  Scene scene;
-  Image values;
-  Mask mask;          ///< 1 = usable; dead, saturated, non-finite, user-masked and out-of-ROI pixels are 0
-  Image variance_scale;  ///< calibration: variance of a value per variance of a count, (1/(parallel - dark))^2; else empty
-  ParameterRef gain, offset;  ///< linear: value = gain * intensity + offset; several micrographs may share one
-  std::vector<UnevenLight> uneven;  ///< linear as well
-  std::optional<NoiseModel> noise;  ///< in counts; else estimated from the image
-  /// Pixel counts by reason, for the report.
-  int masked_by_user = 0, outside_roi = 0, saturated = 0, dead = 0, non_finite = 0;
-};
 
 struct FitOptions {
   int threads = 0;             ///< 0 = all cores
@@ -65,13 +34,13 @@ struct FitOptions {
 /// One of several states that a sample may be in and that no parameter leads from one to the other.
 struct SampleBranch {
   std::string name;            ///< "hedgehog", "ring"
-  std::vector<Sample> samples; ///< of each micrograph in this branch
+  std::vector<Sample> samples; ///< of each picture in this branch
   std::vector<int> idle;       ///< parameters that this branch does not have
 };
 
 struct FitJob {
   ParameterTable parameters;
-  std::vector<Micrograph> micrographs;
+  std::vector<Measurement> measurements;
   std::vector<SampleBranch> branches;  ///< more than one: each is fitted, the best is reported
   std::optional<JointPrior> prior;
   FitOptions options;
@@ -124,6 +93,7 @@ struct FisherDirection {
   std::string words;      ///< "birefringence up 0.01 with diameter_um down 0.4: only their combination is known ..."
 };
 
+/// What became of one frame: a picture, or a table's row, or its rings, as an image of as many pixels.
 struct MicrographResult {
   std::string name;
   Image fitted;     ///< in units of the micrograph's values

@@ -10,10 +10,10 @@
 
 namespace birefit {
 
-/// A table of signal against something (`signal:`): its rows are one-pixel micrographs of the job, one after another.
+/// A table of signal against something (`signal:`), which is the job's measurement of the same number.
 struct SignalTable {
   std::string name;          ///< file name
-  std::size_t first = 0;     ///< micrograph of its first row
+  std::size_t first = 0;     ///< of its rows among FitResult::micrographs
   std::string path;          ///< parameter that its first column sets
   std::vector<double> x;     ///< that column, growing
   std::vector<int> line;     ///< of each row in the file
@@ -29,9 +29,10 @@ std::vector<std::string> describe_rows(const Config& config);
 struct Config {
   std::filesystem::path path;
   std::string text;       ///< the file as read, for the echo
-  FitJob job;             ///< micrographs empty for render-only configs
+  FitJob job;             ///< measurements empty for render-only configs
   std::vector<SignalTable> signals;  ///< empty when the job is of images
-  Scene scene;            ///< of the first micrograph, or of `image_size_px`
+  Scene scene;            ///< of the first measurement, or of `image_size_px`
+  Observable observable;  ///< what is measured in it
   std::vector<std::filesystem::path> inputs;  ///< every file that was read beside the config
   std::string fingerprint;  ///< of a frame of a series: all that determines its fit (birefit/series.h); goes into fit.json
 };

@@ -11,6 +11,7 @@
 #include <Eigen/Dense>
 
 #include "birefit/image.h"
+#include "birefit/observable.h"
 #include "birefit/scene.h"
 
 namespace birefit {
@@ -29,6 +30,7 @@ struct DiscSquare {
 /// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth (but for which
 /// pixels lie at a core's edge: their points follow it, which changes a mean by some 1e-4).
 struct RenderPlan {
+  Observable observable;            ///< what is rendered
   std::string method;               ///< transport method by name
   std::string physics;              ///< the ceiling's name
   std::vector<std::string> reasons; ///< one sentence for every rung: why it stopped or went on
@@ -67,7 +69,8 @@ int rays_side_by_side();
 
 /// Chooses the cheapest method that holds scene.intensity_accuracy within scene.ceiling, at the values of theta.
 /// Throws UserError when a forced method cannot do the scene.
-RenderPlan plan(const Scene& scene, const Theta& theta);
+/// `observable`: what the values of the picture are, where they are not intensities; its one pixel, or one for every ring.
+RenderPlan plan(const Scene& scene, const Theta& theta, const Observable& observable = {});
 
 /// The picture of a droplet, shell or sampled field by Maxwell's equations, marched through (src/wave/march.h): independent of the propagation of Ceiling::wave,
 /// and much slower. Throws UserError like plan().

@@ -191,9 +191,7 @@ struct Plate {
   UniformDirector director;
   std::variant<std::monostate, HeatStep> heat;
   ParameterRef half_angle_deg;  ///< in the outside medium, (0, 80]; none: a table of rings, below
-  /// Instead of a picture, radii of dark rings measured on a screen: "pixel" i of the one row is the radius (cm) of ring number
-  /// ring_numbers[i], where the retardance is 2 pi (ring_numbers[i] + ring_offset). Plates cut normal to the axis only.
-  std::vector<double> ring_numbers;
+  /// Without a picture: dark rings on a screen (Quantity::ring_radius_cm); plates cut normal to the axis only.
   ParameterRef screen_distance_um;  ///< from the middle of the plate
   ParameterRef ring_offset;         ///< of the numbering; not given: 0
 };
@@ -306,15 +304,6 @@ enum class Ceiling {
 /// render.h). What follows from the choice: docs/methods.md.
 enum class Rays { straight, eikonal };
 
-/// What the value of a pixel, or of a row of a table, is. All but the intensity: of a cell at normal incidence whose axis does not turn about the
-/// light, without polarizers and with the sign of n_e - n_o.
-enum class Quantity {
-  intensity,         ///< behind the analyser, over the incident
-  retardance_um,     ///< optical path difference
-  retardance_waves,  ///< the same over the wavelength
-  birefringence,     ///< the same over the thickness
-};
-
 struct Scene {
   Sample sample;
   Material material;
@@ -324,7 +313,6 @@ struct Scene {
   View view;
   Ceiling ceiling = Ceiling::one_way;
   Rays rays = Rays::straight;
-  Quantity quantity = Quantity::intensity;
   double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold
   std::string method = "auto";       ///< or a transport method's name
 };

@@ -55,7 +55,7 @@ Image resampled_residual(const MicrographResult& of, std::mt19937_64& random) {
 bool misfits(const MicrographResult& of) { return of.chi_square > of.used + 5 * std::sqrt(2.0 * of.used); }
 
 /// What a camera with the fit's noise would have recorded.
-Image simulated(const Micrograph& micrograph, const MicrographResult& of, std::mt19937_64& random) {
+Image simulated(const Picture& micrograph, const MicrographResult& of, std::mt19937_64& random) {
   Image values = of.fitted;
   if (misfits(of)) {
     const Image noise = resampled_residual(of, random);
@@ -111,11 +111,20 @@ Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws)
     FitJob again = job;
     again.options.progress = nullptr;
     again.options.threads = threads;
-    for (std::size_t g = 0; g < again.micrographs.size(); ++g) {
-      Micrograph& m = again.micrographs[g];
-      const Image drawn = simulated(m, result.micrographs[g], random);
-      for (std::size_t i = 0; i < drawn.size(); ++i)
-        if (m.mask.values()[i]) m.values.values()[i] = drawn.values()[i];
+    std::size_t sight = 0;
+    for (Measurement& measurement : again.measurements) {
+      if (Picture* m = std::get_if<Picture>(&measurement)) {
+        const Image drawn = simulated(*m, result.micrographs[sight++], random);
+        for (std::size_t i = 0; i < drawn.size(); ++i)
+          if (m->mask.values()[i]) m->values.values()[i] = drawn.values()[i];
+        continue;
+      }
+      Readings& readings = std::get<Readings>(measurement);
+      const Picture as_they_are;  // neither calibrated nor masked
+      for (Eigen::Index at = 0; at < readings.values.size();) {
+        const Image drawn = simulated(as_they_are, result.micrographs[sight++], random);
+        for (const double value : drawn.values()) readings.values[at++] = value;
+      }
     }
     redraw_priors(again, result.theta, random);
     FitResult refit;

@@ -86,6 +86,7 @@ std::vector<Outcome> fit_side_by_side(std::span<const FitJob> jobs) {
   constexpr double kBeaten = 10;
   double best = std::numeric_limits<double>::infinity();
   std::vector<Task> tasks;
+  tasks.reserve(jobs.size());  // problems refer to theirs
   std::vector<Minima> minima;
   std::vector<double> seconds;
   for (const FitJob& job : jobs) {

@@ -31,7 +31,7 @@ struct Planned {
 };
 
 /// Value that `share` of the usable pixels stay below.
-double quantile(const Micrograph& m, double share) {
+double quantile(const Picture& m, double share) {
   std::vector<double> values;
   for (std::size_t i = 0; i < m.values.size(); ++i)
     if (m.mask.values()[i] && std::isfinite(m.values.values()[i])) values.push_back(m.values.values()[i]);
@@ -41,9 +41,16 @@ double quantile(const Micrograph& m, double share) {
   return *at;
 }
 
+Picture& picture_of(Measurement& measurement) {
+  if (Picture* picture = std::get_if<Picture>(&measurement)) return *picture;
+  throw UserError(Where{}, "a table of signals has no next image", "explain --next is for images");
+}
+const Picture& first_picture(const FitJob& job) { return std::get<Picture>(job.measurements.front()); }
+
 Planned planned(const FitJob& job) {
   Planned p{job, {}, {}, ""};
-  for (Micrograph& m : p.job.micrographs) {
+  for (Measurement& measurement : p.job.measurements) {
+    Picture& m = picture_of(measurement);
     const Theta theta = p.job.parameters.values();
     p.plans.push_back(plan(m.scene, theta));
     const Image light = render(m.scene, p.plans.back(), theta, {}, job.options.threads).intensity;
@@ -60,7 +67,7 @@ Planned planned(const FitJob& job) {
         p.job.parameters[m.offset].value = dark - *low * (m.gain ? p.job.parameters[m.gain].value : 1);
     }
     const double gain = m.gain ? p.job.parameters[m.gain].value : 1;
-    Micrograph signal = m;
+    Picture signal = m;
     signal.values = lit(m, p.job.parameters.values(), light);
     Image sigma;
     std::string words;
@@ -101,7 +108,8 @@ struct Information {
 Information information(const Planned& p) {
   Information result;
   result.unknowns = Unknowns::of(p.job);
-  LeastSquares problem(p.job, result.unknowns, p.plans, p.sets);
+  const Task task(p.job);
+  LeastSquares problem(task, p.plans, p.sets);
   Eigen::VectorXd start(static_cast<Eigen::Index>(result.unknowns.searched.size()));
   for (std::size_t j = 0; j < result.unknowns.searched.size(); ++j)
     start[static_cast<Eigen::Index>(j)] = p.job.parameters[result.unknowns.searched[j]].value;
@@ -111,16 +119,10 @@ Information information(const Planned& p) {
   return result;
 }
 
-void refuse_tables(const FitJob& job) {
-  for (const Micrograph& m : job.micrographs)
-    if (m.scene.view.width * m.scene.view.height == 1)
-      throw UserError(Where{}, "a table of signals has no next image", "explain --next is for images");
-}
-
 /// The first image's scene, once more, changed by `change`.
 FitJob with_shot(const FitJob& job, const std::function<void(Scene&, ParameterTable&)>& change) {
   FitJob more = job;
-  Micrograph shot = job.micrographs.front();
+  Picture shot = first_picture(job);
   shot.name = "next";
   shot.values = {};
   change(shot.scene, more.parameters);
@@ -133,7 +135,7 @@ FitJob with_shot(const FitJob& job, const std::function<void(Scene&, ParameterTa
       own.name += ", next image";
       *ref = more.parameters.add(own);
     }
-  more.micrographs.push_back(std::move(shot));
+  more.measurements.push_back(std::move(shot));
   return more;
 }
 
@@ -167,7 +169,6 @@ Outlook outlook(const FitJob& job) {
 }
 
 std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
-  refuse_tables(job);
   const Unknowns unknowns = Unknowns::of(job);
   int wanted = -1;
   std::string names;
@@ -184,7 +185,7 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
   const FitJob base = planned(job).job;  // levels and noise as the images have them
   using Change = std::function<void(Scene&, ParameterTable&)>;
   std::vector<std::pair<std::string, Change>> candidates{{"the same again", [](Scene&, ParameterTable&) {}}};
-  const Microscope& now = base.micrographs.front().scene.microscope;
+  const Microscope& now = first_picture(base).scene.microscope;
   const ParameterTable& table = base.parameters;
   const auto known = [&](ParameterRef ref) { return ref && !table[ref].free; };
   const auto constant = [](ParameterTable& t, const char* name, double value) { return t.add_constant(name, value); };
@@ -209,7 +210,7 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
           s.microscope.wavelength_nm = constant(t, "next wavelength_nm", other);
         });
   }
-  const Scene& scene = base.micrographs.front().scene;
+  const Scene& scene = first_picture(base).scene;
   if (std::holds_alternative<StressedDisc>(scene.sample) && !now.quarter_wave)
     candidates.emplace_back("with quarter-wave plates (circular polariscope)",
                             [](Scene& s, ParameterTable&) { s.microscope.quarter_wave = true; });

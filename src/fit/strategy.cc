@@ -82,7 +82,7 @@ FitResult with_chosen_rays(const FitJob& job, Outcome straight) {
   if (!job.options.choose_rays || !(straight.by_curved_rays >= 1)) return std::move(straight.result);
   FitJob curved = job;
   curved.options.choose_rays = false;
-  for (Micrograph& m : curved.micrographs) m.scene.rays = Rays::eikonal;
+  for_each_scene(curved.measurements, [](Scene& scene) { scene.rays = Rays::eikonal; });
   FitResult better = fit_one(curved).result;
   for (MicrographResult& m : better.micrographs)
     m.plan.reasons.push_back(
@@ -135,7 +135,8 @@ FitResult fit_by_given_waves(const FitJob& job) {
   for (const SampleBranch& branch : job.branches) {
     FitJob& one = jobs.emplace_back(job);
     one.branches.clear();
-    for (std::size_t g = 0; g < one.micrographs.size(); ++g) one.micrographs[g].scene.sample = branch.samples[g];
+    std::size_t at = 0;
+    for_each_scene(one.measurements, [&](Scene& scene) { scene.sample = branch.samples[at++]; });
     for (const int index : branch.idle) one.parameters[index].free = false;
     if (job.options.progress)
       one.options.progress = [&](const std::string& line) { job.options.progress(branch.name + ": " + line); };
@@ -159,12 +160,12 @@ Waves waves_of(const FitJob& job) {
   Waves waves;
   const Theta theta = job.parameters.values();
   double an_image = 0;
-  for (const Micrograph& m : job.micrographs) {
-    const WaveChoice choice = wave_choice(m.scene, theta);
+  for_each_scene(job.measurements, [&](const Scene& scene) {
+    const WaveChoice choice = wave_choice(scene, theta);
     an_image += choice.seconds_an_image;
     waves.words = choice.words;
     waves.series = waves.series && choice.series;
-  }
+  });
   int searched = 1;
   for (int i = 0; i < job.parameters.size(); ++i) searched += job.parameters[i].free && !job.parameters[i].linear;
   // What a fit takes, from what one image does: some 15 evaluations with derivatives, each as dear as one image a
@@ -199,7 +200,7 @@ FitResult fit_by_chosen_waves(const FitJob& job) {
       return by_rays;
     }
   }
-  for (Micrograph& m : chosen.micrographs) m.scene.ceiling = Ceiling::wave;
+  for_each_scene(chosen.measurements, [](Scene& scene) { scene.ceiling = Ceiling::wave; });
   FitResult better = fit_by_given_waves(chosen);
   add_effort(better, by_rays);
   return better;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -12,8 +13,22 @@
 namespace birefit::estimation {
 namespace {
 
-const StressedDisc* disc_of(const Micrograph& micrograph) {
-  return std::get_if<StressedDisc>(&micrograph.scene.sample);
+const StressedDisc* disc_of(const Picture& picture) { return std::get_if<StressedDisc>(&picture.scene.sample); }
+
+/// The pictures of discs among a job's measurements, and where they are among its sights.
+struct PictureOfDisc {
+  std::size_t sight = 0;
+  Picture* picture = nullptr;
+};
+std::vector<PictureOfDisc> discs_of(FitJob& job) {
+  std::vector<PictureOfDisc> discs;
+  std::size_t sight = 0;
+  for (Measurement& measurement : job.measurements) {
+    Picture* picture = std::get_if<Picture>(&measurement);
+    if (picture && disc_of(*picture)) discs.push_back({sight, picture});
+    sight += picture ? 1 : std::get<Readings>(measurement).rows.size();
+  }
+  return discs;
 }
 
 Mask outside_all(Mask mask, const std::vector<DiscZone>& zones) {
@@ -30,7 +45,7 @@ long count(const Mask& mask) {
 
 /// Without whatever the zone covers for some parameters within their bounds: the corners of centre and diameter, the
 /// forces at steps of half of what is left out around them.
-Mask possible_pixels(const FitJob& job, const Micrograph& micrograph, const Theta& theta) {
+Mask possible_pixels(const FitJob& job, const Picture& micrograph, const Theta& theta) {
   const StressedDisc& disc = *disc_of(micrograph);
   const View& view = micrograph.scene.view;
   std::vector<Theta> places{theta};
@@ -59,21 +74,22 @@ Mask possible_pixels(const FitJob& job, const Micrograph& micrograph, const Thet
 
 }  // namespace
 
-Mask fitted_pixels(const Micrograph& micrograph, const Theta& theta) {
+Mask fitted_pixels(const Picture& micrograph, const Theta& theta) {
   return disc_of(micrograph) ? outside_all(micrograph.mask, {DiscZone(micrograph.scene, theta)}) : micrograph.mask;
 }
 
 FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(const FitJob&)>& fit) {
-  const auto& given = job.micrographs;
-  if (std::none_of(given.begin(), given.end(), disc_of)) return fit(job);
   FitJob now = job;
+  const std::vector<PictureOfDisc> discs = discs_of(now);
+  if (discs.empty()) return fit(job);
+  std::vector<Mask> given;
+  for (const PictureOfDisc& disc : discs) given.push_back(disc.picture->mask);
   Theta theta = job.parameters.values();
   bool depends = false;
-  for (std::size_t g = 0; g < given.size(); ++g) {
-    Mask& mask = now.micrographs[g].mask;
-    mask = fitted_pixels(given[g], theta);
-    if (!disc_of(given[g])) continue;
-    Mask possible = possible_pixels(job, given[g], theta);
+  for (const PictureOfDisc& disc : discs) {
+    Mask possible = possible_pixels(job, *disc.picture, theta);
+    Mask& mask = disc.picture->mask;
+    mask = fitted_pixels(*disc.picture, theta);
     if (possible.values() == mask.values()) continue;
     depends = true;
     // Bounds so wide that they leave next to nothing tell no more than the start.
@@ -89,12 +105,13 @@ FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(c
   for (int round = 0; depends && round < kRounds && changed > kSettled && !result.interrupted; ++round) {
     double pixels = 0;
     changed = 0;
-    for (std::size_t g = 0; g < given.size(); ++g) {
-      const Mask mask = fitted_pixels(given[g], result.theta);
-      if (count(mask) == 0) return result;  // the disc has left the picture
-      for (std::size_t i = 0; i < mask.size(); ++i)
-        changed += mask.values()[i] != now.micrographs[g].mask.values()[i], pixels += mask.values()[i] != 0;
-      now.micrographs[g].mask = mask;
+    for (std::size_t d = 0; d < discs.size(); ++d) {
+      Picture& picture = *discs[d].picture;
+      const Mask before = std::exchange(picture.mask, given[d]);
+      picture.mask = fitted_pixels(picture, result.theta);
+      if (count(picture.mask) == 0) return result;  // the disc has left the picture
+      for (std::size_t i = 0; i < before.size(); ++i)
+        changed += picture.mask.values()[i] != before.values()[i], pixels += picture.mask.values()[i] != 0;
     }
     changed /= pixels;
     if (changed == 0) break;
@@ -107,8 +124,8 @@ FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(c
     result = fit(now);
   }
   result.evaluations += evaluations, result.seconds += seconds;
-  for (std::size_t g = 0; g < result.micrographs.size(); ++g)
-    result.micrographs[g].outside = static_cast<int>(count(given[g].mask) - count(now.micrographs[g].mask));
+  for (std::size_t d = 0; d < discs.size(); ++d)
+    result.micrographs[discs[d].sight].outside = static_cast<int>(count(given[d]) - count(discs[d].picture->mask));
   for (ParameterEstimate& estimate : result.parameters)
     if (const ParameterRef ref = job.parameters.find(estimate.name)) estimate.start = job.parameters[ref].value;
   if (depends && changed > kSettled && !result.interrupted) {

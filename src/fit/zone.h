@@ -10,7 +10,7 @@ namespace birefit::estimation {
 
 /// The usable pixels of a micrograph without those that its sample takes out where `theta` puts it; the mask as it is
 /// for samples that take out none.
-Mask fitted_pixels(const Micrograph& micrograph, const Theta& theta);
+Mask fitted_pixels(const Picture& micrograph, const Theta& theta);
 
 /// A fit whose zones follow its parameters: first without whatever a zone may cover within the bounds, then with the
 /// zones at the estimate, again from there until they stay. `fit`: what fits with the masks as they are, and all of it

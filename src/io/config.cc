@@ -154,7 +154,7 @@ void read_calibration(ConfigReader& reader, const Block& root, const Block& micr
   }
 }
 
-MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene) {
+MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene, Quantity quantity) {
   MicrographSettings settings;
   const Block block = reader.block(root, "micrograph",
                                    {"image", "page", "channel", "pixel_size_um", "transfer", "gain", "offset", "illumination", "background", "center_px",
@@ -186,7 +186,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
       settings.transfer.kind = Transfer::Kind::srgb;
     }
   }
-  const bool scaled = !has_ring_table(scene) && scene.quantity == Quantity::intensity;  // radii come in cm, retardances as what they are
+  const bool scaled = !has_ring_table(scene) && quantity == Quantity::intensity;  // radii come in cm, retardances as what they are
   settings.gain = read_linear(reader, block, "gain", 1, scaled);
   settings.offset = read_linear(reader, block, "offset", 0, scaled);
   settings.offset_automatic = reader.table[settings.offset].automatic;
@@ -412,7 +412,7 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
 
 /// Values, mask and the reasons for exclusion; false when a problem left nothing to work with.
 bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const Calibration* calibration,
-                 const Mask* user_mask, LoadedImage& image, const Where& where, Micrograph& micrograph) {
+                 const Mask* user_mask, LoadedImage& image, const Where& where, Picture& micrograph) {
   const int width = image.values.width(), height = image.values.height();
   const std::string& name = micrograph.name;
   const std::size_t problems_before = reader.problems.all().size();
@@ -482,20 +482,25 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
 }
 
 /// Replaces a reference everywhere in a micrograph.
-void replace_ref(Micrograph& micrograph, ParameterRef from, ParameterRef to) {
+void replace_ref(Scene& scene, ParameterRef from, ParameterRef to) {
+  for_each_ref(scene, [&](ParameterRef& ref) {
+    if (ref == from) ref = to;
+  });
+}
+void replace_ref(Picture& micrograph, ParameterRef from, ParameterRef to) {
   const auto swap = [&](ParameterRef& ref) {
     if (ref == from) ref = to;
   };
-  for_each_ref(micrograph.scene, swap);
+  replace_ref(micrograph.scene, from, to);
   swap(micrograph.gain);
   swap(micrograph.offset);
   for (UnevenLight& uneven : micrograph.uneven) swap(uneven.coefficient);
 }
 
 /// A micrograph of the shared scene with its own values of what its `set:` names.
-Micrograph apply_set(ConfigReader& reader, const Micrograph& shared, const Item& item, std::size_t index,
+Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item, std::size_t index,
                      const std::string& list = "micrographs") {
-  Micrograph micrograph = shared;
+  Picture micrograph = shared;
   const std::map<std::string, NumberSpec> shared_specs = reader.specs;
   const std::map<std::string, ParameterRef> shared_refs = reader.refs;
   for (std::size_t k = 0; k < item.set.size(); ++k) {
@@ -566,15 +571,15 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
 /// A droplet in a field is a hedgehog or has a ring: both are fitted.
 void add_branches(FitJob& job) {
   SampleBranch hedgehog{"hedgehog", {}, {}}, ring{"ring", {}, {}};
-  for (const Micrograph& micrograph : job.micrographs) {
-    ring.samples.push_back(micrograph.scene.sample);
-    Droplet droplet = std::get<Droplet>(micrograph.scene.sample);
+  for_each_scene(job.measurements, [&](const Scene& scene) {
+    ring.samples.push_back(scene.sample);
+    Droplet droplet = std::get<Droplet>(scene.sample);
     AxialDirector axial = std::get<AxialDirector>(droplet.director);
     hedgehog.idle.push_back(axial.ring_radius.index);
     axial.ring_radius = {};
     droplet.director = axial;
     hedgehog.samples.push_back(droplet);
-  }
+  });
   job.branches = {hedgehog, ring};
 }
 
@@ -763,14 +768,14 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     for (const auto& [path, unused] : signals[0].set)
       if (everywhere(path)) reader.set_everywhere.push_back(path);
   }
-  Micrograph shared;
+  Picture shared;
   const Quantity quantity = signals.empty() ? Quantity::intensity : signals[0].quantity;
   for (const SignalItem& item : signals)
     if (item.quantity != quantity) reader.problems.add(item.where, "every table of a config must have the same quantity");
   reader.polarizers = quantity == Quantity::intensity;
   shared.scene = read_scene(reader, root);
-  shared.scene.quantity = quantity;
-  MicrographSettings settings = read_micrograph(reader, root, shared.scene);
+  config.observable.quantity = quantity;
+  MicrographSettings settings = read_micrograph(reader, root, shared.scene, quantity);
   if (list && settings.image)
     reader.problems.add(settings.image_where, "micrograph.image is given beside micrographs", "give one of the two");
   if (list && image)
@@ -805,7 +810,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       if (!item.page) item.page = settings.page;
   }
 
-  std::vector<Micrograph> micrographs;
+  std::vector<Picture> micrographs;
+  std::vector<Readings> tables;
   if (!signals.empty()) {
     if (image) reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `signal:`");
     if (!std::holds_alternative<Cell>(shared.scene.sample) && reader.problems.empty())
@@ -821,21 +827,23 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       Item own;
       own.set = signals[i].set;
       own.set_where = signals[i].set_where;
-      const Micrograph base = apply_set(reader, shared, own, i, "signal");
+      const Picture base = apply_set(reader, shared, own, i, "signal");
+      std::size_t rows = 0;
+      for (const Readings& table : tables) rows += table.rows.size();
       append_signal(
-          reader, signals[i], i, base,
-          [&](Micrograph& micrograph, ParameterRef from, ParameterRef to) {
+          reader, signals[i], i, base, rows,
+          [&](Scene& scene, ParameterRef from, ParameterRef to) {
             reader.replaced.insert(from.index);
-            replace_ref(micrograph, from, to);
+            replace_ref(scene, from, to);
           },
-          config, micrographs);
+          config, tables);
     }
     items.clear();
   }
   for (std::size_t i = 0; i < items.size(); ++i) micrographs.push_back(apply_set(reader, shared, items[i], i));
 
   // An image may have a focus of its own, which only waves know.
-  for (const Micrograph& own : micrographs) {
+  for (const Picture& own : micrographs) {
     const ParameterRef focus = own.scene.microscope.focus_um;
     if (!focus || focus == shared.scene.microscope.focus_um || own.scene.ceiling == Ceiling::wave || !is_defocused(reader, own.scene)) continue;
     if (!reader.choose_waves) {
@@ -843,7 +851,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       continue;
     }
     reader.choose_waves = false;
-    for (Micrograph& micrograph : micrographs) micrograph.scene.ceiling = Ceiling::wave;
+    for (Picture& micrograph : micrographs) micrograph.scene.ceiling = Ceiling::wave;
   }
 
   // Without an image to look at there is only the view.
@@ -853,10 +861,14 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   if (use != ConfigUse::render) {
     // A shared parameter that every image replaces by its own is no unknown of the fit.
     std::set<int> used;
-    for (Micrograph& micrograph : micrographs) {
+    for (Picture& micrograph : micrographs) {
       for_each_ref(micrograph.scene, [&](ParameterRef& ref) { used.insert(ref.index); });
       used.insert({micrograph.gain.index, micrograph.offset.index});
       for (const UnevenLight& uneven : micrograph.uneven) used.insert(uneven.coefficient.index);
+    }
+    for (Readings& table : tables) {
+      for (Scene& scene : table.rows) for_each_ref(scene, [&](ParameterRef& ref) { used.insert(ref.index); });
+      used.insert({table.gain.index, table.offset.index});
     }
     const bool sound = reader.problems.empty();  // else images may be missing
     for (int i = 0; i < reader.table.size(); ++i) {
@@ -875,7 +887,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   };
 
   if (use == ConfigUse::render && !signals.empty()) {
-    if (!micrographs.empty()) config.scene = micrographs[0].scene;  // of the first row
+    if (!tables.empty()) config.scene = tables[0].rows[0];
   } else if (view_only && !micrographs.empty()) {  // none: their list's mistake was reported
     Scene& scene = micrographs[0].scene;
     const Item& item = items[0];
@@ -888,7 +900,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     } else if (image || item.image) {
       const ImageRequest request{image ? *image : reader.resolve(*item.image), item.page, settings.channel,
                                  image ? Where{image->string()} : item.image_where};
-      if (const std::optional<LoadedImage> loaded = has_ring_table(scene) ? load_ring_table(reader, request.path, request.where, scene) : try_load(reader, request)) {
+      if (const std::optional<LoadedImage> loaded = has_ring_table(scene) ? load_ring_table(reader, request.path, request.where, scene, config.observable) : try_load(reader, request)) {
         set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
         demand_pixel_size(scene);
         if (reader.problems.empty()) {
@@ -907,7 +919,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       reader.problems.add({reader.file}, "needs image_size_px: [width, height] or micrograph.image");
     }
     config.scene = scene;
-    if (use == ConfigUse::plan) config.job.micrographs = {micrographs[0]};
+    if (use == ConfigUse::plan) config.job.measurements = {micrographs[0]};
   } else if (!view_only) {
     if (!list && signals.empty() && !items[0].image && !image) {
       const Block micrograph{root.find("micrograph"), "micrograph",
@@ -926,17 +938,18 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
           user_mask->values()[i] = loaded->values.values()[i] != 0 && std::isfinite(loaded->values.values()[i]);
       }
     }
+    std::vector<Observable> observables(micrographs.size());
     const bool frames_missing = (settings.dark || settings.parallel) && !calibration;
     const bool mask_missing = settings.mask && !user_mask;
     for (std::size_t i = 0; i < items.size(); ++i) {
       const Item& item = items[i];
-      Micrograph& micrograph = micrographs[i];
+      Picture& micrograph = micrographs[i];
       if (!item.image && !(image && !list)) continue;
       const bool replaced = image && !list;
       const std::filesystem::path file = replaced ? *image : reader.resolve(*item.image);
       const Where where = replaced ? Where{file.string()} : item.image_where;
       micrograph.name = file.filename().string();
-      std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene) ? load_ring_table(reader, file, where, micrograph.scene)
+      std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene) ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
                                                                           : try_load(reader, {file, item.page, settings.channel, where});
       if (!loaded) continue;
       for (const std::string& note : loaded->notes) reader.warnings.push_back(micrograph.name + ": " + note);
@@ -963,8 +976,15 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       offset.value = calibration->crossed_median;
       offset.prior_sd = calibration->crossed_sd;
     }
-    if (!micrographs.empty()) config.scene = micrographs[0].scene;
-    config.job.micrographs = std::move(micrographs);
+    if (!micrographs.empty()) config.scene = micrographs[0].scene, config.observable = observables[0];
+    if (!tables.empty()) config.scene = tables[0].rows[0];
+    for (std::size_t i = 0; i < micrographs.size(); ++i) {
+      if (observables[i].quantity != Quantity::ring_radius_cm)
+        config.job.measurements.push_back(std::move(micrographs[i]));
+      else if (!micrographs[i].mask.empty())
+        config.job.measurements.push_back(ring_readings(micrographs[i], observables[i]));
+    }
+    for (Readings& table : tables) config.job.measurements.push_back(std::move(table));
     if (const auto* droplet = std::get_if<Droplet>(&config.scene.sample))
       if (const auto* axial = std::get_if<AxialDirector>(&droplet->director); axial && axial->compare) add_branches(config.job);
     if (reader.problems.empty()) read_prior(reader, root, config.job);
@@ -983,7 +1003,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       config.job.options.choose_waves = true;
     } else if (const WaveChoice choice = wave_choice(config.scene, theta); choice.seconds_an_image <= reader.max_seconds) {
       config.scene.ceiling = Ceiling::wave;
-      for (Micrograph& m : config.job.micrographs) m.scene.ceiling = Ceiling::wave;
+      for_each_scene(config.job.measurements, [](Scene& scene) { scene.ceiling = Ceiling::wave; });
     } else {
       reader.warnings.push_back(choice.words + " Rays are taken instead: physics.max_seconds and ceiling: wave change that.");
     }

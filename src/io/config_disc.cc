@@ -76,7 +76,7 @@ StressedDisc read_stressed_disc(ConfigReader& reader, const Block& parent) {
   return disc;
 }
 
-void check_stressed_disc(ConfigReader& reader, const Micrograph& micrograph) {
+void check_stressed_disc(ConfigReader& reader, const Picture& micrograph) {
   const auto* disc = std::get_if<StressedDisc>(&micrograph.scene.sample);
   if (!disc || !reader.problems.empty()) return;
   const DiscZone zone(micrograph.scene, reader.table.values());

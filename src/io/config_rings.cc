@@ -25,7 +25,8 @@ bool has_ring_table(const Scene& scene) {
   return plate && plate->screen_distance_um;
 }
 
-std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::filesystem::path& path, const Where& where, Scene& scene) {
+std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::filesystem::path& path, const Where& where,
+                                           const Scene& scene, Observable& observable) {
   PlacedTable table;
   try {
     table = load_placed_table(path, where);
@@ -50,8 +51,8 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
   LoadedImage image;
   image.values = Image(rows, 1, 0);
   image.bits = 32;
-  Plate& plate = std::get<Plate>(scene.sample);
-  plate.ring_numbers.clear();
+  const Plate& plate = std::get<Plate>(scene.sample);
+  observable = {Quantity::ring_radius_cm, {}};
   const double least = reader.table[plate.ring_offset].free ? reader.table[plate.ring_offset].lower : reader.table[plate.ring_offset].value;
   for (int i = 0; i < rows; ++i) {
     const std::vector<double>& row = table.table.rows[static_cast<std::size_t>(i)];
@@ -60,10 +61,27 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
       reader.problems.add(place, "ring number " + show(row[static_cast<std::size_t>(m)]) + " with ring_offset " + show(least) + " is not above 0",
                           "the dark centre is number 0 and has no radius; raise the lower bound of ring_offset");
     if (!(row[static_cast<std::size_t>(r)] > 0)) reader.problems.add(place, "the radius " + show(row[static_cast<std::size_t>(r)]) + " cm is not above 0");
-    plate.ring_numbers.push_back(row[static_cast<std::size_t>(m)]);
+    observable.ring_numbers.push_back(row[static_cast<std::size_t>(m)]);
     image.values(i, 0) = row[static_cast<std::size_t>(r)];
   }
   return image;
+}
+
+Readings ring_readings(const Picture& table, const Observable& observable) {
+  Readings readings;
+  readings.name = table.name;
+  readings.rows = {table.scene};
+  readings.gain = table.gain, readings.offset = table.offset;
+  readings.noise = table.noise;
+  readings.observable.quantity = Quantity::ring_radius_cm;
+  std::vector<double> radii;
+  for (int i = 0; i < table.values.width(); ++i)
+    if (table.mask(i, 0)) {
+      radii.push_back(table.values(i, 0));
+      readings.observable.ring_numbers.push_back(observable.ring_numbers[static_cast<std::size_t>(i)]);
+    }
+  readings.values = Eigen::Map<const Eigen::VectorXd>(radii.data(), static_cast<Eigen::Index>(radii.size()));
+  return readings;
 }
 
 }  // namespace birefit

@@ -124,9 +124,9 @@ std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
   return items;
 }
 
-void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Micrograph& base,
-                   const std::function<void(Micrograph&, ParameterRef, ParameterRef)>& replace, Config& config,
-                   std::vector<Micrograph>& micrographs) {
+void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base, std::size_t first,
+                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
+                   std::vector<Readings>& tables) {
   if (item.file.empty()) return;
   TextTable text;
   try {
@@ -166,6 +166,8 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
     }
     if (std::any_of(item.set.begin(), item.set.end(), [&](const auto& entry) { return entry.first == path; }))
       reader.problems.add(item.columns[i].where, path + " is in columns and in set", "give one of the two");
+    if (path == "micrograph.gain" || path == "micrograph.offset")
+      reader.problems.add(item.columns[i].where, "a column cannot set " + path, "rows of a table share the lamp and the detector: give it in micrograph");
     columns.push_back({column_of(item.columns[i].name, item.columns[i].where), reader.refs.at(path), &spec->second});
   }
   std::vector<int> only;
@@ -216,13 +218,20 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   for (const auto& point : curve) largest = std::max(largest, std::abs(point.second));
   NoiseModel noise;  // of the whole table; one pixel cannot tell its own
   noise.read_counts = item.noise ? *item.noise : std::max(noise_of(curve), 1e-6 * largest);
-  SignalTable table{std::filesystem::path(file).filename().string(), micrographs.size(), item.columns[0].path, {}, {}};
+  SignalTable table{std::filesystem::path(file).filename().string(), first, item.columns[0].path, {}, {}};
   switch (item.quantity) {
-    case Quantity::intensity: break;
+    case Quantity::intensity:
+    case Quantity::ring_radius_cm: break;
     case Quantity::retardance_um: table.quantity = "retardance (\u00b5m)"; break;
     case Quantity::retardance_waves: table.quantity = "retardance (waves)"; break;
     case Quantity::birefringence: table.quantity = "birefringence"; break;
   }
+  Readings readings;
+  readings.name = table.name;
+  readings.observable.quantity = item.quantity;
+  readings.gain = base.gain, readings.offset = base.offset;
+  readings.noise = noise;
+  std::vector<double> values;
   // In the order of the first column: what neighbouring rows share is told from their order.
   std::vector<std::size_t> order(rows.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -230,38 +239,40 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   for (std::size_t k = 0; k < order.size(); k += static_cast<std::size_t>(item.every)) {
     const Row& row = rows[order[k]];
     const int line = text.lines[row.number];
-    Micrograph micrograph = base;
-    micrograph.name = table.name + ":" + std::to_string(line);
-    micrograph.values = Image(1, 1, row.value);
-    micrograph.mask = Mask(1, 1, 1);
-    micrograph.noise = noise;
+    Scene scene = base.scene;
     for (std::size_t c = 0; c < columns.size(); ++c) {
       const double value = row.set[c];
       if (!columns[c].spec->contains(value))
         reader.problems.add({file, line, text.rows[row.number][static_cast<std::size_t>(columns[c].at)].column},
                             item.columns[c].name + " = " + show(value) + " is outside " + columns[c].spec->range() + ", the range of " + item.columns[c].path);
       const std::string name = "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;
-      replace(micrograph, columns[c].shared, reader.table.add_constant(name, value, columns[c].spec->unit));
+      replace(scene, columns[c].shared, reader.table.add_constant(name, value, columns[c].spec->unit));
     }
     table.x.push_back(row.set[0]);
     table.line.push_back(line);
-    micrographs.push_back(std::move(micrograph));
+    values.push_back(row.value);
+    readings.rows.push_back(std::move(scene));
+    readings.lines.push_back(line);
     if (reader.problems.all().size() > 100) return;  // a wrong column, said often enough
   }
   if (table.x.size() < 3) reader.problems.add(item.file_where, item.file + " has fewer than three rows");
+  readings.values = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  tables.push_back(std::move(readings));
   config.signals.push_back(std::move(table));
 }
 
 std::vector<std::string> describe_rows(const Config& config) {
   std::vector<std::string> sentences;
-  for (const SignalTable& table : config.signals) {
+  for (std::size_t k = 0; k < config.signals.size() && k < config.job.measurements.size(); ++k) {
+    const SignalTable& table = config.signals[k];
+    const Eigen::VectorXd& values = std::get<Readings>(config.job.measurements[k]).values;
     std::vector<std::size_t> order(table.line.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.line[a] < table.line[b]; });
     std::vector<double> x, y;
     for (const std::size_t i : order) {
       x.push_back(table.x[i]);
-      y.push_back(config.job.micrographs[table.first + i].values(0, 0));
+      y.push_back(values[static_cast<Eigen::Index>(i)]);
     }
     const RowFindings found = look_at_rows(x, y);
     if (!found.outliers.empty()) {

@@ -1,6 +1,5 @@
 #pragma once
-// `signal:` of docs/configuration.md: a cell fitted to tables of signal against voltage. Every row becomes a micrograph of one
-// pixel, so that the fit knows nothing of tables.
+// `signal:` of docs/configuration.md: a cell fitted to tables of signal against voltage.
 
 #include <functional>
 #include <string>
@@ -40,10 +39,10 @@ struct SignalItem {
 /// `signal:` as one table or a list of them; empty without the key.
 std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root);
 
-/// Rows of a table as micrographs, made from `base` (the shared scene with what the table sets). `replace` gives a micrograph
-/// another reference for a parameter.
-void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Micrograph& base,
-                   const std::function<void(Micrograph&, ParameterRef, ParameterRef)>& replace, Config& config,
-                   std::vector<Micrograph>& micrographs);
+/// A table's rows, each in `base` (the shared scene with what the table sets) but for what its columns set; `first`: sights of
+/// the tables before it. `replace` gives a scene another reference for a parameter.
+void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base, std::size_t first,
+                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
+                   std::vector<Readings>& tables);
 
 }  // namespace birefit

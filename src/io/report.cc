@@ -152,7 +152,7 @@ std::string wide_and_narrow(Chart chart) {
 /// Everything the report needs of one micrograph, whatever part of it is there.
 struct Frame {
   const MicrographResult* result = nullptr;
-  const Micrograph* input = nullptr;
+  const Picture* input = nullptr;
   const Scene* scene = nullptr;
   Image measured;
   Image normalised;  ///< residual / sigma; NaN where not used
@@ -170,8 +170,8 @@ std::vector<Frame> frames_of(const Config& config, const FitResult& result) {
     frame.result = &m;
     const int width = m.fitted.width(), height = m.fitted.height();
     const auto fits = [&](const auto& grid) { return grid.width() == width && grid.height() == height; };
-    if (i < config.job.micrographs.size()) {
-      frame.input = &config.job.micrographs[i];
+    frame.input = picture_at(config.job.measurements, i);
+    if (frame.input) {
       frame.scene = &frame.input->scene;
       if (fits(frame.input->values)) frame.measured = frame.input->values;
     }
@@ -844,8 +844,9 @@ std::string data_section(const Config& config, const FitResult& result) {
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
     if (later_row(config, i)) continue;
     const MicrographResult& m = result.micrographs[i];
-    const Micrograph none;
-    const Micrograph& input = i < config.job.micrographs.size() ? config.job.micrographs[i] : none;
+    const Picture none;
+    const Picture* of = picture_at(config.job.measurements, i);
+    const Picture& input = of ? *of : none;
     out += fmt::format(
         "<tr><td class=\"name "
         "file\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"

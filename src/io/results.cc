@@ -69,8 +69,8 @@ struct PixelCounts {
 PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t i) {
   PixelCounts counts;
   if (i < result.micrographs.size()) counts.used = result.micrographs[i].used, counts.outliers = result.micrographs[i].outliers;
-  if (i < config.job.micrographs.size()) {
-    const Micrograph& m = config.job.micrographs[i];
+  if (const Picture* picture = picture_at(config.job.measurements, i)) {
+    const Picture& m = *picture;
     counts.masked = m.masked_by_user;
     counts.saturated = m.saturated;
     counts.dead = m.dead;

@@ -159,8 +159,8 @@ std::unique_ptr<PixelModel<S>> make_disc_model(const Scene&, const RenderPlan&, 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_volume_model(const Scene&, const RenderPlan&, const Values<S>&);
 template <class S>
-std::unique_ptr<PixelModel<S>> make_ring_model(const Scene&, const Values<S>&);
-/// The scene is a table of ring radii.
+std::unique_ptr<PixelModel<S>> make_ring_model(const Scene&, const RenderPlan&, const Values<S>&);
+/// What is seen of the scene are the radii of rings.
 inline bool is_ring_table(const Scene& scene) {
   const auto* plate = std::get_if<Plate>(&scene.sample);
   return plate && plate->screen_distance_um;

@@ -867,7 +867,7 @@ void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
 
 }  // namespace
 
-RenderPlan plan(const Scene& scene, const Theta& theta) {
+RenderPlan plan(const Scene& scene, const Theta& theta, const Observable& observable) {
   check_method(scene);
   check_validity(scene, theta);
   const Values<double> value(theta, {});
@@ -897,15 +897,16 @@ RenderPlan plan(const Scene& scene, const Theta& theta) {
   } else if (is_ring_table(scene)) {
     if (scene.method != "auto" && scene.method != "diagonal")
       throw UserError(Where{}, fmt::format("transport method '{}' does not apply to a table of rings", scene.method), "leave transport.method at auto");
-    if (std::get<Plate>(scene.sample).ring_numbers.empty())
+    if (observable.ring_numbers.empty())
       throw UserError(Where{}, "a plate with screen_distance_um needs a table of ring radii", "micrograph: {image: rings.csv}");
     result.method = "closed_form";
     result.reasons.push_back("the rings of a plate cut normal to its axis lie where the retardance is a whole number of waves: radii in closed form");
-  } else if (scene.quantity != Quantity::intensity) {
+  } else if (observable.quantity != Quantity::intensity) {
     result = plan_retardance(scene, value);
   } else {
     result = plan_planar(scene, value);
   }
+  result.observable = observable;
   note_material(scene, theta, result);
   note_ring(scene, value, result);
   const Symmetry symmetry = result.wave ? Symmetry::none : symmetry_of(scene, result, value);
@@ -943,7 +944,6 @@ double ripple_period(const Scene& scene, const Theta& theta, int index) {
 }
 
 double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index) {
-  if (scene.quantity != Quantity::intensity) return 0;
   const std::size_t i = static_cast<std::size_t>(index);
   const double h = std::max(1e-6, 1e-5 * std::abs(theta[i]));
   Theta up = theta, down = theta;

@@ -32,8 +32,8 @@ std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const Render
     if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
     if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
     if (std::holds_alternative<SampledVolume>(scene.sample)) return make_volume_model(scene, plan, value);
-    if (is_ring_table(scene)) return make_ring_model(scene, value);
-    if (scene.quantity != Quantity::intensity) return make_retardance_model(scene, plan, value);
+    if (is_ring_table(scene)) return make_ring_model(scene, plan, value);
+    if (plan.observable.quantity != Quantity::intensity) return make_retardance_model(scene, plan, value);
     return make_planar_model(scene, plan, value);
   }
 }

@@ -28,8 +28,8 @@ class RetardanceModel final : public PixelModel<S> {
  public:
   RetardanceModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
     value_ = path_um(*planar_optics(scene, value).column, plan.steps);
-    if (scene.quantity == Quantity::retardance_waves) value_ = value_ / wavelength_um(scene, value);
-    if (scene.quantity == Quantity::birefringence) value_ = value_ / value(std::get<Cell>(scene.sample).thickness_um);
+    if (plan.observable.quantity == Quantity::retardance_waves) value_ = value_ / wavelength_um(scene, value);
+    if (plan.observable.quantity == Quantity::birefringence) value_ = value_ / value(std::get<Cell>(scene.sample).thickness_um);
   }
   S intensity(const PlainOf<S>&, const PlainOf<S>&) const override { return value_; }
 

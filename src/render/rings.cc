@@ -1,4 +1,4 @@
-// A table of ring radii instead of a picture: "pixel" i of one row is the radius of ring number ring_numbers[i].
+// Radii of rings: "pixel" i of one row is the radius of ring number Observable::ring_numbers[i].
 
 #include "render/rings.h"
 
@@ -15,8 +15,8 @@ template <class S>
 class RingModel final : public PixelModel<S> {
  public:
   using P = PlainOf<S>;
-  RingModel(const Scene& scene, const Values<S>& value)
-      : numbers_(std::get<Plate>(scene.sample).ring_numbers), n_host_(host_index<S>(scene, value)) {
+  RingModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+      : numbers_(plan.observable.ring_numbers), n_host_(host_index<S>(scene, value)) {
     const Plate& plate = std::get<Plate>(scene.sample);
     const Indices<S> n = material_indices<S>(scene.material, value, wavelength_um(scene, value));
     n_o_ = n.ordinary;
@@ -50,10 +50,10 @@ class RingModel final : public PixelModel<S> {
 }  // namespace
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_ring_model(const Scene& scene, const Values<S>& value) {
-  return std::make_unique<RingModel<S>>(scene, value);
+std::unique_ptr<PixelModel<S>> make_ring_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+  return std::make_unique<RingModel<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S) template std::unique_ptr<PixelModel<S>> make_ring_model<S>(const Scene&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S) template std::unique_ptr<PixelModel<S>> make_ring_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

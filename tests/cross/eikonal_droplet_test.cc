@@ -347,7 +347,7 @@ FitResult fit_of(double diameter_um, Rays rays, int size) {
   std::vector<double> counts;
   for (double i : image.values()) counts.push_back(100 + 3000 * i);
   Job job(diameter_um, rays, true, size);
-  Micrograph m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000), job.b.linear("offset", 100), {4, 0.5});
+  Picture m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000), job.b.linear("offset", 100), {4, 0.5});
   for (int r = 0; r < size; ++r)
     for (int c = 0; c < size; ++c) {
       const double radius = std::hypot(c - (0.5 * size - 0.6), r - (0.5 * size - 0.2)) * job.scene.view.pixel_size_um / (diameter_um / 2);
@@ -355,7 +355,7 @@ FitResult fit_of(double diameter_um, Rays rays, int size) {
     }
   FitJob fit_job;
   fit_job.parameters = job.b.table;
-  fit_job.micrographs = {m};
+  fit_job.measurements = {m};
   return fit(fit_job);
 }
 ParameterEstimate fitted(double diameter_um, Rays rays) { return *find_estimate(fit_of(diameter_um, rays, 128), "birefringence"); }
@@ -404,13 +404,13 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
     const Image picture = render(truth.scene, plan(truth.scene, theta), theta, {}, 1).intensity;
     for (const double i : picture.values()) counts.push_back(100 + 3000 * i);
     Job job = job_of(Rays::straight, true);
-    Micrograph m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000), job.b.linear("offset", 100), {4, 0.5});
+    Picture m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000), job.b.linear("offset", 100), {4, 0.5});
     for (int r = 0; r < 96; ++r)
       for (int c = 0; c < 96; ++c)
         if (std::hypot(c - 47.4, r - 47.8) * job.scene.view.pixel_size_um > 4) m.mask(c, r) = 0;
     FitJob fit_job;
     fit_job.parameters = job.b.table;
-    fit_job.micrographs = {m};
+    fit_job.measurements = {m};
     fit_job.options.choose_rays = true;
     const FitResult result = fit(fit_job);
     const ParameterEstimate estimate = *find_estimate(result, "birefringence");

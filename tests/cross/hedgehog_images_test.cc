@@ -79,7 +79,7 @@ FitResult fit_of_beam_propagation(Rays rays, bool choose = false) {
   const Scene scene = scene_of_beam_propagation(b, rays, image.width(), 9.1, 0.21);
   FitJob job;
   const ParameterRef gain = b.linear("gain", 1), offset = b.fixed("offset", 0);
-  job.micrographs.push_back(micrograph_of("bpm", scene, image.values(), gain, offset, {0.02, 0}));
+  job.measurements.push_back(micrograph_of("bpm", scene, image.values(), gain, offset, {0.02, 0}));
   job.parameters = b.table;
   job.options.choose_rays = choose;
   return fit(job);
@@ -130,7 +130,7 @@ TEST(PeerHedgehog, AFitGoesOverToCurvedRaysOnlyWhereTheyAreNoWorse) {
   const ParameterRef gain = b.linear("gain", 1), offset = b.fixed("offset", 0);
   const Theta theta = b.table.values();
   const Image image = render(scene, plan(scene, theta), theta, {}, 1).intensity;
-  job.micrographs.push_back(micrograph_of("straight", scene, image.values(), gain, offset, {0.02, 0}));
+  job.measurements.push_back(micrograph_of("straight", scene, image.values(), gain, offset, {0.02, 0}));
   job.parameters = b.table;
   job.options.choose_rays = true;
   const FitResult straight = fit(job);

@@ -107,6 +107,7 @@ struct Case {
   testing::TableBuilder t;
   Scene scene;
   std::vector<int> parameters;
+  Observable observable = {};
 };
 
 Case base(const std::string& name) {
@@ -436,7 +437,8 @@ std::vector<Case> cases() {
     plate.director.axis = {c.t.fixed("ax", 0), c.t.fixed("ay", 0), c.t.fixed("az", 1)};
     plate.screen_distance_um = c.t.fixed("screen_distance_um", 7e5);
     plate.ring_offset = c.t.fixed("ring_offset", -0.2);
-    for (int i = 0; i < c.scene.view.width; ++i) plate.ring_numbers.push_back(i + 1);
+    c.observable.quantity = Quantity::ring_radius_cm;
+    for (int i = 0; i < c.scene.view.width; ++i) c.observable.ring_numbers.push_back(i + 1);
     c.scene.sample = plate;
     c.scene.view.height = 1;
     all.push_back(c);
@@ -449,7 +451,7 @@ std::vector<Case> cases() {
 TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
   for (Case& c : cases()) {
     const Theta theta = c.t.table.values();
-    RenderPlan p = plan(c.scene, theta);
+    RenderPlan p = plan(c.scene, theta, c.observable);
     // Points that go from one part of a table to another jump by a little of the accuracy (PolarTable and RadialTable look at that).
     p.disc.clear();
     if (c.scene.ceiling != Ceiling::wave) p.radial_panels = 0;
@@ -491,7 +493,7 @@ TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
 TEST(Gradients, SameBitsWhateverTheNumberOfThreads) {
   Case c = cases()[1];
   const Theta theta = c.t.table.values();
-  const RenderPlan p = plan(c.scene, theta);
+  const RenderPlan p = plan(c.scene, theta, c.observable);
   const Rendering one = render(c.scene, p, theta, {0, 1, 3}, 1), two = render(c.scene, p, theta, {0, 1, 3}, 2);
   EXPECT_EQ(one.intensity.values(), two.intensity.values());
   for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(one.derivatives[k].values(), two.derivatives[k].values());

@@ -54,7 +54,7 @@ FitJob job_of(const Bar& bar, const std::vector<double>& volts, bool built_in_fr
         const double phase = std::numbers::pi / 2 * (volts[g] + bar.built_in_v) / bar.half_wave_v * field;
         mean.push_back(bar.offset + bar.gain * std::pow(std::sin(phase), 2));
       }
-    job.micrographs.push_back(micrograph_of(std::to_string(static_cast<int>(volts[g])), scene,
+    job.measurements.push_back(micrograph_of(std::to_string(static_cast<int>(volts[g])), scene,
                                             camera(mean, 1, bar.read, seed + 100 * static_cast<unsigned>(g), false),
                                             gain, offset, {bar.read, 1}));
   }

@@ -57,14 +57,14 @@ FitJob disc_job(double counts_per_photon, double read_counts, unsigned long seed
   scene.view.rotation_deg = b.fixed("rotation", 0);
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
   FitJob job;
-  Micrograph m = micrograph_of("disc", scene, camera(mean, counts_per_photon, read_counts, seed, false), gain, offset, {read_counts, counts_per_photon});
+  Picture m = micrograph_of("disc", scene, camera(mean, counts_per_photon, read_counts, seed, false), gain, offset, {read_counts, counts_per_photon});
   const double radius = d.radius_um / d.um_per_px;
   for (int row = 0; row < kSide; ++row)  // not the edge, not the forces
     for (int column = 0; column < kSide; ++column) {
       const double x = column - 32, y = 31 - row;
       if (std::hypot(x, y) > 0.95 * radius || std::hypot(x, std::abs(y) - radius) < 0.2 * radius) m.mask(column, row) = 0;
     }
-  job.micrographs.push_back(m);
+  job.measurements.push_back(m);
   job.parameters = b.table;
   job.options.threads = 1;
   return job;
@@ -136,7 +136,7 @@ TEST(DiscRecovery, ZonesAroundTheForcesFollowTheDirection) {
     scene.view.rotation_deg = b.fixed("rotation", 0);
     const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
     FitJob job;
-    job.micrographs.push_back(micrograph_of("disc", scene, camera(mean, 1, 3, 1000u + static_cast<unsigned>(draw), false),
+    job.measurements.push_back(micrograph_of("disc", scene, camera(mean, 1, 3, 1000u + static_cast<unsigned>(draw), false),
                                             gain, offset, {3, 1}));
     job.parameters = b.table;
     job.options.threads = 1;

@@ -24,7 +24,7 @@ constexpr double kGain = 1000, kOffset = 40, kDiameter = 9.3, kBirefringence = 0
 struct Droplet96 {
   TableBuilder b;
   Scene scene;
-  Micrograph m;
+  Picture m;
   std::optional<Scene> nature;  ///< where it is not what the fit takes it for
   ParameterRef diameter, birefringence, center_x, center_y, polarizer, analyzer, gain, offset;
 
@@ -82,9 +82,9 @@ FitResult fit_one(const Disturbance& by, bool helped, unsigned seed) {
   for (const auto& [ref, start] : {std::pair(d.diameter, 9.2), {d.birefringence, 0.21}, {d.center_x, 47.0}, {d.center_y, 48.0}, {d.polarizer, 0.0}, {d.analyzer, 90.0}, {d.gain, 900.0}, {d.offset, 0.0}})
     d.b.table[ref].value = start;
   FitJob job;
-  Micrograph m = micrograph_of("droplet", d.scene, counts.values(), d.gain, d.offset, {3, 1});
+  Picture m = micrograph_of("droplet", d.scene, counts.values(), d.gain, d.offset, {3, 1});
   m.noise.reset();  // estimated from the image, as a user would
-  job.micrographs.push_back(std::move(m));
+  job.measurements.push_back(std::move(m));
   job.options.threads = 1;
   if (helped) by.help(d, job);
   job.parameters = d.b.table;
@@ -172,7 +172,7 @@ TEST(DisturbedRecovery, AnotherDroplet) {
   };
   d.help = [](Droplet96&, FitJob& job) {  // masked
     for (int y = 0; y < 28; ++y)
-      for (int x = 70; x < kSize; ++x) job.micrographs[0].mask(x, y) = 0;
+      for (int x = 70; x < kSize; ++x) picture(job, 0).mask(x, y) = 0;
   };
   const Outcome bare = fits("other droplet", d, false), helped = fits("other droplet", d, true);
   EXPECT_EQ(bare.wrong, 0);
@@ -184,7 +184,7 @@ TEST(DisturbedRecovery, UnevenLight) {
   const auto free = [](std::vector<std::pair<UnevenLight::Shape, bool>> shapes) {
     return [shapes](Droplet96& d, FitJob& job) {
       int number = 0;
-      for (const auto& [shape, of_intensity] : shapes) job.micrographs[0].uneven.push_back({d.b.linear("uneven " + std::to_string(number++), 0), shape, of_intensity});
+      for (const auto& [shape, of_intensity] : shapes) picture(job, 0).uneven.push_back({d.b.linear("uneven " + std::to_string(number++), 0), shape, of_intensity});
     };
   };
   using Shape = UnevenLight::Shape;
@@ -270,7 +270,7 @@ TEST(DisturbedRecovery, SaturatedAndCutOff) {
     for (double& v : counts.values()) v = std::min(v, 700.0);
   };
   saturated.help = [](Droplet96&, FitJob& job) {  // what io does with saturation_counts
-    Micrograph& m = job.micrographs[0];
+    Picture& m = picture(job, 0);
     for (std::size_t i = 0; i < m.values.size(); ++i)
       if (m.values.values()[i] >= 700) m.mask.values()[i] = 0;
   };
@@ -338,7 +338,7 @@ TEST(WrongModel, AWrongInputDoesWhatTheResultSaysOfIt) {
     Disturbance wrong;
     wrong.help = [&](Droplet96& d, FitJob& job) {
       c.believe(d, 1 + c.relative);
-      job.micrographs[0].scene = d.scene;
+      picture(job, 0).scene = d.scene;
     };
     const FitResult there = fit_one(wrong, true, 1);
     const auto input = std::find_if(right.inputs.begin(), right.inputs.end(), [&](const InputEffect& i) { return i.name == c.input; });

@@ -83,7 +83,7 @@ FitJob droplet_job(double counts_per_photon, double read_counts, unsigned long s
   scene.view.rotation_deg = b.fixed("rotation", 0);
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
   FitJob job;
-  job.micrographs.push_back(micrograph_of("droplet", scene, camera(mean_counts(), counts_per_photon, read_counts, seed, false),
+  job.measurements.push_back(micrograph_of("droplet", scene, camera(mean_counts(), counts_per_photon, read_counts, seed, false),
                                           gain, offset, {read_counts, counts_per_photon}));
   job.parameters = b.table;
   job.options.threads = 1;
@@ -126,7 +126,7 @@ TEST(DropletRecovery, TruthIsTheRenderedImage) {
   Theta theta = job.parameters.values();
   for (const auto& [name, value] : true_values())
     if (const ParameterRef ref = job.parameters.find(name)) theta[static_cast<std::size_t>(ref.index)] = value;
-  const Scene& scene = job.micrographs[0].scene;
+  const Scene& scene = picture(job, 0).scene;
   const Rendering r = render(scene, plan(scene, theta), theta);
   double sum = 0, worst = 0;
   int at = 0;

@@ -53,7 +53,7 @@ FitJob voltage_job(double v, double start, unsigned long seed, double pretilt_de
     const double light = pretilt_deg > 0 ? kCell.crossed(v, wavelength_nm / 1000)
                                          : std::pow(std::sin(M_PI * 1000 / wavelength_nm * kCell.thickness_um * (kCell.n_e - kCell.n_o)), 2);
     const std::vector<double> mean(kSide * kSide, kGain * light);
-    job.micrographs.push_back(micrograph_of(name, here, camera(mean, 1, 3, 10 * seed + job.micrographs.size(), false),
+    job.measurements.push_back(micrograph_of(name, here, camera(mean, 1, 3, 10 * seed + job.measurements.size(), false),
                                             gain, offset, {3, 1}));
   }
   job.parameters = b.table;
@@ -69,8 +69,8 @@ FitJob one_pixel_job(double v, double start, double lower, double upper, unsigne
   voltage.upper = upper;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0, kNoise);
-  for (std::size_t i = 0; i < job.micrographs.size(); ++i) {
-    Micrograph& m = job.micrographs[i];
+  for (std::size_t i = 0; i < job.measurements.size(); ++i) {
+    Picture& m = picture(job, i);
     m.scene.view.width = m.scene.view.height = 1;
     m.values = Image(1, 1, kGain * kCell.crossed(v, kWavelengthsNm[i] / 1000) + noise(random));
     m.mask = Mask(1, 1, 1);

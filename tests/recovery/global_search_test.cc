@@ -16,6 +16,7 @@
 #include "birefit/render.h"
 #include "core/threads.h"
 #include "random_families.h"
+#include "pictures.h"
 
 namespace birefit {
 namespace {
@@ -37,7 +38,8 @@ constexpr double kClear = 20;
 /// Chi-square of the pixels' noise alone, whatever weights a fit gave its frames.
 double chi_square_at(const Posed& posed, const Theta& theta) {
   double sum = 0;
-  for (const Micrograph& m : posed.job.micrographs) {
+  for (std::size_t g = 0; g < posed.job.measurements.size(); ++g) {
+    const Picture& m = picture(posed.job, g);
     const Image shown = render(m.scene, plan(m.scene, theta), theta, {}, 1).intensity;
     const auto of = [&](ParameterRef ref) { return theta[static_cast<std::size_t>(ref.index)]; };
     for (std::size_t i = 0; i < shown.values().size(); ++i)

@@ -49,7 +49,7 @@ FitJob pitch_job(double pitch_um, double azimuth_deg, std::mt19937_64& random) {
       here.microscope.wavelength_nm = b.fixed("wavelength_nm " + name, wavelength_nm);
       here.microscope.polarizer_deg = b.fixed("polarizer_deg " + name, between_deg[0]);
       here.microscope.analyzer_deg = b.fixed("analyzer_deg " + name, between_deg[1]);
-      job.micrographs.push_back(micrograph_of(name, here, {kGain * light(pitch_um, azimuth_deg, between_deg[0], between_deg[1], wavelength_nm / 1000) + noise(random)}, gain, offset, {kNoise, 0}));
+      job.measurements.push_back(micrograph_of(name, here, {kGain * light(pitch_um, azimuth_deg, between_deg[0], between_deg[1], wavelength_nm / 1000) + noise(random)}, gain, offset, {kNoise, 0}));
     }
   job.parameters = b.table;
   job.options.threads = 1;

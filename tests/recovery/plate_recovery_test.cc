@@ -57,7 +57,7 @@ FitJob plate_job(double counts_per_photon, double read_counts, unsigned long see
   scene.view.rotation_deg = b.fixed("rotation", 0);
   FitJob job;
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
-  job.micrographs.push_back(micrograph_of("plate", scene, camera(mean_counts(), counts_per_photon, read_counts, seed, false),
+  job.measurements.push_back(micrograph_of("plate", scene, camera(mean_counts(), counts_per_photon, read_counts, seed, false),
                                           gain, offset, {read_counts, counts_per_photon}));
   job.parameters = b.table;
   job.options.threads = 1;
@@ -87,7 +87,7 @@ TEST(PlateRecovery, TruthIsTheRenderedImage) {
   const FitJob job = plate_job(1, 3, 1, false);
   Theta theta = job.parameters.values();
   theta[static_cast<std::size_t>(job.parameters.find("fourier_number").index)] = kFourier;
-  const Scene& scene = job.micrographs[0].scene;
+  const Scene& scene = picture(job, 0).scene;
   const RenderPlan chosen = plan(scene, theta);
   const Rendering r = render(scene, chosen, theta);
   double sum = 0, worst = 0;
@@ -146,17 +146,17 @@ TEST(PlateFit, ACameraAtTheSideIsFound) {
     }
   FitJob job = plate_job(1, 3, 1, false);
   TableBuilder b{job.parameters};
-  Micrograph& picture = job.micrographs[0];
-  picture.values = image_of(camera(counts, 1, 3, 2, false), kSize, kSize);
-  Plate& sample = std::get<Plate>(picture.scene.sample);
+  Picture& taken = picture(job, 0);
+  taken.values = image_of(camera(counts, 1, 3, 2, false), kSize, kSize);
+  Plate& sample = std::get<Plate>(taken.scene.sample);
   std::get<HeatStep>(sample.heat).fourier_number = b.fixed("fourier", kFourier);
   b.table[b.table.find("fourier_number")].free = false;
   sample.thickness_um = b.fixed("thin_um", 100);
   const std::vector<std::pair<std::string, double>> truth = {{"half_angle", kHalfAngle}, {"tilt_x_deg", from.tilt_x_deg}, {"tilt_y_deg", from.tilt_y_deg}, {"half_field_deg", from.half_field_deg}, {"column", kCenterX}, {"row", kCenterY}};
   sample.half_angle_deg = b.fitted("half_angle", 14, 12, 18);
-  picture.scene.view.camera = SideCamera{b.fitted("tilt_x_deg", 20, 5, 50), b.fitted("tilt_y_deg", -5, -40, 10), b.fitted("half_field_deg", 10, 0, 45)};
-  picture.scene.view.center_x_px = b.fitted("column", 31.5, 27, 36);
-  picture.scene.view.center_y_px = b.fitted("row", 31.5, 27, 36);
+  taken.scene.view.camera = SideCamera{b.fitted("tilt_x_deg", 20, 5, 50), b.fitted("tilt_y_deg", -5, -40, 10), b.fitted("half_field_deg", 10, 0, 45)};
+  taken.scene.view.center_x_px = b.fitted("column", 31.5, 27, 36);
+  taken.scene.view.center_y_px = b.fitted("row", 31.5, 27, 36);
   job.parameters = b.table;
   const FitResult r = fit(job);
   EXPECT_TRUE(r.has_answer()) << r.verdict;

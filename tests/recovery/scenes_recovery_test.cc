@@ -94,7 +94,7 @@ Scatter scatter(int draws, const std::function<void(Draw&)>& make, const std::st
       Parameter& p = d.b.table[k];
       if (p.free && !p.linear) p.value = d.between(p.lower, p.upper);
     }
-    job.micrographs.push_back(micrograph_of(of, d.scene, counts, gain, offset, {kNoise, 0}));
+    job.measurements.push_back(micrograph_of(of, d.scene, counts, gain, offset, {kNoise, 0}));
     job.parameters = d.b.table;
     f.result = fit(job);
   });
@@ -221,7 +221,7 @@ TEST(BranchRecovery, TheBranchThatMadeThePictureIsReported) {
     for (double value : exact.values()) counts.push_back(kGain * value + noise(d.random));
     FitJob job;
     const ParameterRef gain = d.b.linear("gain", 900), offset = d.b.linear("offset", 5);
-    job.micrographs.push_back(micrograph_of("branch", d.scene, counts, gain, offset, {kNoise, 0}));
+    job.measurements.push_back(micrograph_of("branch", d.scene, counts, gain, offset, {kNoise, 0}));
     job.parameters = d.b.table;
     job.branches = {{"hedgehog", {hedgehog}, {d.b.table.find("ring_radius").index}}, {"ring", {sample}, {}}};
     const FitResult r = fit(job);
@@ -278,7 +278,7 @@ TEST(LongBranchRecovery, TheLikelierBranchIsTheTrueOne) {
       Parameter& p = d.b.table[k];
       if (p.free && !p.linear) p.value = d.between(p.lower, p.upper);
     }
-    job.micrographs.push_back(micrograph_of("branch", d.scene, counts, gain, offset, {noise, 0}));
+    job.measurements.push_back(micrograph_of("branch", d.scene, counts, gain, offset, {noise, 0}));
     job.parameters = d.b.table;
     job.branches = {{"hedgehog", {hedgehog}, {d.b.table.find("ring_radius").index}}, {"ring", {with_ring}, {}}};
     const FitResult r = fit(job);

@@ -45,7 +45,7 @@ FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed
     here.microscope.polarizer_deg = b.fixed("polarizer_" + std::to_string(k), p);
     here.microscope.analyzer_deg = b.fixed("analyzer_" + std::to_string(k), a);
     const std::vector<double> mean(kSide * kSide, kOffset + kGain * kCell.intensity(p, a));
-    job.micrographs.push_back(micrograph_of("image " + std::to_string(k), here,
+    job.measurements.push_back(micrograph_of("image " + std::to_string(k), here,
                                             camera(mean, counts_per_photon, read_counts, 1000 * seed + static_cast<unsigned long>(k), false),
                                             gain, offset, {read_counts, counts_per_photon}));
     ++k;
@@ -59,7 +59,7 @@ FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed
     here.microscope.polarizer_deg = b.fixed("polarizer_" + std::to_string(k), 0);
     here.microscope.analyzer_deg = b.fixed("analyzer_" + std::to_string(k), a);
     const std::vector<double> mean(kSide * kSide, kOffset + (a == 0 ? kGain : 0));
-    job.micrographs.push_back(micrograph_of("empty " + std::to_string(k), here,
+    job.measurements.push_back(micrograph_of("empty " + std::to_string(k), here,
                                             camera(mean, counts_per_photon, read_counts, 1000 * seed + static_cast<unsigned long>(k), false),
                                             gain, offset, {read_counts, counts_per_photon}));
     ++k;

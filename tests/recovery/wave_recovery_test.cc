@@ -35,7 +35,7 @@ struct WaveDraw {
     const ParameterRef gain = table.linear("gain", 900), offset = table.linear("offset", 5);
     // Nobody's gain is below zero: that would pass off dark fringes as bright ones.
     table.table[gain].lower = table.table[gain].physical_lower = 0;
-    job.micrographs.push_back(micrograph_of("droplet", fitted, counts, gain, offset, {noise, 0}));
+    job.measurements.push_back(micrograph_of("droplet", fitted, counts, gain, offset, {noise, 0}));
     job.parameters = table.table;
     return job;
   }
@@ -359,7 +359,7 @@ void check_bipolar(bool as_samples, int draws, double least_share) {
     BipolarDraw d(static_cast<unsigned>(i), as_samples);
     FitJob job;
     const ParameterRef gain = d.b.linear("gain", 900), offset = d.b.linear("offset", 5);
-    job.micrographs.push_back(micrograph_of("droplet", as_samples ? d.sampled : d.droplet, d.counts, gain, offset, {d.noise, 0}));
+    job.measurements.push_back(micrograph_of("droplet", as_samples ? d.sampled : d.droplet, d.counts, gain, offset, {d.noise, 0}));
     job.parameters = d.b.table;
     const FitResult r = fit(job);
     refused += !r.has_answer();

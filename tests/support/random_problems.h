@@ -133,9 +133,9 @@ inline Posed pose(RandomProblem& p, const std::string& name, Ceiling ceiling = C
     if (of.free && !of.linear) of.value = p.between(of.lower, of.upper);
   }
   for (std::size_t g = 0; g < p.scenes.size(); ++g) {
-    posed.job.micrographs.push_back(
+    posed.job.measurements.push_back(
         micrograph_of(name, p.scenes[g], pictures[g], gains[g], offsets[g], {posed.noise, 0}));
-    if (!p.masks.empty()) posed.job.micrographs.back().mask = p.masks[g];
+    if (!p.masks.empty()) std::get<Picture>(posed.job.measurements.back()).mask = p.masks[g];
   }
   posed.job.parameters = p.b.table;
   posed.job.options.threads = 1;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "pictures.h"
 #include "birefit/fit.h"
 
 namespace birefit::testing {
@@ -49,9 +50,9 @@ inline Image image_of(const std::vector<double>& values, int width, int height) 
   return image;
 }
 
-inline Micrograph micrograph_of(std::string name, Scene scene, const std::vector<double>& counts, ParameterRef gain,
+inline Picture micrograph_of(std::string name, Scene scene, const std::vector<double>& counts, ParameterRef gain,
                                 ParameterRef offset, NoiseModel noise) {
-  Micrograph m;
+  Picture m;
   m.name = std::move(name);
   m.values = image_of(counts, scene.view.width, scene.view.height);
   m.mask = Mask(scene.view.width, scene.view.height, 1);

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "birefit/io.h"
+#include "pictures.h"
 
 namespace birefit {
 namespace {
@@ -264,9 +265,9 @@ TEST_F(Config, SharesWhatNoMicrographSets) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   const auto config = load(kCrystal, ConfigUse::fit);
-  ASSERT_EQ(config.job.micrographs.size(), 2u);
-  const auto& a = config.job.micrographs[0];
-  const auto& b = config.job.micrographs[1];
+  ASSERT_EQ(config.job.measurements.size(), 2u);
+  const auto& a = picture(config.job, 0);
+  const auto& b = picture(config.job, 1);
   const auto& table = config.job.parameters;
   const auto &first = std::get<Crystal>(a.scene.sample), &second = std::get<Crystal>(b.scene.sample);
   EXPECT_EQ(first.half_wave_voltage_v, second.half_wave_voltage_v);
@@ -289,17 +290,17 @@ TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
   save("b.tif", counts(200, 2));
   const std::string one = replaced(kRender, "image_size_px: [64, 48]\n", ""), fitted = replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: {value: 0.5, fit: [-2, 2]}");
   const auto alone = load(replaced(fitted, "{pixel_size_um", "{image: a.tif, pixel_size_um"), ConfigUse::fit);
-  EXPECT_TRUE(alone.job.parameters[alone.job.micrographs[0].scene.microscope.focus_um].free);
+  EXPECT_TRUE(alone.job.parameters[picture(alone.job, 0).scene.microscope.focus_um].free);
   const auto two = load("micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" + fitted, ConfigUse::fit);
   const ParameterTable& table = two.job.parameters;
-  const ParameterRef a = two.job.micrographs[0].scene.microscope.focus_um, b = two.job.micrographs[1].scene.microscope.focus_um;
+  const ParameterRef a = picture(two.job, 0).scene.microscope.focus_um, b = picture(two.job, 1).scene.microscope.focus_um;
   EXPECT_TRUE(table[a].free);
   EXPECT_EQ(table[a].value, 0.5);
   EXPECT_FALSE(table[b].free);
   EXPECT_EQ(table[b].value, -1);
   // The shared one on the mid plane, one image's not: waves, or an error.
   const std::string own = "micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" + replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: 0");
-  EXPECT_EQ(load(own + "physics: {max_seconds: 0}\n", ConfigUse::fit).job.micrographs[0].scene.ceiling, Ceiling::wave);
+  EXPECT_EQ(picture(load(own + "physics: {max_seconds: 0}\n", ConfigUse::fit).job, 0).scene.ceiling, Ceiling::wave);
   EXPECT_NE(mistakes(own + "physics: {ceiling: one_way}\n", ConfigUse::fit).find("defocus needs wave optics"), std::string::npos);
 }
 
@@ -311,7 +312,7 @@ TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
   const std::string frame = replaced(kCrystal, "set: {sample.crystal.bias_v: 200}", "set: {sample.crystal.bias_v: 200, micrograph.background.y: {fit: auto}}");
   const auto config = load(replaced(frame, plain, uneven), ConfigUse::fit);
   const ParameterTable& table = config.job.parameters;
-  const auto &a = config.job.micrographs[0].uneven, &b = config.job.micrographs[1].uneven;
+  const auto &a = picture(config.job, 0).uneven, &b = picture(config.job, 1).uneven;
   ASSERT_EQ(a.size(), 3u);
   EXPECT_EQ(table[a[0].coefficient].name, "micrograph.illumination.x");
   EXPECT_TRUE(a[0].of_intensity && table[a[0].coefficient].free && table[a[0].coefficient].linear);
@@ -341,7 +342,7 @@ TEST_F(Config, TurnsCountsIntoTransmission) {
   for (auto& [name, frame] : {std::pair<const char*, Image&>("d.tif", dark), {"p.tif", parallel}, {"c.tif", crossed}, {"a.tif", image}, {"b.tif", image}})
     save(name, frame);
   const auto config = load(kCrystal + "calibration: {dark: d.tif, parallel: p.tif, crossed: c.tif}\n", ConfigUse::fit);
-  const Micrograph& a = config.job.micrographs[0];
+  const Picture& a = picture(config.job, 0);
   EXPECT_DOUBLE_EQ(a.values(8, 8), 0.5);
   EXPECT_DOUBLE_EQ(a.variance_scale(8, 8), 1e-6);
   EXPECT_EQ(a.mask(10, 12), 0);
@@ -359,10 +360,10 @@ TEST_F(Config, ExcludesAndCountsNonFiniteAndIsolatedPixels) {
   save("a.tif", a);
   save("b.tif", b);
   const auto config = load(kCrystal, ConfigUse::fit);
-  EXPECT_EQ(config.job.micrographs[0].non_finite, 1);
-  EXPECT_EQ(config.job.micrographs[0].dead, 1);
-  EXPECT_EQ(config.job.micrographs[0].mask(20, 20), 0);
-  EXPECT_EQ(config.job.micrographs[1].dead, 0);
+  EXPECT_EQ(picture(config.job, 0).non_finite, 1);
+  EXPECT_EQ(picture(config.job, 0).dead, 1);
+  EXPECT_EQ(picture(config.job, 0).mask(20, 20), 0);
+  EXPECT_EQ(picture(config.job, 1).dead, 0);
 }
 
 TEST_F(Config, KeepsTheCrestsOfFineFringes) {
@@ -376,7 +377,7 @@ TEST_F(Config, KeepsTheCrestsOfFineFringes) {
   save("a.tif", a);
   save("b.tif", b);
   const auto config = load(replaced(kCrystal, "[2, 4, 30, 28]", "[0, 0, 96, 96]"), ConfigUse::fit);
-  EXPECT_EQ(config.job.micrographs[0].dead, 0);
+  EXPECT_EQ(picture(config.job, 0).dead, 0);
 }
 
 TEST_F(Config, ReadsAJointPrior) {
@@ -439,29 +440,31 @@ sample:
 microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}
 )";
 
-TEST_F(Config, MakesEveryRowOfASignalAMicrographOfOnePixel) {
+TEST_F(Config, GivesEveryRowOfASignalASceneOfItsOwn) {
   write("a.csv", ",volts,out\n0,0.5,1\n1,1,2\n2,2,4\n3,3,8\n");
   write("b.csv", "out,volts\n1,0.5\n2,1\n3,1.5\n4,2\n5,2.5\n");
   const auto config = load(kSignal, ConfigUse::fit);
-  ASSERT_EQ(config.job.micrographs.size(), 4u + 3u);
+  ASSERT_EQ(config.job.measurements.size(), 2u);
+  const Readings &a = readings(config.job, 0), &b = readings(config.job, 1);
+  ASSERT_EQ(a.rows.size(), 4u);
+  ASSERT_EQ(b.rows.size(), 3u);
   ASSERT_EQ(config.signals.size(), 2u);
   EXPECT_EQ(config.signals[1].first, 4u);
   EXPECT_EQ(config.signals[1].x, (std::vector<double>{0.5, 1.5, 2.5}));
   const Theta theta = config.job.parameters.values();
-  const auto voltage = [&](std::size_t row) {
-    return theta[std::get<FreederickszDirector>(std::get<Cell>(config.job.micrographs[row].scene.sample).director).voltage_v.index];
+  const auto voltage = [&](const Scene& row) {
+    return theta[std::get<FreederickszDirector>(std::get<Cell>(row.sample).director).voltage_v.index];
   };
-  EXPECT_EQ(config.job.micrographs[3].values(0, 0), 8);
-  EXPECT_EQ(voltage(3), 3);
-  EXPECT_EQ(voltage(5), 1.5);
-  EXPECT_EQ(theta[config.job.micrographs[2].scene.microscope.wavelength_nm.index], 500);
-  EXPECT_EQ(theta[config.job.micrographs[4].scene.microscope.wavelength_nm.index], 600);
-  EXPECT_EQ(config.job.micrographs[4].noise->read_counts, 0.5);
-  EXPECT_GT(config.job.micrographs[0].noise->read_counts, 0);
-  // The first table has the shared gain, the second its own, one for all its rows.
-  EXPECT_NE(config.job.micrographs[0].gain.index, config.job.micrographs[4].gain.index);
-  EXPECT_EQ(config.job.micrographs[4].gain.index, config.job.micrographs[6].gain.index);
-  for (const std::size_t row : {0u, 4u}) EXPECT_EQ(config.job.parameters[config.job.micrographs[row].gain].lower, 0);
+  EXPECT_EQ(a.values[3], 8);
+  EXPECT_EQ(voltage(a.rows[3]), 3);
+  EXPECT_EQ(voltage(b.rows[1]), 1.5);
+  EXPECT_EQ(theta[a.rows[2].microscope.wavelength_nm.index], 500);
+  EXPECT_EQ(theta[b.rows[0].microscope.wavelength_nm.index], 600);
+  EXPECT_EQ(b.noise->read_counts, 0.5);
+  EXPECT_GT(a.noise->read_counts, 0);
+  // The first table has the shared gain, the second its own.
+  EXPECT_NE(a.gain.index, b.gain.index);
+  for (const Readings* table : {&a, &b}) EXPECT_EQ(config.job.parameters[table->gain].lower, 0);
   // Without images: the scene of the first row.
   EXPECT_EQ(load(kSignal).scene.view.width, 1);
 }
@@ -496,15 +499,17 @@ microscope: {light: {wavelength_nm: 550}}
 TEST_F(Config, TakesTheRowsAndUnitsThatASignalAsksFor) {
   write("a.csv", "kind,celsius,dn,remark\nnematic,20,0.1,ok\nisotropic,58,0,clear\nnematic,30,0.09,\nnematic,40.5,0.08,\nnematic,52,0.01,late\nother,none,x,\n");
   const auto config = load(kBirefringence, ConfigUse::fit);
-  ASSERT_EQ(config.job.micrographs.size(), 3u);
+  ASSERT_EQ(config.job.measurements.size(), 1u);
   EXPECT_EQ(config.signals[0].line, (std::vector<int>{2, 4, 5}));
   const Theta theta = config.job.parameters.values();
-  const Micrograph& last = config.job.micrographs[2];
-  EXPECT_EQ(theta[static_cast<std::size_t>(std::get<LawIndices>(last.scene.material).temperature_k.index)], 313.65);
-  EXPECT_EQ(last.scene.quantity, Quantity::birefringence);
-  EXPECT_FALSE(config.job.parameters[last.gain].free);
-  EXPECT_EQ(config.job.parameters[last.gain].value, 1);
-  EXPECT_EQ(config.job.parameters[last.offset].value, 0);
+  const Readings& table = readings(config.job, 0);
+  ASSERT_EQ(table.rows.size(), 3u);
+  const Scene& last = table.rows[2];
+  EXPECT_EQ(theta[static_cast<std::size_t>(std::get<LawIndices>(last.material).temperature_k.index)], 313.65);
+  EXPECT_EQ(table.observable.quantity, Quantity::birefringence);
+  EXPECT_FALSE(config.job.parameters[table.gain].free);
+  EXPECT_EQ(config.job.parameters[table.gain].value, 1);
+  EXPECT_EQ(config.job.parameters[table.offset].value, 0);
 
   EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "sort: nematic"), ConfigUse::fit).find("a.csv has no column sort"), std::string::npos);
   EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "kind: smectic"), ConfigUse::fit).find("fewer than three rows that `where` lets through"), std::string::npos);

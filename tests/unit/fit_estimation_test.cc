@@ -54,9 +54,9 @@ struct Bar {
   void free_linear() {
     for (const ParameterRef ref : {gain, offset}) job.parameters[ref].free = job.parameters[ref].linear = true;
   }
-  Micrograph& add_image(int width, int height, ParameterRef bias_ref, bool uniform = false) {
-    Micrograph micrograph;
-    micrograph.name = "frame " + std::to_string(job.micrographs.size());
+  Picture& add_image(int width, int height, ParameterRef bias_ref, bool uniform = false) {
+    Picture micrograph;
+    micrograph.name = "frame " + std::to_string(job.measurements.size());
     Crystal crystal;
     crystal.half_wave_voltage_v = half_wave;
     crystal.bias_v = bias_ref;
@@ -78,8 +78,8 @@ struct Bar {
     micrograph.mask = Mask(width, height, 1);
     micrograph.gain = gain;
     micrograph.offset = offset;
-    job.micrographs.push_back(std::move(micrograph));
-    return job.micrographs.back();
+    job.measurements.push_back(std::move(micrograph));
+    return std::get<Picture>(job.measurements.back());
   }
 };
 
@@ -90,7 +90,7 @@ double intensity(double bias, double tilt, int y, int height) {
 }
 
 /// value = gain * intensity + offset + noise(x, y, signal).
-void expose(Micrograph& micrograph, double gain, double offset, double bias, double tilt,
+void expose(Picture& micrograph, double gain, double offset, double bias, double tilt,
             const std::function<double(int, int, double)>& noise) {
   for (int y = 0; y < micrograph.values.height(); ++y)
     for (int x = 0; x < micrograph.values.width(); ++x) {
@@ -119,7 +119,7 @@ const ParameterEstimate& estimate(const FitResult& result, const std::string& na
 TEST(Fit, GainAndOffsetAreTheLeastSquaresSolutionWithItsCovariance) {
   Bar bar(700, 0.4);
   bar.free_linear();
-  Micrograph& micrograph = bar.add_image(40, 30, bar.bias);
+  Picture& micrograph = bar.add_image(40, 30, bar.bias);
   constexpr double kSd = 20;
   micrograph.noise = NoiseModel{kSd, 0, false};
   Gaussian gaussian(1);
@@ -147,7 +147,7 @@ TEST(Fit, PriorsPullAsTheAnalyticPosterior) {
   for (const bool joint : {false, true}) {
     Bar bar(700, 0.4);
     bar.free_linear();
-    Micrograph& micrograph = bar.add_image(20, 20, bar.bias);
+    Picture& micrograph = bar.add_image(20, 20, bar.bias);
     constexpr double kSd = 100;
     micrograph.noise = NoiseModel{kSd, 0, false};
     Gaussian gaussian(2);
@@ -193,7 +193,7 @@ TEST(Fit, AStartInAnotherFringeOrderIsRecovered) {
   Bar bar(6 * kHalfWave, 0.3);
   bar.free(bar.bias, 3.6 * kHalfWave, 1 * kHalfWave, 9 * kHalfWave);
   bar.free_linear();
-  Micrograph& micrograph = bar.add_image(16, 200, bar.bias);
+  Picture& micrograph = bar.add_image(16, 200, bar.bias);
   micrograph.noise = NoiseModel{20, 0, false};
   Gaussian gaussian(3);
   // A pixel is the mean over its area: 8 Gauss-like midpoints of it are exact to 1e-4 of a count here.
@@ -220,7 +220,7 @@ TEST(Fit, StandardErrorsEqualTheSpreadOverSeeds) {
     bar.free(bar.bias, 650, 400, 1000);
     bar.free(bar.tilt, 0.3, 0.1, 0.7);
     bar.free_linear();
-    Micrograph& micrograph = bar.add_image(24, 24, bar.bias);
+    Picture& micrograph = bar.add_image(24, 24, bar.bias);
     micrograph.noise = NoiseModel{10, 0.5, false};
     Gaussian gaussian(1000 + seed);
     // The noise-free image at 24 x 24, pixel means as above.
@@ -258,7 +258,7 @@ Bar calibration(unsigned seed, double scatter, int side = 8) {
   bar.job.options.threads = 1;
   for (const double voltage : {200.0, 400.0, 600.0, 800.0, 1000.0}) {
     const ParameterRef ref = bar.job.parameters.add_constant("bias", voltage);
-    Micrograph& micrograph = bar.add_image(side, side, ref, true);
+    Picture& micrograph = bar.add_image(side, side, ref, true);
     micrograph.noise = NoiseModel{0.002, 0, false};
     const double frame = scatter * gaussian();
     expose(micrograph, 0.77, 0.008, voltage, 0, [&](int, int, double) { return 0.77 * frame + 0.002 * gaussian(); });
@@ -319,7 +319,7 @@ TEST(Fit, ASingleFrameThroughACalibrationCarriesTheFramesOwnMisfit) {
   Bar bar(700, 0);
   bar.free(bar.bias, 600, 100, 1400);
   bar.free_linear();
-  Micrograph& micrograph = bar.add_image(100, 100, bar.bias, true);
+  Picture& micrograph = bar.add_image(100, 100, bar.bias, true);
   micrograph.noise = NoiseModel{0.002, 0, false};
   Gaussian gaussian(4);
   expose(micrograph, 0.77, 0.008, 700, 0, [&](int, int, double) { return 0.002 * gaussian(); });
@@ -345,7 +345,7 @@ TEST(Fit, MisfitSharedByPixelsWidensTheErrors) {
     Bar bar;
     bar.free(bar.bias, 650, 400, 1000);
     bar.free_linear();
-    Micrograph& micrograph = bar.add_image(64, 64, bar.bias);
+    Picture& micrograph = bar.add_image(64, 64, bar.bias);
     micrograph.noise = NoiseModel{10, 0, false};
     Gaussian gaussian(8);
     expose(micrograph, 3000, 100, 700, 0.4,
@@ -373,7 +373,7 @@ FitResult sweep(unsigned seed, double rho) {
   double misfit = gaussian();
   for (int row = 0; row < 80; ++row) {
     const double voltage = 50 + 25 * row;
-    Micrograph& micrograph = bar.add_image(1, 1, bar.job.parameters.add_constant("bias", voltage), true);
+    Picture& micrograph = bar.add_image(1, 1, bar.job.parameters.add_constant("bias", voltage), true);
     micrograph.name = "sweep.csv:" + std::to_string(row + 2);
     micrograph.noise = NoiseModel{0.0005, 0, false};
     misfit = rho * misfit + std::sqrt(1 - rho * rho) * gaussian();
@@ -403,7 +403,7 @@ TEST(Fit, MisfitSharedByRowsWidensTheErrors) {
 TEST(Fit, MirrorMinimaInsideTheBoundsAreAmbiguous) {
   Bar bar(700, 0);
   bar.free(bar.bias, 500, 0, 3000);
-  Micrograph& micrograph = bar.add_image(30, 30, bar.bias, true);
+  Picture& micrograph = bar.add_image(30, 30, bar.bias, true);
   micrograph.noise = NoiseModel{0.01, 0, false};
   Gaussian gaussian(12);
   expose(micrograph, 1, 0, 700, 0, [&](int, int, double) { return 0.01 * gaussian(); });
@@ -422,7 +422,7 @@ TEST(Fit, MirrorMinimaInsideTheBoundsAreAmbiguous) {
 TEST(Fit, OddsOfANarrowMinimumAreSmaller) {
   Bar bar(700, 0);
   bar.free(bar.half_wave, kHalfWave, 400, 3000);
-  Micrograph& micrograph = bar.add_image(30, 30, bar.bias, true);
+  Picture& micrograph = bar.add_image(30, 30, bar.bias, true);
   micrograph.noise = NoiseModel{0.01, 0, false};
   Gaussian gaussian(12);
   expose(micrograph, 1, 0, 700, 0, [&](int, int, double) { return 0.01 * gaussian(); });
@@ -440,7 +440,7 @@ TEST(Fit, AParameterWithoutInfluenceIsNamed) {
   bar.free(bar.bias, 650, 400, 1000);
   bar.free(bar.wavelength, 1550, 1000, 2000);  // a crystal's retardance is given in voltages
   bar.free_linear();
-  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  Picture& micrograph = bar.add_image(32, 32, bar.bias);
   micrograph.noise = NoiseModel{10, 0, false};
   Gaussian gaussian(21);
   expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return 10 * gaussian(); });
@@ -457,7 +457,7 @@ TEST(Fit, OneUniformFrameCannotGiveBiasGainAndOffset) {
   Bar bar(700, 0);
   bar.free(bar.bias, 650, 100, 1400);
   bar.free_linear();
-  Micrograph& micrograph = bar.add_image(32, 32, bar.bias, true);
+  Picture& micrograph = bar.add_image(32, 32, bar.bias, true);
   micrograph.noise = NoiseModel{10, 0, false};
   Gaussian gaussian(22);
   expose(micrograph, 3000, 100, 700, 0, [&](int, int, double) { return 10 * gaussian(); });
@@ -471,7 +471,7 @@ TEST(Fit, NoiseAloneIsNoSignal) {
     Bar bar;
     bar.free(bar.bias, 650, 100, 5000);
     bar.free_linear();
-    Micrograph& micrograph = bar.add_image(40, 40, bar.bias);
+    Picture& micrograph = bar.add_image(40, 40, bar.bias);
     Gaussian gaussian(300 + seed);
     for (double& value : micrograph.values.values()) value = std::round(1000 + 15 * gaussian());
     const FitResult result = fit(bar.job);
@@ -486,7 +486,7 @@ TEST(Fit, WhatTheModelLeavesOverIsItsShareOfThePicture) {
     Bar bar;
     bar.free(bar.bias, 650, 100, 1400);
     bar.free_linear();
-    Micrograph& micrograph = bar.add_image(40, 40, bar.bias);
+    Picture& micrograph = bar.add_image(40, 40, bar.bias);
     constexpr double kNoise = 10;
     micrograph.noise = NoiseModel{kNoise, 0, false};
     Gaussian gaussian(7);
@@ -554,7 +554,7 @@ TEST(Scan, AnglesTurnThePictureAsMalusSays) {
   s.surround_index = b.fixed("surround", 1.5);
   const ParameterRef gain = b.linear("gain", 1), offset = b.linear("offset", 0);
   FitJob job;
-  job.micrographs.push_back(testing::micrograph_of("cell", s, std::vector<double>(4, 0.5), gain, offset, {0.01, 0}));
+  job.measurements.push_back(testing::micrograph_of("cell", s, std::vector<double>(4, 0.5), gain, offset, {0.01, 0}));
   job.parameters = b.table;
   const estimation::Task task(job);
   const std::unique_ptr<estimation::LeastSquares> problem = estimation::problem_of(task, estimation::prepare(task).frames, {{}});
@@ -574,7 +574,7 @@ TEST(Scan, NoStepIsLongerThanARadian) {
     return table.add(p);
   };
   FitJob job;
-  Micrograph m;
+  Picture m;
   m.name = "droplet";
   Droplet droplet;
   droplet.diameter_um = add("diameter_um", 6, 5.5, 16);
@@ -595,7 +595,7 @@ TEST(Scan, NoStepIsLongerThanARadian) {
   job.parameters = table;
   m.values = render(m.scene, plan(m.scene, table.values()), table.values(), {}, 1).intensity;
   m.mask = Mask(32, 32, 1);
-  job.micrographs.push_back(m);
+  job.measurements.push_back(m);
   const FitResult result = fit(job);
   ASSERT_EQ(result.scans.size(), 2u);
   for (const ScanTrace& scan : result.scans) {
@@ -620,7 +620,7 @@ TEST(Fit, AFlatImageIsNoSignal) {
   Bar bar;
   bar.free(bar.bias, 650, 100, 5000);
   bar.free_linear();
-  Micrograph& micrograph = bar.add_image(40, 40, bar.bias);
+  Picture& micrograph = bar.add_image(40, 40, bar.bias);
   for (double& value : micrograph.values.values()) value = 1000;
   const FitResult result = fit(bar.job);
   EXPECT_FALSE(result.has_answer());
@@ -630,7 +630,7 @@ TEST(Fit, AFlatImageIsNoSignal) {
 TEST(Fit, ABoundThatIsNoPhysicalLimitPins) {
   Bar bar;
   bar.free(bar.bias, 450, 300, 500);
-  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  Picture& micrograph = bar.add_image(32, 32, bar.bias);
   micrograph.noise = NoiseModel{0.01, 0, false};
   expose(micrograph, 1, 0, 700, 0.4, [](int, int, double) { return 0.0; });
   const FitResult result = fit(bar.job);
@@ -643,7 +643,7 @@ TEST(Fit, APhysicalLimitGivesAOneSidedLimit) {
   Bar bar;
   bar.free(bar.tilt, 0.1, 0, 0.5);
   bar.job.parameters[bar.tilt].physical_lower = 0;
-  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  Picture& micrograph = bar.add_image(32, 32, bar.bias);
   micrograph.noise = NoiseModel{0.05, 0, false};
   // A little beyond the limit, so that the fit must end on it.
   expose(micrograph, 1, 0, 700, -0.001, [](int, int, double) { return 0.0; });
@@ -662,7 +662,7 @@ TEST(Fit, GainBoundsAreHonouredByTheExactSolution) {
   Bar bar(700, 0.4);
   bar.free_linear();
   bar.job.parameters[bar.gain].upper = 2500;
-  Micrograph& micrograph = bar.add_image(20, 20, bar.bias);
+  Picture& micrograph = bar.add_image(20, 20, bar.bias);
   micrograph.noise = NoiseModel{10, 0, false};
   expose(micrograph, 3000, 150, 700, 0.4, [](int, int, double) { return 0.0; });
   const FitResult result = fit(bar.job);
@@ -688,7 +688,7 @@ TEST(Fit, UnevenLightIsSolvedExactlyBesideGainAndOffset) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 650, 400, 1000);
   bar.free_linear();
-  Micrograph& m = bar.add_image(60, 40, bar.bias);
+  Picture& m = bar.add_image(60, 40, bar.bias);
   for (const auto& [shape, of_intensity] : shapes) {
     Parameter p;
     p.name = "uneven " + std::to_string(m.uneven.size());
@@ -722,7 +722,7 @@ TEST(Fit, UnevenLightIsSolvedExactlyBesideGainAndOffset) {
       const double light = (result.micrographs[0].fitted(x, y) - offset) / gain;
       design(i, 0) = light, design(i, 1) = 1;
       for (std::size_t k = 0; k < shapes.size(); ++k) design(i, static_cast<int>(k) + 2) = (shapes[k].second ? light : 1) * shape_at(shapes[k].first, x, y);
-      values[i] = bar.job.micrographs[0].values(x, y);
+      values[i] = picture(bar.job, 0).values(x, y);
     }
   const Eigen::VectorXd expected = design.colPivHouseholderQr().solve(values);
   for (std::size_t k = 0; k < names.size(); ++k) {
@@ -737,7 +737,7 @@ TEST(Fit, AnInterruptionGivesTheBestStateSoFar) {
   Bar bar;
   bar.free(bar.bias, 650, 400, 1000);
   bar.free_linear();
-  Micrograph& micrograph = bar.add_image(32, 32, bar.bias);
+  Picture& micrograph = bar.add_image(32, 32, bar.bias);
   expose(micrograph, 3000, 100, 700, 0.4, [](int x, int y, double) { return (x * 7 + y * 13) % 5; });
   std::atomic<bool> stop = true;
   bar.job.options.interrupted = &stop;
@@ -759,7 +759,7 @@ TEST(Fit, GivesTheSameBitsWithOneAndTwoThreads) {
     bar.free(bar.bias, 500, 100, 4000);
     bar.free(bar.tilt, 0.3, 0.1, 0.7);
     bar.free_linear();
-    Micrograph& micrograph = bar.add_image(160, 150, bar.bias);  // some parts of a few thousand pixels
+    Picture& micrograph = bar.add_image(160, 150, bar.bias);  // some parts of a few thousand pixels
     Gaussian gaussian(17);
     expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return std::round(20 * gaussian()); });
     return fit(bar.job);
@@ -779,7 +779,7 @@ TEST(LeastSquares, WeightsMeanAndShapeApartOverAllParts) {
   bar.free(bar.tilt, 0.38, 0.1, 0.7);
   bar.job.parameters[bar.gain].free = bar.job.parameters[bar.gain].linear = true;
   bar.job.parameters[bar.offset].value = 160;  // wrong, so that the mean counts
-  Micrograph& micrograph = bar.add_image(110, 100, bar.bias);
+  Picture& micrograph = bar.add_image(110, 100, bar.bias);
   Gaussian gaussian(23);
   expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
   estimation::PixelSet set;
@@ -792,8 +792,8 @@ TEST(LeastSquares, WeightsMeanAndShapeApartOverAllParts) {
     }
   set.value = Eigen::Map<const Eigen::VectorXd>(value.data(), static_cast<Eigen::Index>(value.size()));
   set.sigma = Eigen::Map<const Eigen::VectorXd>(sigma.data(), static_cast<Eigen::Index>(sigma.size()));
-  const estimation::Unknowns unknowns = estimation::Unknowns::of(bar.job);
-  estimation::LeastSquares problem(bar.job, unknowns, {plan(micrograph.scene, bar.job.parameters.values())}, {set});
+  const estimation::Task task(bar.job);
+  estimation::LeastSquares problem(task, {plan(micrograph.scene, bar.job.parameters.values())}, {set});
   const estimation::Misfit misfit{0.9, 2.5, false};
   problem.set_misfit({misfit});
   const auto objective_at = [&](double bias, double tilt) {
@@ -841,7 +841,7 @@ TEST(Fit, FramesWithVoltagesOfTheirOwnGiveTheSameBitsWithOneAndTwoThreads) {
       bias.value = volts + 15;
       bias.lower = 300, bias.upper = 1100;
       bias.free = true;
-      Micrograph& micrograph = bar.add_image(24, 24, bar.job.parameters.add(bias));
+      Picture& micrograph = bar.add_image(24, 24, bar.job.parameters.add(bias));
       micrograph.noise = NoiseModel{20, 0, false};
       expose(micrograph, 3000, 100, volts, 0.4, [&](int, int, double) { return 20 * gaussian(); });
     }
@@ -860,7 +860,7 @@ TEST(Fit, FramesWithVoltagesOfTheirOwnGiveTheSameBitsWithOneAndTwoThreads) {
 TEST(Fit, AnImageWithoutUsablePixelsIsTheUsersMistake) {
   Bar bar;
   bar.free(bar.bias, 500, 100, 4000);
-  Micrograph& micrograph = bar.add_image(16, 16, bar.bias);
+  Picture& micrograph = bar.add_image(16, 16, bar.bias);
   micrograph.mask = Mask(16, 16, 0);
   EXPECT_THROW(fit(bar.job), UserError);
 }
@@ -874,7 +874,7 @@ struct OneVoltage {
   /// Every pixel the same but for +-kSd, so that the mean is exactly `mean`.
   explicit OneVoltage(double mean, double start = 1100) {
     bar.free(bar.bias, start, 450, 1480);
-    Micrograph& m = bar.add_image(kSide, kSide, bar.bias, true);
+    Picture& m = bar.add_image(kSide, kSide, bar.bias, true);
     m.noise = NoiseModel{kSd, 0, false};
     for (int y = 0; y < kSide; ++y)
       for (int x = 0; x < kSide; ++x) m.values(x, y) = mean + ((x + y) % 2 ? kSd : -kSd);
@@ -901,8 +901,8 @@ TEST(Fit, IntervalOfABentLikelihoodIsWhereItFallsNotPlusMinus) {
   EXPECT_GT(high - bias.value, 1.2 * (bias.value - low));
   // Halfway to the maximum with a hundredth of the noise the likelihood is a parabola.
   OneVoltage straight(0.5);
-  straight.job.micrographs[0].noise->read_counts *= 0.01;
-  for (double& v : straight.job.micrographs[0].values.values()) v = 0.5 + 0.01 * (v - 0.5);
+  picture(straight.job, 0).noise->read_counts *= 0.01;
+  for (double& v : picture(straight.job, 0).values.values()) v = 0.5 + 0.01 * (v - 0.5);
   EXPECT_FALSE(estimate(fit(straight.job), "sample.crystal.bias_v").profiled);
 }
 
@@ -914,7 +914,7 @@ TEST(Fit, ProfileFollowsAValleyThatBends) {
   bar.free(bar.tilt, 0.4, 0.1, 0.8);
   bar.job.parameters[bar.gain].value = 3000;
   bar.job.parameters[bar.offset].value = 150;
-  Micrograph& m = bar.add_image(40, 30, bar.bias);
+  Picture& m = bar.add_image(40, 30, bar.bias);
   constexpr double kSd = 1500;  // of 3000: errors of some percent, bent a little
   m.noise = NoiseModel{kSd, 0, false};
   Gaussian gaussian(5);
@@ -944,7 +944,7 @@ TEST(Inputs, ShiftTheEstimateAsAFitWithAnotherInputDoes) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 650, 400, 1000);
   bar.free_linear();
-  Micrograph& m = bar.add_image(40, 30, bar.bias);
+  Picture& m = bar.add_image(40, 30, bar.bias);
   m.noise = NoiseModel{1, 0, false};
   Gaussian gaussian(29);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return gaussian(); });
@@ -975,7 +975,7 @@ TEST(Coverage, OfAPlainFitIsNominalAndTheSameTwice) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
-  Micrograph& m = bar.add_image(24, 20, bar.bias);
+  Picture& m = bar.add_image(24, 20, bar.bias);
   m.noise = NoiseModel{20, 0.5, false};
   Gaussian gaussian(11);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double signal) { return std::sqrt(400 + 0.5 * signal) * gaussian(); });
@@ -1009,7 +1009,7 @@ TEST(Coverage, SeesAnIntervalThatIsTooNarrow) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
-  Micrograph& m = bar.add_image(24, 20, bar.bias);
+  Picture& m = bar.add_image(24, 20, bar.bias);
   m.noise = NoiseModel{20, 0, false};
   Gaussian gaussian(12);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
@@ -1029,7 +1029,7 @@ TEST(Coverage, TakesResidualsForNoiseWhereTheModelDoesNotFit) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
-  Micrograph& m = bar.add_image(40, 30, bar.bias);
+  Picture& m = bar.add_image(40, 30, bar.bias);
   m.noise = NoiseModel{20, 0, false};
   Gaussian gaussian(13);
   // Stray fringes three times the noise.
@@ -1050,7 +1050,7 @@ TEST(Coverage, HoldsForAParameterKnownByItsPriorAlone) {
   bar.free(bar.half_wave, kHalfWave, 1000, 2000);
   bar.job.parameters[bar.half_wave].prior_sd = 45;
   bar.free_linear();
-  Micrograph& m = bar.add_image(24, 20, bar.bias);
+  Picture& m = bar.add_image(24, 20, bar.bias);
   m.noise = NoiseModel{20, 0, false};
   Gaussian gaussian(17);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
@@ -1069,7 +1069,7 @@ TEST(Coverage, OfAMaskedImageHasItsNoise) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
-  Micrograph& m = bar.add_image(40, 40, bar.bias);
+  Picture& m = bar.add_image(40, 40, bar.bias);
   m.noise = NoiseModel{10, 0, false};  // half the truth
   Gaussian gaussian(19);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
@@ -1089,14 +1089,14 @@ TEST(Outlook, IsTheStandardErrorThatTheFitThenHas) {
   bar.free_linear();
   bar.job.parameters[bar.gain].value = 3000;
   bar.job.parameters[bar.offset].value = 150;
-  Micrograph& m = bar.add_image(40, 30, bar.bias);
+  Picture& m = bar.add_image(40, 30, bar.bias);
   m.noise = NoiseModel{20, 0.5, false};
   Gaussian gaussian(21);
   expose(m, 3000, 150, 2400, 0.9, [&](int, int, double signal) { return std::sqrt(400 + 0.5 * signal) * gaussian(); });
   const FitResult result = fit(bar.job);
   FitJob planned = bar.job;
-  planned.micrographs[0].values = {};
-  planned.micrographs[0].mask = {};
+  picture(planned, 0).values = {};
+  picture(planned, 0).mask = {};
   for (const FitJob& job : {bar.job, planned}) {
     const Outlook expected = outlook(job);
     EXPECT_TRUE(expected.identifiable);
@@ -1104,7 +1104,7 @@ TEST(Outlook, IsTheStandardErrorThatTheFitThenHas) {
     for (std::size_t j = 0; j < result.parameters.size(); ++j) {
       EXPECT_EQ(expected.parameters[j].name, result.parameters[j].name);
       // With the image, its level is read off its darkest and brightest pixels, noise and all.
-      EXPECT_NEAR(expected.parameters[j].stderr_ / result.parameters[j].stderr_, 1, job.micrographs[0].values.empty() ? 0.02 : 0.1) << result.parameters[j].name;
+      EXPECT_NEAR(expected.parameters[j].stderr_ / result.parameters[j].stderr_, 1, picture(job, 0).values.empty() ? 0.02 : 0.1) << result.parameters[j].name;
     }
   }
 }
@@ -1125,7 +1125,7 @@ TEST(NextShot, IsWorthWhatTheFitWithItThenShows) {
   bar.free_linear();
   bar.job.parameters[bar.gain].value = 3000;
   bar.job.parameters[bar.offset].value = 150;
-  Micrograph& m = bar.add_image(30, 20, bar.bias);
+  Picture& m = bar.add_image(30, 20, bar.bias);
   m.noise = NoiseModel{20, 0, false};
   m.values = {};
   m.mask = {};
@@ -1156,19 +1156,19 @@ TEST(NextShot, IsWorthWhatTheFitWithItThenShows) {
     return bar.job.parameters.add(p);
   };
   FitJob& job = bar.job;
-  Micrograph first = job.micrographs[0], second = first;
+  Picture first = picture(job, 0), second = first;
   second.gain = add("second.gain", 3000);
   second.offset = add("second.offset", 150);
   second.scene.microscope.analyzer_deg = job.parameters.add_constant("second.analyzer", 180);
   Gaussian gaussian(31);
-  for (Micrograph* image : {&first, &second}) {
+  for (Picture* image : {&first, &second}) {
     image->values = Image(30, 20);
     image->mask = Mask(30, 20, 1);
     const bool crossed = image == &first;
     for (int y = 0; y < 20; ++y)
       for (int x = 0; x < 30; ++x) image->values(x, y) = 150 + 3000 * (crossed ? intensity(1450, 0.1, y, 20) : 1 - intensity(1450, 0.1, y, 20)) + 20 * gaussian();
   }
-  job.micrographs = {first, second};
+  job.measurements = {first, second};
   const FitResult both = fit(job);
   // The slope at the estimate instead of at the truth.
   EXPECT_NEAR(estimate(both, "sample.crystal.bias_v").stderr_ / same->stderr_, 1, 0.15);

@@ -22,10 +22,10 @@ double variance_at(const NoiseModel& noise, double signal) {
 }
 
 /// Fringes of the given period along the diagonal, 100 to 3100 counts, Gaussian read and photon noise, rounded.
-Micrograph fringes(const Truth& truth, double period, unsigned seed, bool rounded = true) {
+Picture fringes(const Truth& truth, double period, unsigned seed, bool rounded = true) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
-  Micrograph micrograph;
+  Picture micrograph;
   micrograph.values = Image(256, 256);
   micrograph.mask = Mask(256, 256, 1);
   for (int y = 0; y < 256; ++y)
@@ -56,7 +56,7 @@ TEST(NoiseEstimate, FindsReadAndPhotonNoiseUnderFringes) {
 }
 
 TEST(NoiseEstimate, IgnoresDustAndMaskedPixels) {
-  Micrograph micrograph = fringes({20, 0.0}, 30, 5);
+  Picture micrograph = fringes({20, 0.0}, 30, 5);
   std::mt19937_64 random(9);
   for (int i = 0; i < 300; ++i) {
     const int x = static_cast<int>(random() % 256), y = static_cast<int>(random() % 256);
@@ -77,7 +77,7 @@ TEST(NoiseEstimate, NeverFallsBelowTheRoundingOfCounts) {
 
 TEST(NoiseEstimate, IsInCountsWhenValuesAreTransmission) {
   const Truth truth{15, 0.5};
-  Micrograph micrograph = fringes(truth, 25, 3);
+  Picture micrograph = fringes(truth, 25, 3);
   constexpr double kBright = 4000;  // parallel - dark
   micrograph.variance_scale = Image(256, 256, 1 / (kBright * kBright));
   for (double& value : micrograph.values.values()) value /= kBright;
@@ -101,11 +101,11 @@ struct Camera {
     const double light = std::max(0.0, signal - black);
     return std::sqrt(read * read + counts_per_photon * light + step * step / 12);
   }
-  Micrograph picture(unsigned seed) const {
+  Picture picture(unsigned seed) const {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     constexpr int kSize = 256;
-    Micrograph micrograph;
+    Picture micrograph;
     micrograph.values = Image(kSize, kSize);
     micrograph.mask = Mask(kSize, kSize, 1);
     if (bright > 0) micrograph.variance_scale = Image(kSize, kSize, 0);
@@ -151,7 +151,7 @@ TEST(NoiseEstimate, IsRightAtEveryLevelForAnyCamera) {
   std::mt19937_64 random(20250117);
   for (int draw = 0; draw < 60; ++draw) {
     const Camera camera = any_camera(random);
-    const Micrograph micrograph = camera.picture(1000 + static_cast<unsigned>(draw));
+    const Picture micrograph = camera.picture(1000 + static_cast<unsigned>(draw));
     const NoiseModel noise = estimate_noise(micrograph);
     for (const double share : {0.0, 0.1, 0.3, 0.6, 0.9, 1.0}) {
       const double signal = camera.low + share * (camera.high - camera.low), expected = camera.sd(signal);
@@ -193,7 +193,7 @@ TEST(NoiseEstimate, NeverEndsAtTheFloorWhereThePictureScatters) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   for (const double pattern : {0.02, 0.05, 0.2}) {
-    Micrograph micrograph;
+    Picture micrograph;
     micrograph.values = Image(200, 200);
     micrograph.mask = Mask(200, 200, 1);
     const auto sd = [&](double s) { return std::hypot(45.0, pattern * s); };
@@ -216,7 +216,7 @@ TEST(NoiseEstimate, IsThatOfTheOthersWhereHalfOfThePixelsAreCutOff) {
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   for (const double background : {-300.0, -30.0, 0.0}) {
-    Micrograph micrograph;
+    Picture micrograph;
     micrograph.values = Image(256, 256);
     micrograph.mask = Mask(256, 256, 1);
     for (int y = 0; y < 256; ++y)

@@ -18,6 +18,7 @@
 #include "birefit/io.h"
 #include "io/report_chart.h"
 #include "io/report_format.h"
+#include "pictures.h"
 
 namespace birefit {
 namespace {
@@ -86,7 +87,7 @@ Case make_case(int micrographs = 1, int width = 48, int height = 40) {
   std::mt19937 generator(7);
   std::normal_distribution<double> normal;
   for (int k = 0; k < micrographs; ++k) {
-    Micrograph input;
+    Picture input;
     MicrographResult m;
     m.name = input.name = "drop" + std::to_string(k) + ".tif";
     input.scene.sample = Droplet{};
@@ -116,7 +117,7 @@ Case make_case(int micrographs = 1, int width = 48, int height = 40) {
     input.masked_by_user = 5 * height;
     input.saturated = 3;
     r.micrographs.push_back(std::move(m));
-    c.config.job.micrographs.push_back(std::move(input));
+    c.config.job.measurements.push_back(std::move(input));
   }
   return c;
 }
@@ -246,7 +247,7 @@ TEST(Report, EscapesEverythingOfTheUsers) {
   Case c = make_case();
   c.config.path = "jobs/" + kEvil + ".yaml";
   c.config.text = kEvil;
-  c.config.job.micrographs[0].name = c.result.micrographs[0].name = kEvil;
+  picture(c.config.job, 0).name = c.result.micrographs[0].name = kEvil;
   c.result.verdict = c.result.solver_report = c.result.covariance_kind = kEvil;
   c.result.warnings = {kEvil};
   c.result.parameters[1].name = c.result.names[1] = c.result.scans[0].name = kEvil;
@@ -312,7 +313,7 @@ TEST(Report, SurvivesResultsOfFailedFits) {
   EXPECT_FALSE(std::regex_search(html, kBareNan));
 
   Case flat = make_case();
-  flat.result.micrographs[0].fitted = flat.config.job.micrographs[0].values = Image(48, 40, 5.0);
+  flat.result.micrographs[0].fitted = picture(flat.config.job, 0).values = Image(48, 40, 5.0);
   flat.result.micrographs[0].residual = flat.result.micrographs[0].sigma = Image(48, 40, 0.0);
   EXPECT_FALSE(std::regex_search(report_html(flat.config, flat.result), kBareNan));
 }
@@ -326,7 +327,7 @@ TEST(Report, LargeImagesAreShrunk) {
 
 TEST(Report, BarsShowTheProfileAlongTheField) {
   Case c = make_case();
-  c.config.job.micrographs[0].scene.sample = Crystal{};
+  picture(c.config.job, 0).scene.sample = Crystal{};
   EXPECT_THAT(report_html(c.config, c.result), HasSubstr("mean over the columns of every row"));
 }
 

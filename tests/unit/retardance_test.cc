@@ -17,6 +17,7 @@ using namespace testing;
 struct TiltedCell {
   TableBuilder b;
   Scene scene;
+  Observable observable;
   ParameterRef thickness, birefringence, tilt, wavelength;
   TiltedCell(double n_o, double dn, double tilt_deg, Quantity quantity) {
     Cell cell;
@@ -32,10 +33,10 @@ struct TiltedCell {
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
     scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 0);
     scene.view.width = scene.view.height = 1;
-    scene.quantity = quantity;
+    observable.quantity = quantity;
   }
   double value() const { return value(b.table.values()); }
-  double value(const Theta& theta) const { return render(scene, plan(scene, theta), theta, {}, 1).intensity(0, 0); }
+  double value(const Theta& theta) const { return render(scene, plan(scene, theta, observable), theta, {}, 1).intensity(0, 0); }
 };
 
 /// (n_eff - n_o) d of an axis at `tilt` to the layer: 1/n_eff^2 = cos^2 / n_e^2 + sin^2 / n_o^2.
@@ -58,7 +59,7 @@ TEST(Retardance, HasItsDerivatives) {
   const TiltedCell cell(1.52, 0.2, 35, Quantity::retardance_waves);
   const Theta theta = cell.b.table.values();
   const std::vector<int> active{cell.thickness.index, cell.birefringence.index, cell.tilt.index, cell.wavelength.index};
-  const Rendering r = render(cell.scene, plan(cell.scene, theta), theta, active, 1);
+  const Rendering r = render(cell.scene, plan(cell.scene, theta, cell.observable), theta, active, 1);
   for (std::size_t j = 0; j < active.size(); ++j) {
     Theta up = theta, down = theta;
     const std::size_t i = static_cast<std::size_t>(active[j]);
@@ -72,7 +73,7 @@ TEST(Retardance, HasItsDerivatives) {
 TEST(Retardance, IsNotOneNumberWhereTheAxisTurns) {
   TiltedCell cell(1.52, 0.2, 0, Quantity::retardance_um);
   std::get<Cell>(cell.scene.sample).director = TwistedDirector{cell.b.fixed("twist_deg", 90), cell.b.fixed("azimuth", 0), cell.b.fixed("pretilt_deg", 0)};
-  EXPECT_THROW(plan(cell.scene, cell.b.table.values()), UserError);
+  EXPECT_THROW(plan(cell.scene, cell.b.table.values(), cell.observable), UserError);
 }
 
 /// A table of retardances with noise, its thickness known beforehand as `prior` +- 4 um; true: 40 um.
@@ -83,13 +84,17 @@ FitResult fitted_with_prior(double prior, double noise) {
   Parameter& thickness = cell.b.table[cell.thickness];
   thickness.free = true, thickness.value = prior, thickness.lower = 1, thickness.upper = 5000, thickness.prior_sd = 4;
   FitJob job;
-  const ParameterRef gain = cell.b.fixed("gain", 1), offset = cell.b.fixed("offset", 0);
+  Readings table{.name = "table", .observable = cell.observable, .gain = cell.b.fixed("gain", 1), .offset = cell.b.fixed("offset", 0), .noise = NoiseModel{noise, 0}};
+  table.values.resize(12);
   for (int i = 0; i < 12; ++i) {
     Scene scene = cell.scene;
     const double nm = 450 + 20 * i;
     scene.microscope.wavelength_nm = cell.b.fixed("wavelength" + std::to_string(i), nm);
-    job.micrographs.push_back(micrograph_of("table:" + std::to_string(i + 2), scene, {0.01 * 40 / (1e-3 * nm) + normal(random)}, gain, offset, {noise, 0}));
+    table.rows.push_back(scene);
+    table.lines.push_back(i + 2);
+    table.values[i] = 0.01 * 40 / (1e-3 * nm) + normal(random);
   }
+  job.measurements = {table};
   job.parameters = cell.b.table;
   return fit(job);
 }

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "birefit/series.h"
+#include "pictures.h"
 
 namespace birefit {
 namespace {
@@ -179,7 +180,7 @@ TEST_F(SeriesFiles, FramesFollowTheirTable) {
   EXPECT_EQ(series.frames[0].name, "f2");
   EXPECT_EQ(series.columns.at(series.along.value()).name, "time_s");
   const Config first = load_frame(series, 0);
-  const ParameterRef bias = std::get<Crystal>(first.job.micrographs.at(0).scene.sample).bias_v;
+  const ParameterRef bias = std::get<Crystal>(picture(first.job, 0).scene.sample).bias_v;
   EXPECT_EQ(first.job.parameters[bias].value, 800);
   EXPECT_FALSE(first.job.parameters[bias].free);
 }

@@ -333,7 +333,7 @@ FitJob job_of(DropletScene s, Image values, const std::array<Range, 4>& ranges, 
     parameter.free = true;
     parameter.value = ranges[k].start, parameter.lower = ranges[k].low, parameter.upper = ranges[k].high;
   }
-  Micrograph micrograph;
+  Picture micrograph;
   micrograph.name = "synthetic";
   micrograph.mask = Mask(values.width(), values.height(), 1);
   micrograph.values = std::move(values);
@@ -347,7 +347,7 @@ FitJob job_of(DropletScene s, Image values, const std::array<Range, 4>& ranges, 
   micrograph.scene = s.scene;
   FitJob job;
   job.parameters = s.table;
-  job.micrographs = {micrograph};
+  job.measurements = {micrograph};
   return job;
 }
 

@@ -15,9 +15,9 @@ namespace {
 /// Known numbers that all micrographs read.
 std::vector<int> shared_inputs(const Task& task) {
   std::map<int, int> readers;
-  for (const Micrograph& m : task.job.micrographs) {
+  for (int g = 0; g < task.frames(); ++g) {
     std::set<int> read;
-    for_each_ref(m.scene, [&](const ParameterRef& ref) {
+    for_each_ref(task.picture(g).scene, [&](const ParameterRef& ref) {
       if (!ref || task.job.parameters[ref].free) return;
       const bool of_a_vector =
           task.job.parameters[ref].name.find(".axis.") != std::string::npos;  // no quantity by itself
@@ -40,7 +40,7 @@ Eigen::VectorXd intensity_by_pixel_size(const Task& task, const Optimum& optimum
     const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
     std::array<Image, 2> images;
     for (const std::size_t side : {0, 1}) {
-      Scene scene = task.micrograph(g).scene;
+      Scene scene = task.picture(g).scene;
       scene.view.pixel_size_um *= 1 + (side ? kStep : -kStep);
       images[side] = render(scene, frame.plan, optimum.theta, {}, task.job.options.threads).intensity;
     }
@@ -56,9 +56,7 @@ Eigen::VectorXd intensity_by_pixel_size(const Task& task, const Optimum& optimum
 class ChangedInput {
  public:
   ChangedInput(const Task& task, const Optimum& optimum, const std::function<void(FitJob&)>& change)
-      : optimum_(optimum), job_(task.job) {
-    change(job_);
-    job_.prior.reset();
+      : optimum_(optimum), job_(changed(task.job, change)), task_(job_) {
     std::vector<RenderPlan> plans;
     std::vector<PixelSet> sets;
     std::size_t all = 0;
@@ -67,13 +65,13 @@ class ChangedInput {
       const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
       const std::size_t share = std::max<std::size_t>(1, kPixels * frame.pixels.size() / std::max<std::size_t>(all, 1));
       const Image picture = fitted_image(task, optimum.frames, g, optimum.theta);
-      PixelSet set = pixel_set(task.micrograph(g), frame.sigma, subsample(frame.pixels, share));
+      PixelSet set = pixel_set(task.picture(g), frame.sigma, subsample(frame.pixels, share));
       for (std::size_t i = 0; i < set.pixels.size(); ++i)
         set.value[static_cast<Eigen::Index>(i)] = picture(set.pixels[i][0], set.pixels[i][1]);
       sets.push_back(std::move(set));
       plans.push_back(frame.plan);
     }
-    problem_ = std::make_unique<LeastSquares>(job_, task.unknowns, std::move(plans), std::move(sets));
+    problem_ = std::make_unique<LeastSquares>(task_, std::move(plans), std::move(sets));
     problem_->set_misfit(optimum.problem->misfit());
   }
 
@@ -98,9 +96,16 @@ class ChangedInput {
   }
 
  private:
+  static FitJob changed(FitJob job, const std::function<void(FitJob&)>& change) {
+    change(job);
+    job.prior.reset();
+    return job;
+  }
+
   static constexpr std::size_t kPixels = 4000;  // as of a scan
   const Optimum& optimum_;
   FitJob job_;
+  Task task_;
   std::unique_ptr<LeastSquares> problem_;
 };
 
@@ -132,14 +137,14 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
           job.parameters[index].value = optimum.theta[static_cast<std::size_t>(index)] + step;
         });
   }
-  const double pixel_um = task.micrograph(0).scene.view.pixel_size_um;
-  const std::vector<Micrograph>& micrographs = task.job.micrographs;
-  const bool shared = std::all_of(micrographs.begin(), micrographs.end(),
-                                  [&](const Micrograph& m) { return m.scene.view.pixel_size_um == pixel_um; });
+  const double pixel_um = task.picture(0).scene.view.pixel_size_um;
+  const bool shared = std::all_of(task.sights.begin(), task.sights.end(), [&](const Sight& sight) {
+    return sight.picture->scene.view.pixel_size_um == pixel_um;
+  });
   if (pixel_um > 0 && shared)
     add("micrograph.pixel_size_um", "um", pixel_um, intensity_by_pixel_size(task, optimum, pixel_um),
         [](FitJob& job, double step) {
-          for (Micrograph& m : job.micrographs) m.scene.view.pixel_size_um += step;
+          for_each_scene(job.measurements, [&](Scene& scene) { scene.view.pixel_size_um += step; });
         });
   const auto weight = [&](const InputEffect& effect) {
     double most = 0;

@@ -52,13 +52,13 @@ Eigen::VectorXd change_by_values(const Task& task, const Optimum& optimum, const
   for (int g = 0; g < task.frames(); ++g) {
     const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
     const Image& image = values[static_cast<std::size_t>(g)];
-    PixelSet set = pixel_set(task.micrograph(g), frame.sigma, frame.pixels);
+    PixelSet set = pixel_set(task.picture(g), frame.sigma, frame.pixels);
     for (std::size_t i = 0; i < set.pixels.size(); ++i)
       set.value[static_cast<Eigen::Index>(i)] = image(set.pixels[i][0], set.pixels[i][1]);
     sets.push_back(std::move(set));
     plans.push_back(frame.plan);
   }
-  LeastSquares problem(task.job, task.unknowns, std::move(plans), std::move(sets));
+  LeastSquares problem(task, std::move(plans), std::move(sets));
   problem.set_misfit(optimum.problem->misfit());
   Eigen::VectorXd searched = optimum.searched;
   problem.solve(searched, few_steps(task, steps));
@@ -71,7 +71,8 @@ void measure_propagation(const Task& task, const Optimum& optimum, LeftOut& left
   left_out.propagation.resize(task.unknowns.size(), 0);
   if (optimum.stopped || !by_waves(optimum.frames)) return;
   std::vector<std::vector<Image>> pictures;  // of each frame, each scene of its twin
-  for (const Micrograph& m : task.job.micrographs) {
+  for (int g = 0; g < task.frames(); ++g) {
+    const Picture& m = task.picture(g);
     const std::optional<RadialTwin> twin = radial_twin(m.scene, optimum.theta);
     if (!twin) return;
     try {
@@ -108,14 +109,16 @@ void measure_propagation(const Task& task, const Optimum& optimum, LeftOut& left
 }
 
 void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {
-  const auto has_curved = [](const Micrograph& m) {
-    return has_curved_rays(m.scene) && m.scene.rays == Rays::straight && m.scene.ceiling != Ceiling::wave;
+  const auto has_curved = [](const Sight& sight) {
+    const Scene& scene = sight.picture->scene;
+    return has_curved_rays(scene) && scene.rays == Rays::straight && scene.ceiling != Ceiling::wave;
   };
-  const std::vector<Micrograph>& micrographs = task.job.micrographs;
   if (optimum.stopped || task.unknowns.searched.empty() ||
-      !std::all_of(micrographs.begin(), micrographs.end(), has_curved))
+      !std::all_of(task.sights.begin(), task.sights.end(), has_curved))
     return;
   FitJob curved = task.job;
+  for_each_scene(curved.measurements, [](Scene& scene) { scene.rays = Rays::eikonal; });
+  const Task curved_task(curved);
   std::vector<RenderPlan> plans, straight_plans;
   std::vector<PixelSet> sets;
   // Of large images a part tells it, fitted both ways: what its noise does to a fit, it does to both.
@@ -125,14 +128,12 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
   const bool part = all > kPixels;
   for (int g = 0; g < task.frames(); ++g) {
     const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
-    Scene& scene = curved.micrographs[static_cast<std::size_t>(g)].scene;
-    scene.rays = Rays::eikonal;
-    plans.push_back(plan(scene, optimum.theta));
+    plans.push_back(curved_task.planned(g, optimum.theta));
     straight_plans.push_back(frame.plan);
     const Pixels pixels =
         part ? subsample(frame.pixels, std::max<std::size_t>(50, kPixels * frame.pixels.size() / all)) : frame.pixels;
     used += pixels.size();
-    sets.push_back(pixel_set(task.micrograph(g), frame.sigma, pixels));
+    sets.push_back(pixel_set(task.picture(g), frame.sigma, pixels));
   }
   SolveOptions few = few_steps(task, 12);
   double straight_objective = optimum.problem->objective();
@@ -141,14 +142,14 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
   few.function_tolerance = 0.1 / std::max(straight_objective, 1.0);
   Theta straight = optimum.theta;
   if (part) {
-    LeastSquares problem(task.job, task.unknowns, std::move(straight_plans), sets);
+    LeastSquares problem(task, std::move(straight_plans), sets);
     problem.set_misfit(optimum.problem->misfit());
     Eigen::VectorXd searched = optimum.searched;
     problem.solve(searched, few);
     straight_objective = problem.objective();
     straight = problem.theta();
   }
-  LeastSquares problem(curved, task.unknowns, std::move(plans), std::move(sets));
+  LeastSquares problem(curved_task, std::move(plans), std::move(sets));
   problem.set_misfit(optimum.problem->misfit());
   Eigen::VectorXd searched = optimum.searched;
   problem.solve(searched, few);
@@ -171,17 +172,19 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
 }
 
 void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {
-  const auto has_waves = [](const Micrograph& m) {
-    return std::holds_alternative<Droplet>(m.scene.sample) && m.scene.ceiling == Ceiling::one_way &&
-           m.scene.microscope.objective_na > 0;
+  const auto has_waves = [](const Sight& sight) {
+    const Scene& scene = sight.picture->scene;
+    return std::holds_alternative<Droplet>(scene.sample) && scene.ceiling == Ceiling::one_way &&
+           scene.microscope.objective_na > 0;
   };
   const FitJob& job = task.job;
   if (optimum.stopped || task.unknowns.searched.empty() ||
-      !std::all_of(job.micrographs.begin(), job.micrographs.end(), has_waves))
+      !std::all_of(task.sights.begin(), task.sights.end(), has_waves))
     return;
   constexpr double kMostSeconds = 10;  // for a warning
   std::vector<Image> values;
-  for (const Micrograph& micrograph : job.micrographs) {
+  for (int g = 0; g < task.frames(); ++g) {
+    const Picture& micrograph = task.picture(g);
     Scene waves = micrograph.scene;
     waves.ceiling = Ceiling::wave;
     waves.method = "auto";

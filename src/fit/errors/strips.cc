@@ -22,7 +22,7 @@ std::optional<bool> strips_of_rows(const Sample& sample) {
     if (!crystal->field_legendre.empty()) return std::nullopt;  // the variation is the model's own
     return crystal->field_along_y;
   }
-  if (const auto* plate = std::get_if<Plate>(&sample); plate && plate->ring_numbers.empty()) return true;
+  if (const auto* plate = std::get_if<Plate>(&sample); plate && !plate->screen_distance_um) return true;
   if (std::holds_alternative<StressedDisc>(sample)) return true;
   return std::nullopt;
 }
@@ -58,11 +58,11 @@ std::optional<Strip> fitted_strip(const Task& task, const Optimum& optimum, bool
       }
     constexpr std::size_t kFewest = 100;
     if (part.size() < kFewest) return std::nullopt;
-    sets.push_back(pixel_set(task.micrograph(g), frame.sigma, std::move(part)));
+    sets.push_back(pixel_set(task.picture(g), frame.sigma, std::move(part)));
     plans.push_back(frame.plan);
   }
   strip.roi_px = rows ? std::array{low, begin, high, end} : std::array{begin, low, end, high};
-  LeastSquares problem(task.job, task.unknowns, std::move(plans), std::move(sets));
+  LeastSquares problem(task, std::move(plans), std::move(sets));
   SolveOptions few;
   few.max_iterations = 5;  // next to linear
   few.interrupted = task.job.options.interrupted;
@@ -74,7 +74,7 @@ std::optional<Strip> fitted_strip(const Task& task, const Optimum& optimum, bool
     const LeastSquares::FrameMisfit misfit = problem.frame_misfit(g);
     chi_square += misfit.chi_square, pixels += static_cast<double>(problem.pixels(g).value.size());
     squares += std::pow(misfit.mean_residual / task.gain_of(g, problem.theta()), 2);
-    const Micrograph& micrograph = task.micrograph(g);
+    const Picture& micrograph = task.picture(g);
     Image whitened(micrograph.values.width(), micrograph.values.height());
     Mask mask(whitened.width(), whitened.height());
     const Eigen::VectorXd residual = problem.noise_whitened_residual(g);
@@ -140,7 +140,7 @@ std::string range(const std::vector<Strip>& strips, double Strip::*measure, cons
 
 void compare_strips(const Task& task, const Optimum& optimum, FitResult& result) {
   if (task.unknowns.searched.empty() || task.interrupted() || optimum.stopped) return;
-  const std::optional<bool> rows = strips_of_rows(task.micrograph(0).scene.sample);
+  const std::optional<bool> rows = strips_of_rows(task.picture(0).scene.sample);
   constexpr double kDescribed = 2;  // a model that describes the image leaves strips nothing to differ by
   if (!rows || !(result.reduced_chi_square > kDescribed)) return;
   std::vector<Strip> strips;

@@ -14,7 +14,7 @@ namespace birefit::estimation {
 namespace {
 
 MicrographResult report_of(const Task& task, const Optimum& optimum, int g) {
-  const Micrograph& micrograph = task.micrograph(g);
+  const Picture& micrograph = task.picture(g);
   const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
   MicrographResult out;
   out.name = micrograph.name;
@@ -111,17 +111,19 @@ void warn_of_misfit(const std::string& name, const Rows& rows, FitResult& result
 std::vector<std::string> with_shared_lines(const Task& task, const std::vector<std::string>& warnings) {
   std::vector<std::pair<std::string, std::vector<std::string>>> said;  // words, of whom; of nobody: a line as it is
   for (const std::string& warning : warnings) {
-    const auto of = std::find_if(task.job.micrographs.begin(), task.job.micrographs.end(),
-                                 [&](const Micrograph& m) { return warning.starts_with(m.name + ": "); });
-    const bool named = of != task.job.micrographs.end();
-    const std::string words = named ? warning.substr(of->name.size() + 2) : warning;
+    const auto of = std::find_if(task.sights.begin(), task.sights.end(), [&](const Sight& sight) {
+      return warning.starts_with(sight.picture->name + ": ");
+    });
+    const bool named = of != task.sights.end();
+    const std::string name = named ? of->picture->name : "";
+    const std::string words = named ? warning.substr(name.size() + 2) : warning;
     const auto same = std::find_if(said.begin(), said.end(), [&](const auto& line) {
       return named && !line.second.empty() && line.first == words;
     });
     if (same == said.end())
-      said.push_back({words, named ? std::vector<std::string>{of->name} : std::vector<std::string>{}});
+      said.push_back({words, named ? std::vector<std::string>{name} : std::vector<std::string>{}});
     else
-      same->second.push_back(of->name);
+      same->second.push_back(name);
   }
   std::vector<std::string> lines;
   for (const auto& [words, names] : said)
@@ -138,15 +140,17 @@ void report_micrographs(const Task& task, const Optimum& optimum, FitResult& res
   for (int g = 0; g < task.frames(); ++g) result.micrographs.push_back(report_of(task, optimum, g));
   // A row of a table has no range of its own: the table's.
   std::map<std::string, std::pair<double, double>> tables;
-  for (const MicrographResult& row : result.micrographs)
-    if (row.used == 1) {
-      auto& [low, high] = tables.try_emplace(table_of(row.name), row.fitted(0, 0), row.fitted(0, 0)).first->second;
+  for (int g = 0; g < task.frames(); ++g)
+    if (const MicrographResult& row = result.micrographs[static_cast<std::size_t>(g)]; row.used == 1) {
+      auto& [low, high] =
+          tables.try_emplace(task.sights[static_cast<std::size_t>(g)].table, row.fitted(0, 0), row.fitted(0, 0))
+              .first->second;
       low = std::min(low, row.fitted(0, 0));
       high = std::max(high, row.fitted(0, 0));
     }
-  for (MicrographResult& row : result.micrographs)
-    if (row.used == 1) {
-      const auto [low, high] = tables.at(table_of(row.name));
+  for (int g = 0; g < task.frames(); ++g)
+    if (MicrographResult& row = result.micrographs[static_cast<std::size_t>(g)]; row.used == 1) {
+      const auto [low, high] = tables.at(task.sights[static_cast<std::size_t>(g)].table);
       row.signal_range = high - low;
     }
 }
@@ -164,9 +168,9 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
           result.taken_as_exact.end())
         result.taken_as_exact.push_back(sentence);
     if (micrograph.used == 1) {  // a row of a table (name:line): judged with the others of it
-      Rows& rows = tables[table_of(micrograph.name)];
+      Rows& rows = tables[task.sights[static_cast<std::size_t>(g)].table];
       const auto [x, y] = optimum.frames[static_cast<std::size_t>(g)].pixels[0];
-      const double value = task.micrograph(g).values(x, y);
+      const double value = task.picture(g).values(x, y);
       rows.number += 1;
       rows.chi_square += micrograph.chi_square;
       rows.squares += micrograph.residual_rms * micrograph.residual_rms;

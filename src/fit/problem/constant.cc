@@ -17,7 +17,7 @@ double chi_square_of_level(const Task& task, const LeastSquares& problem, int of
   Eigen::VectorXd right = Eigen::VectorXd::Zero(kShapes), shape(kShapes);
   double squares = 0;
   for (int g = 0; g < task.frames(); ++g) {
-    const Micrograph& m = task.micrograph(g);
+    const Picture& m = task.picture(g);
     if (m.offset.index != offset) continue;
     const PixelSet& set = problem.pixels(g);
     for (Eigen::Index i = 0; i < set.value.size(); ++i) {
@@ -49,8 +49,9 @@ std::optional<double> chi_square_of_a_constant(const Task& task, const LeastSqua
   // Frames that share an offset share the constant; an uneven background is part of it.
   double sum = 0;
   std::set<int> done;
-  for (const Micrograph& m : task.job.micrographs)
-    if (done.insert(m.offset.index).second) sum += chi_square_of_level(task, problem, m.offset.index);
+  for (int g = 0; g < task.frames(); ++g)
+    if (const int offset = task.picture(g).offset.index; done.insert(offset).second)
+      sum += chi_square_of_level(task, problem, offset);
   return sum;
 }
 

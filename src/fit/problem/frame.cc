@@ -26,16 +26,17 @@ Theta start_of(const FitJob& job) {
 
 Start prepare(const Task& task) {
   const FitJob& job = task.job;
-  if (job.micrographs.empty()) throw UserError(Where{}, "there is no image to fit");
+  if (job.measurements.empty()) throw UserError(Where{}, "there is no image to fit");
   Start start;
   start.theta = start_of(job);
   start.searched.resize(static_cast<Eigen::Index>(task.unknowns.searched.size()));
   for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)
     start.searched[static_cast<Eigen::Index>(j)] = start.theta[static_cast<std::size_t>(task.unknowns.searched[j])];
   std::size_t used = 0;
-  for (const Micrograph& micrograph : job.micrographs) {
+  for (int g = 0; g < task.frames(); ++g) {
+    const Picture& micrograph = task.picture(g);
     Frame frame;
-    frame.plan = plan(micrograph.scene, start.theta);
+    frame.plan = task.planned(g, start.theta);
     frame.noise = micrograph.noise ? *micrograph.noise : estimate_noise(micrograph);
     frame.sigma = standard_deviation(micrograph, frame.noise, smoothed(micrograph));
     frame.pixels = usable_pixels(micrograph, frame.sigma);
@@ -58,8 +59,6 @@ bool by_waves(const Frames& frames) {
   return std::any_of(frames.begin(), frames.end(), [](const Frame& frame) { return frame.plan.wave != nullptr; });
 }
 
-std::string table_of(const std::string& row) { return row.substr(0, row.rfind(':')); }
-
 std::vector<Misfit> misfit_of_prior(const Task& task, const Theta& theta) {
   std::vector<Misfit> misfit(static_cast<std::size_t>(task.frames()));
   if (task.job.prior && task.job.prior->frame_scatter)
@@ -71,17 +70,12 @@ std::vector<Misfit> misfit_of_prior(const Task& task, const Theta& theta) {
   return misfit;
 }
 
-bool lit_by_a_lamp(const Scene& scene) {
-  const Plate* plate = std::get_if<Plate>(&scene.sample);
-  return scene.quantity == Quantity::intensity && !(plate && !plate->ring_numbers.empty());
-}
-
 std::vector<Misfit> misfit_expected(const Task& task, const Frames& frames, const Theta& theta) {
   std::vector<Misfit> misfit = misfit_of_prior(task, theta);
   if (task.frames() < 2) return misfit;
   for (int g = 0; g < task.frames(); ++g) {
-    const Micrograph& micrograph = task.micrograph(g);
-    if (!lit_by_a_lamp(micrograph.scene)) continue;
+    const Picture& micrograph = task.picture(g);
+    if (task.observable(g).quantity != Quantity::intensity) continue;  // no lamp in it
     const Pixels& pixels = frames[static_cast<std::size_t>(g)].pixels;
     double sum = 0;
     for (const auto& [x, y] : pixels) sum += micrograph.values(x, y);
@@ -97,23 +91,23 @@ std::unique_ptr<LeastSquares> problem_of(const Task& task, const Frames& frames,
   std::vector<RenderPlan> plans;
   for (int g = 0; g < task.frames(); ++g) {
     const Frame& frame = frames[static_cast<std::size_t>(g)];
-    sets.push_back(pixel_set(task.micrograph(g), frame.sigma, frame.pixels));
+    sets.push_back(pixel_set(task.picture(g), frame.sigma, frame.pixels));
     plans.push_back(frame.plan);
   }
-  auto problem = std::make_unique<LeastSquares>(task.job, task.unknowns, std::move(plans), std::move(sets));
+  auto problem = std::make_unique<LeastSquares>(task, std::move(plans), std::move(sets));
   problem->set_misfit(misfit);
   return problem;
 }
 
 Image fitted_image(const Task& task, const Frames& frames, int frame, const Theta& theta) {
-  const Micrograph& micrograph = task.micrograph(frame);
+  const Picture& micrograph = task.picture(frame);
   const RenderPlan& plan = frames[static_cast<std::size_t>(frame)].plan;
   return lit(micrograph, theta, render(micrograph.scene, plan, theta, {}, task.job.options.threads).intensity);
 }
 
 Frames replanned(const Task& task, Frames frames, const Theta& theta) {
   for (int g = 0; g < task.frames(); ++g)
-    frames[static_cast<std::size_t>(g)].plan = plan(task.micrograph(g).scene, theta);
+    frames[static_cast<std::size_t>(g)].plan = task.planned(g, theta);
   return frames;
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "fit/problem/least_squares.h"
 #include "fit/problem/task.h"
 
 namespace birefit::estimation {
@@ -26,12 +27,10 @@ struct Start {
 /// Throws UserError for a job that no fit can be made of: no image, no usable pixel, fewer pixels than unknowns.
 Start prepare(const Task& task);
 
-/// Micrographs of one pixel each: rows of a table.
+/// All of one pixel each, as the rows of a table are.
 bool are_rows(const Frames& frames);
 /// Some frame's picture is by wave optics.
 bool by_waves(const Frames& frames);
-/// Rows of a signal table are micrographs of one pixel named file:line.
-std::string table_of(const std::string& row);
 
 /// What is known of the misfit before a fit: of a single frame through the prior of a calibration, its mean has the
 /// misfit that the calibration's frames had.
@@ -40,8 +39,6 @@ std::vector<Misfit> misfit_of_prior(const Task& task, const Theta& theta);
 /// Standard deviation of a lamp's brightness from frame to frame, as a share: what is expected of a lamp before its
 /// frames have shown it.
 inline constexpr double kLampJitter = 0.003;
-/// Values that a lamp's brightness enters: not retardances, nor radii of rings.
-bool lit_by_a_lamp(const Scene& scene);
 /// The same where several frames are compared, with a lamp's jitter: before it is measured no minimum may be chosen by
 /// it.
 std::vector<Misfit> misfit_expected(const Task& task, const Frames& frames, const Theta& theta);

@@ -59,40 +59,33 @@ int position(const std::vector<int>& indices, int index) {
 
 }  // namespace
 
-Unknowns Unknowns::of(const FitJob& job) {
-  Unknowns unknowns;
-  std::vector<bool> linear(job.parameters.size(), false);
-  for (const Micrograph& micrograph : job.micrographs)
-    for (const LightTerm& term : light_terms(micrograph))
-      if (term.coefficient) linear[term.coefficient.index] = true;
-  for (int i = 0; i < job.parameters.size(); ++i)
-    if (job.parameters[i].free) (linear[i] ? unknowns.linear : unknowns.searched).push_back(i);
-  return unknowns;
-}
-
-LeastSquares::LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vector<RenderPlan> plans,
-                           std::vector<PixelSet> pixels)
-    : job_(job), unknowns_(unknowns), plans_(std::move(plans)), theta_(job.parameters.values()) {
+LeastSquares::LeastSquares(const Task& task, std::vector<RenderPlan> plans, std::vector<PixelSet> pixels)
+    : task_(task),
+      job_(task.job),
+      unknowns_(task.unknowns),
+      plans_(std::move(plans)),
+      theta_(task.job.parameters.values()) {
   for (std::size_t g = 0; g < pixels.size(); ++g) {
+    const Picture& picture = task.picture(static_cast<int>(g));
     Frame frame;
     frame.set = std::move(pixels[g]);
     frame.begin = pixel_rows_;
     frame.count = frame.set.value.size();
     frame.inverse_sigma = frame.set.sigma.cwiseInverse();
     frame.inverse_sigma_norm = frame.inverse_sigma.norm();
-    for (const LightTerm& light : light_terms(job.micrographs[g])) {
+    for (const LightTerm& light : light_terms(picture)) {
       Term term{light, light.coefficient ? position(unknowns_.linear, light.coefficient.index) : -1, {}, {}};
       if (term.shape) {
         term.at_pixels.resize(frame.count);
         for (Eigen::Index i = 0; i < frame.count; ++i)
           term.at_pixels[i] =
-              term.shape_at(job.micrographs[g].scene.view, frame.set.pixels[static_cast<std::size_t>(i)][0],
+              term.shape_at(picture.scene.view, frame.set.pixels[static_cast<std::size_t>(i)][0],
                             frame.set.pixels[static_cast<std::size_t>(i)][1]);
       }
       frame.terms.push_back(std::move(term));
     }
     std::set<int> read;
-    for_each_ref(job.micrographs[g].scene,
+    for_each_ref(picture.scene,
                  [&](const ParameterRef& ref) { read.insert(position(unknowns_.searched, ref.index)); });
     frame.read.assign(read.lower_bound(0), read.end());
     for (Eigen::Index begin = 0; begin < frame.count; begin += kTileRows)
@@ -196,7 +189,7 @@ void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, in
                                Eigen::Ref<Eigen::VectorXd> intensity,
                                const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative) {
   Frame& frame = frames_[g];
-  const Scene& scene = job_.micrographs[g].scene;
+  const Scene& scene = task_.picture(static_cast<int>(g)).scene;
   const std::vector<std::array<int, 2>>& pixels = frame.set.pixels;
   if (picture_is_cheaper(scene, plans_[g], pixels)) {
     render(scene, plans_[g], theta_, active, threads, frame.rendering);

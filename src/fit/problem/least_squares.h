@@ -16,21 +16,9 @@
 #include "birefit/fit.h"
 #include "fit/problem/light.h"
 #include "fit/problem/pixels.h"
+#include "fit/problem/task.h"
 
 namespace birefit::estimation {
-
-/// Which table entries are estimated, and how.
-struct Unknowns {
-  std::vector<int> searched;  ///< table indices: the solver's parameters
-  std::vector<int> linear;    ///< table indices: gains, offsets and uneven light, solved exactly
-  int size() const { return static_cast<int>(searched.size() + linear.size()); }
-  /// Table index of unknown j, searched first.
-  int table_index(int j) const {
-    const int p = static_cast<int>(searched.size());
-    return j < p ? searched[j] : linear[j - p];
-  }
-  static Unknowns of(const FitJob& job);
-};
 
 /// What a micrograph's misfit does to its weights beyond the noise of its pixels. Its residual's generalised mean
 /// gets the variance of the noise plus `mean_sd`^2, everything else its variance times `shape_variance`. In a fit of
@@ -59,8 +47,8 @@ struct SolveSummary {
 /// Whitened rows in a fixed order (micrograph by micrograph, then priors), evaluated at one point at a time.
 class LeastSquares {
  public:
-  LeastSquares(const FitJob& job, const Unknowns& unknowns, std::vector<RenderPlan> plans,
-               std::vector<PixelSet> pixels);
+  /// `plans` and `pixels` of every sight of the task, which has to outlive the problem.
+  LeastSquares(const Task& task, std::vector<RenderPlan> plans, std::vector<PixelSet> pixels);
 
   int searched_size() const { return static_cast<int>(unknowns_.searched.size()); }
   void set_misfit(const std::vector<Misfit>& misfit);
@@ -157,8 +145,9 @@ class LeastSquares {
   template <class Rows>
   Eigen::MatrixXd factor_of(Eigen::Index columns, const Rows& rows_of) const;
 
+  const Task& task_;
   const FitJob& job_;
-  Unknowns unknowns_;
+  const Unknowns& unknowns_;
   std::vector<RenderPlan> plans_;
   std::vector<Frame> frames_;
   std::vector<Misfit> misfit_;

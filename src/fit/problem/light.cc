@@ -17,14 +17,14 @@ double LightTerm::shape_at(const View& view, int column, int row) const {
   return 0;
 }
 
-std::vector<LightTerm> light_terms(const Micrograph& micrograph) {
+std::vector<LightTerm> light_terms(const Picture& micrograph) {
   std::vector<LightTerm> terms{{micrograph.gain, 1, true, {}}, {micrograph.offset, 0, false, {}}};
   for (const UnevenLight& uneven : micrograph.uneven)
     terms.push_back({uneven.coefficient, 0, uneven.of_intensity, uneven.shape});
   return terms;
 }
 
-Image lit(const Micrograph& micrograph, const Theta& theta, Image intensity) {
+Image lit(const Picture& micrograph, const Theta& theta, Image intensity) {
   const std::vector<LightTerm> terms = light_terms(micrograph);
   for (int y = 0; y < intensity.height(); ++y)
     for (int x = 0; x < intensity.width(); ++x) {

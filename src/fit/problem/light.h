@@ -22,9 +22,9 @@ struct LightTerm {
 };
 
 /// Gain and offset first, then the micrograph's uneven light.
-std::vector<LightTerm> light_terms(const Micrograph& micrograph);
+std::vector<LightTerm> light_terms(const Picture& micrograph);
 
 /// The values that a camera would show for these intensities.
-Image lit(const Micrograph& micrograph, const Theta& theta, Image intensity);
+Image lit(const Picture& micrograph, const Theta& theta, Image intensity);
 
 }  // namespace birefit::estimation

@@ -40,7 +40,7 @@ Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) co
 
   for (std::size_t g = 0; g < frames_.size(); ++g) {
     const Frame& frame = frames_[g];
-    const View& view = job_.micrographs[g].scene.view;
+    const View& view = task_.picture(static_cast<int>(g)).scene.view;
     const double center_x = theta_[static_cast<std::size_t>(view.center_x_px.index)],
                  center_y = theta_[static_cast<std::size_t>(view.center_y_px.index)];
     int left = std::numeric_limits<int>::max(), right = -1, top = left, bottom = -1;

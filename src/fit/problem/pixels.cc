@@ -5,7 +5,7 @@
 
 namespace birefit::estimation {
 
-Pixels usable_pixels(const Micrograph& micrograph, const Image& sigma) {
+Pixels usable_pixels(const Picture& micrograph, const Image& sigma) {
   Pixels pixels;
   for (int y = 0; y < micrograph.values.height(); ++y)
     for (int x = 0; x < micrograph.values.width(); ++x)
@@ -15,7 +15,7 @@ Pixels usable_pixels(const Micrograph& micrograph, const Image& sigma) {
   return pixels;
 }
 
-PixelSet pixel_set(const Micrograph& micrograph, const Image& sigma, Pixels pixels) {
+PixelSet pixel_set(const Picture& micrograph, const Image& sigma, Pixels pixels) {
   PixelSet set;
   set.pixels = std::move(pixels);
   const auto n = static_cast<Eigen::Index>(set.pixels.size());

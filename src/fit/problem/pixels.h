@@ -19,9 +19,9 @@ struct PixelSet {
 };
 
 /// Pixels the mask leaves and whose value and weight are numbers.
-Pixels usable_pixels(const Micrograph& micrograph, const Image& sigma);
+Pixels usable_pixels(const Picture& micrograph, const Image& sigma);
 
-PixelSet pixel_set(const Micrograph& micrograph, const Image& sigma, Pixels pixels);
+PixelSet pixel_set(const Picture& micrograph, const Image& sigma, Pixels pixels);
 
 /// A fixed part of the pixels that meets every region: multiples of the golden section leave no gap longer than
 /// 2.6 times the mean (Knuth, TAOCP 6.4) and, unlike a stride, cannot lock to a row length.

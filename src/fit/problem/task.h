@@ -1,22 +1,54 @@
 #pragma once
 // What every stage of a fit reads and none changes.
 
+#include <memory>
 #include <string>
+#include <vector>
+
+#include <Eigen/Dense>
 
 #include "birefit/fit.h"
-#include "fit/problem/least_squares.h"
 
 namespace birefit::estimation {
 
+/// Which table entries are estimated, and how.
+struct Unknowns {
+  std::vector<int> searched;  ///< table indices: the solver's parameters
+  std::vector<int> linear;    ///< table indices: gains, offsets and uneven light, solved exactly
+  int size() const { return static_cast<int>(searched.size() + linear.size()); }
+  /// Table index of unknown j, searched first.
+  int table_index(int j) const {
+    const int p = static_cast<int>(searched.size());
+    return j < p ? searched[j] : linear[j - p];
+  }
+  static Unknowns of(const FitJob& job);
+};
+
+/// What the solver sees at once, whose mean residual is one observation among those of the others: a picture, or of a
+/// table a row, or all its rings. What is no picture stands there as one, with a pixel a value.
+struct Sight {
+  std::shared_ptr<const Picture> picture;  ///< the job's, or its own
+  Observable observable;
+  std::string table;  ///< name of the table that it is a row of; "" for pictures and rings
+};
+
+/// The sights of a job's measurements, in their order. The job has to outlive them.
+std::vector<Sight> sights_of(const FitJob& job);
+
 /// A job and what is estimated of it. Refers to the job, which has to outlive it.
 struct Task {
-  explicit Task(const FitJob& of) : job(of), unknowns(Unknowns::of(of)) {}
+  explicit Task(const FitJob& of) : job(of), unknowns(Unknowns::of(of)), sights(sights_of(of)) {}
 
   const FitJob& job;
   Unknowns unknowns;
+  std::vector<Sight> sights;
 
-  int frames() const { return static_cast<int>(job.micrographs.size()); }
-  const Micrograph& micrograph(int frame) const { return job.micrographs[static_cast<std::size_t>(frame)]; }
+  int frames() const { return static_cast<int>(sights.size()); }
+  const Picture& picture(int frame) const { return *sights[static_cast<std::size_t>(frame)].picture; }
+  const Observable& observable(int frame) const { return sights[static_cast<std::size_t>(frame)].observable; }
+  RenderPlan planned(int frame, const Theta& theta) const {
+    return plan(picture(frame).scene, theta, observable(frame));
+  }
   const Parameter& searched(std::size_t j) const { return job.parameters[unknowns.searched[j]]; }
   /// `searched` in the table's places.
   Theta with(Theta theta, const Eigen::VectorXd& searched) const {
@@ -25,7 +57,7 @@ struct Task {
     return theta;
   }
   double gain_of(int frame, const Theta& theta) const {
-    const ParameterRef ref = micrograph(frame).gain;
+    const ParameterRef ref = picture(frame).gain;
     return ref ? theta[static_cast<std::size_t>(ref.index)] : 1.0;
   }
   bool interrupted() const { return job.options.interrupted && job.options.interrupted->load(); }

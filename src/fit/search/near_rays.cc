@@ -13,16 +13,16 @@ namespace {
 FitJob job_by_rays(const FitJob& job) {
   FitJob by_rays = job;
   by_rays.branches.clear();
-  for (Micrograph& m : by_rays.micrographs) {
-    m.scene.ceiling = Ceiling::one_way, m.scene.method = "auto", m.scene.microscope.focus_um = {};
+  for_each_scene(by_rays.measurements, [](Scene& scene) {
+    scene.ceiling = Ceiling::one_way, scene.method = "auto", scene.microscope.focus_um = {};
     // They are off by a quarter of the image: good enough to start from.
-    m.scene.intensity_accuracy = std::max(m.scene.intensity_accuracy, 1e-2);
-  }
+    scene.intensity_accuracy = std::max(scene.intensity_accuracy, 1e-2);
+  });
   return by_rays;
 }
 
 bool is_diameter(const Task& task, int g, std::size_t j) {
-  const auto* droplet = std::get_if<Droplet>(&task.micrograph(g).scene.sample);
+  const auto* droplet = std::get_if<Droplet>(&task.picture(g).scene.sample);
   return droplet && droplet->diameter_um.index == task.unknowns.searched[j];
 }
 
@@ -37,7 +37,7 @@ Frames planned_for(const Task& task, Frames frames, const Theta& start, const st
           double& value = theta[static_cast<std::size_t>(task.unknowns.searched[j])];
           value = std::max(value, x[static_cast<Eigen::Index>(j)]);
         }
-    frames[static_cast<std::size_t>(g)].plan = plan(task.micrograph(g).scene, theta);
+    frames[static_cast<std::size_t>(g)].plan = task.planned(g, theta);
   }
   return frames;
 }
@@ -100,10 +100,10 @@ Minima search_near_rays(const Task& task, const Start& start) {
 
   Eigen::VectorXd rates = Eigen::VectorXd::Zero(start.searched.size());
   for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)
-    for (const Micrograph& m : by_rays.micrographs) {
+    for_each_scene(by_rays.measurements, [&](const Scene& scene) {
       double& rate = rates[static_cast<Eigen::Index>(j)];
-      rate = std::max(rate, std::abs(fringe_phase_per_unit(m.scene, rays.theta, task.unknowns.searched[j])));
-    }
+      rate = std::max(rate, std::abs(fringe_phase_per_unit(scene, rays.theta, task.unknowns.searched[j])));
+    });
   task.say("neighbouring fringe orders by wave optics");
   const auto problem_for = [&](const std::vector<Eigen::VectorXd>& places) {
     return problem_of(task, planned_for(task, start.frames, start.theta, places), misfit_of_prior(task, start.theta));

@@ -57,8 +57,8 @@ double Optimum::reduced_chi_square(const Task& task) const {
 
 double ripple_period_of(const Task& task, const Theta& theta, std::size_t j) {
   double period = 0;
-  for (const Micrograph& m : task.job.micrographs)
-    period = std::max(period, ripple_period(m.scene, theta, task.unknowns.searched[j]));
+  for (int g = 0; g < task.frames(); ++g)
+    period = std::max(period, ripple_period(task.picture(g).scene, theta, task.unknowns.searched[j]));
   return period;
 }
 

@@ -29,8 +29,9 @@ double rate_at(const Scene& scene, const Theta& theta, int index) {
 }
 
 bool is_centre(const Task& task, int index) {
-  return std::any_of(task.job.micrographs.begin(), task.job.micrographs.end(), [&](const Micrograph& m) {
-    return m.scene.view.center_x_px.index == index || m.scene.view.center_y_px.index == index;
+  return std::any_of(task.sights.begin(), task.sights.end(), [&](const Sight& sight) {
+    const View& view = sight.picture->scene.view;
+    return view.center_x_px.index == index || view.center_y_px.index == index;
   });
 }
 
@@ -39,7 +40,7 @@ PicturePhase fringe_phase(const Task& task, const Theta& theta, int index) {
   // A rate may be largest anywhere between the bounds (a voltage just above its threshold).
   constexpr int kIntervals = 16;
   // Of hundreds of rows of a table a few dozen show it.
-  const std::size_t frames = task.job.micrographs.size(), stride = (frames + 31) / 32;
+  const int frames = task.frames(), stride = (frames + 31) / 32;
   const Parameter& parameter = task.job.parameters[index];
   const double width = parameter.upper - parameter.lower;
   std::array<Theta, 3> others{theta, theta, theta};
@@ -56,8 +57,9 @@ PicturePhase fringe_phase(const Task& task, const Theta& theta, int index) {
     double fastest = 0;
     for (Theta& probe : others) {
       probe[static_cast<std::size_t>(index)] = phase.value.back();
-      for (std::size_t g = 0; g < frames; g += stride)
-        fastest = std::max(fastest, rate_at(task.job.micrographs[g].scene, probe, index));
+      for (int g = 0; g < frames; g += stride)
+        if (task.observable(g).quantity == Quantity::intensity)  // nothing else has fringes
+          fastest = std::max(fastest, rate_at(task.picture(g).scene, probe, index));
     }
     rates.push_back(fastest);
   }

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "fit/problem/least_squares.h"
 #include "fit/problem/task.h"
 
 namespace birefit::estimation {

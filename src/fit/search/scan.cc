@@ -65,8 +65,8 @@ std::size_t product_of(const std::vector<Axis>& axes) {
 
 /// A cell's picture is one number, of a director that no field has to be found for.
 bool costs_microseconds(const Task& task) {
-  return std::all_of(task.job.micrographs.begin(), task.job.micrographs.end(), [](const Micrograph& m) {
-    const Cell* cell = std::get_if<Cell>(&m.scene.sample);
+  return std::all_of(task.sights.begin(), task.sights.end(), [](const Sight& sight) {
+    const Cell* cell = std::get_if<Cell>(&sight.picture->scene.sample);
     return cell && !std::holds_alternative<FreederickszDirector>(cell->director);
   });
 }
@@ -80,8 +80,8 @@ std::vector<Axis> axes_of(const Task& task, const std::vector<PicturePhase>& pha
       if (phases[j].value.empty() || phases[j].of_fringes != of_fringes) continue;
       const Parameter& parameter = task.searched(j);
       double longest = (parameter.upper - parameter.lower) / (of_fringes ? kFewestPointsOfFringes : kFewestPoints);
-      for (const Micrograph& m : task.job.micrographs)
-        if (const Droplet* droplet = std::get_if<Droplet>(&m.scene.sample);
+      for (const Sight& sight : task.sights)
+        if (const Droplet* droplet = std::get_if<Droplet>(&sight.picture->scene.sample);
             droplet && droplet->diameter_um.index == task.unknowns.searched[j])
           longest = std::min(longest, kDiameterStep * parameter.upper);
       Axis axis = axis_along(static_cast<int>(j), phases[j], (of_fringes ? kStepOfFringes : kStep) / fineness, longest);

@@ -15,7 +15,7 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
   Eigen::VectorXd centred = start.searched;
   std::array<int, 2> at{-1, -1};
   for (int g = 0; g < task.frames(); ++g) {
-    const View& view = task.micrograph(g).scene.view;
+    const View& view = task.picture(g).scene.view;
     const auto unknown = [&](ParameterRef ref) {
       const std::vector<int>& searched = task.unknowns.searched;
       const auto found = ref ? std::find(searched.begin(), searched.end(), ref.index) : searched.end();
@@ -23,7 +23,7 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
     };
     const std::array<int, 2> here{unknown(view.center_x_px), unknown(view.center_y_px)};
     if (here[0] < 0 || here[1] < 0 || here == at) continue;  // frames that share a centre: the first one's
-    const Image& values = task.micrograph(g).values;
+    const Image& values = task.picture(g).values;
     Mask used(values.width(), values.height());
     for (const auto& [x, y] : start.frames[static_cast<std::size_t>(g)].pixels) used(x, y) = 1;
     const std::optional<std::array<double, 2>> centre = centre_of_symmetry(values, used);
@@ -37,7 +37,7 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
   }
   if (at[0] < 0) return std::nullopt;
   // What is found is good to a hundredth of an image: a start as near as that is no worse.
-  const View& view = task.micrograph(0).scene.view;
+  const View& view = task.picture(0).scene.view;
   if ((centred - start.searched).cwiseAbs().maxCoeff() < 0.01 * std::max(view.width, view.height)) return std::nullopt;
   return centred;
 }
@@ -48,12 +48,12 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
       static_cast<std::size_t>(std::max(50, task.job.options.scan_pixels / std::max(1, task.frames())));
   const Frame& frame = frames[static_cast<std::size_t>(g)];
   const bool own_rays =
-      std::holds_alternative<Droplet>(task.micrograph(g).scene.sample) && frame.plan.radial_panels == 0;
+      std::holds_alternative<Droplet>(task.picture(g).scene.sample) && frame.plan.radial_panels == 0;
   if (!own_rays) return share;
   // kEnough: units of chi-square by which a constant image is then off; a wrong order is by a good part of that.
   // kFewest: pixels that lie where the image is not flat, however much of it is background.
   constexpr double kEnough = 20000, kFewest = 100;
-  const Image& values = task.micrograph(g).values;
+  const Image& values = task.picture(g).values;
   double mean = 0, square = 0, fourth = 0;
   const double n = static_cast<double>(frame.pixels.size());
   for (const auto& [x, y] : frame.pixels) mean += values(x, y) / n;
@@ -68,10 +68,10 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
 }
 
 /// A cell's picture is one number: the mean of its pixels tells all of it, and has a row instead of hundreds.
-bool is_one_number(const Micrograph& micrograph) {
+bool is_one_number(const Picture& micrograph) {
   return std::holds_alternative<Cell>(micrograph.scene.sample) && micrograph.uneven.empty();
 }
-PixelSet mean_of(const Micrograph& micrograph, const Frame& frame) {
+PixelSet mean_of(const Picture& micrograph, const Frame& frame) {
   double weights = 0, sum = 0;
   for (const auto& [x, y] : frame.pixels) {
     const double weight = 1 / (frame.sigma(x, y) * frame.sigma(x, y));
@@ -84,10 +84,10 @@ PixelSet mean_of(const Micrograph& micrograph, const Frame& frame) {
 
 /// Rough enough to be quick, and finer than a lamp's jitter: where the minima are on all pixels is found out by the
 /// plan.
-RenderPlan rough_plan(Scene scene, const Theta& theta) {
+RenderPlan rough_plan(Scene scene, const Observable& observable, const Theta& theta) {
   constexpr double kRough = 1e-3;
   scene.intensity_accuracy = std::max(scene.intensity_accuracy, kRough);
-  return plan(scene, theta);
+  return plan(scene, theta, observable);
 }
 
 /// The problem of what the grid looks at.
@@ -95,14 +95,14 @@ std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, co
   std::vector<PixelSet> sets;
   std::vector<RenderPlan> plans;
   for (int g = 0; g < task.frames(); ++g) {
-    const Micrograph& micrograph = task.micrograph(g);
+    const Picture& micrograph = task.picture(g);
     const Frame& frame = frames[static_cast<std::size_t>(g)];
     sets.push_back(is_one_number(micrograph)
                        ? mean_of(micrograph, frame)
                        : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g))));
-    plans.push_back(is_one_number(micrograph) ? rough_plan(micrograph.scene, theta) : frame.plan);
+    plans.push_back(is_one_number(micrograph) ? rough_plan(micrograph.scene, task.observable(g), theta) : frame.plan);
   }
-  auto problem = std::make_unique<LeastSquares>(task.job, task.unknowns, std::move(plans), std::move(sets));
+  auto problem = std::make_unique<LeastSquares>(task, std::move(plans), std::move(sets));
   problem->set_misfit(misfit_expected(task, frames, theta));
   return problem;
 }

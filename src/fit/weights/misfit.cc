@@ -38,7 +38,7 @@ std::vector<double> freedom_of_means(const Task& task, const Optimum& optimum, c
 /// Pixels that share one misfit, of a frame's residual without its mean where that is another observation.
 double shared_area(const Task& task, const Optimum& optimum, const LeastSquares::FrameMisfit& frame, int g,
                    bool mean_known) {
-  const Micrograph& micrograph = task.micrograph(g);
+  const Picture& micrograph = task.picture(g);
   Image whitened(micrograph.values.width(), micrograph.values.height());
   Mask mask(whitened.width(), whitened.height());
   const PixelSet& set = optimum.problem->pixels(g);
@@ -101,7 +101,7 @@ std::vector<double> lamp_over_noise(const Task& task, const Frames& setup, const
   for (int g = 0; g < task.frames(); ++g) {
     const auto& frame = frames[static_cast<std::size_t>(g)];
     const bool known =
-        lit_by_a_lamp(task.micrograph(g).scene) && !(rows && setup[static_cast<std::size_t>(g)].noise.estimated);
+        task.observable(g).quantity == Quantity::intensity && !(rows && setup[static_cast<std::size_t>(g)].noise.estimated);
     ratio.push_back(known ? std::abs(frame.mean_light) / frame.mean_noise_sd : 0);
   }
   return ratio;
@@ -165,7 +165,7 @@ double row_correlation(const Task& task, const Theta& theta, const FrameSums& fr
   for (int g = 0; g < task.frames(); ++g) {
     const auto& frame = frames[static_cast<std::size_t>(g)];
     const double ratio = frame_sd * std::abs(task.gain_of(g, theta)) / frame.mean_noise_sd;
-    tables[table_of(task.micrograph(g).name)].push_back(frame.mean_whitened / std::sqrt(1 + ratio * ratio));
+    tables[task.sights[static_cast<std::size_t>(g)].table].push_back(frame.mean_whitened / std::sqrt(1 + ratio * ratio));
   }
   double squares = 0, products = 0, rows = 0, pairs = 0;
   for (const auto& [name, residual] : tables)

@@ -17,14 +17,14 @@ namespace {
 constexpr double kQuantisation = 1.0 / 12;
 
 /// Value per count: 1, or 1 / (parallel - dark) where calibration frames turned counts into transmission.
-double value_per_count(const Micrograph& micrograph, int x, int y) {
+double value_per_count(const Picture& micrograph, int x, int y) {
   return micrograph.variance_scale.empty() ? 1.0 : std::sqrt(micrograph.variance_scale(x, y));
 }
 
 /// The values that pixels take (counts): how far apart codes are, and whether the lowest one holds what was cut off.
 class Codes {
  public:
-  explicit Codes(const Micrograph& micrograph) {
+  explicit Codes(const Picture& micrograph) {
     const int width = micrograph.values.width(), height = micrograph.values.height();
     constexpr std::size_t kEnough = 1 << 18;  // pixels that tell it
     const std::size_t stride = 1 + micrograph.values.size() / kEnough;
@@ -106,7 +106,7 @@ struct Sample {
 /// The signal is the mean under the squared mask: exactly what the variance of the difference depends on when the
 /// pixel variance is linear in the signal. Neighbourhoods with pixels that were cut off are left out.
 template <int N>
-std::vector<Sample> differences(const Micrograph& micrograph, const Image* fitted, const std::array<double, N>& mask,
+std::vector<Sample> differences(const Picture& micrograph, const Image* fitted, const std::array<double, N>& mask,
                                 std::optional<double> cut) {
   constexpr int kHalf = N / 2;
   double norm = 0, lever = 0;
@@ -269,7 +269,7 @@ VarianceLine variance_line(const std::vector<Bin>& bins, double floor, std::opti
 
 }  // namespace
 
-NoiseModel estimate_noise(const Micrograph& micrograph, const Image* fitted) {
+NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
   constexpr std::size_t kEnough = 200;
   const Codes codes(micrograph);
   double order = 4;
@@ -295,7 +295,7 @@ NoiseModel estimate_noise(const Micrograph& micrograph, const Image* fitted) {
   return noise;
 }
 
-Image smoothed(const Micrograph& micrograph) {
+Image smoothed(const Picture& micrograph) {
   const int width = micrograph.values.width(), height = micrograph.values.height();
   Image result(width, height);
   for (int y = 0; y < height; ++y)
@@ -309,7 +309,7 @@ Image smoothed(const Micrograph& micrograph) {
   return result;
 }
 
-Image standard_deviation(const Micrograph& micrograph, const NoiseModel& noise, const Image& signal) {
+Image standard_deviation(const Picture& micrograph, const NoiseModel& noise, const Image& signal) {
   const int width = micrograph.values.width(), height = micrograph.values.height();
   double read_variance = noise.read_counts * noise.read_counts;
   // A model without read noise still has the rounding, or no dark pixel could be weighted.
@@ -324,7 +324,7 @@ Image standard_deviation(const Micrograph& micrograph, const NoiseModel& noise, 
   return result;
 }
 
-double mean_variance(const Micrograph& micrograph, const NoiseModel& noise, const Image& signal) {
+double mean_variance(const Picture& micrograph, const NoiseModel& noise, const Image& signal) {
   const Image sd = standard_deviation(micrograph, noise, signal);
   double sum = 0, count = 0;
   for (int y = 0; y < sd.height(); ++y)

@@ -38,7 +38,7 @@ bool lower_noise(const Task& task, Optimum& optimum) {
   for (int g = 0; g < task.frames() && !optimum.stopped; ++g) {
     Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
     if (!frame.noise.estimated) continue;
-    const Micrograph& micrograph = task.micrograph(g);
+    const Picture& micrograph = task.picture(g);
     const Image image = fitted_image(task, optimum.frames, g, optimum.theta);
     const NoiseModel again = estimate_noise(micrograph, &image);
     if (mean_variance(micrograph, again, image) >= kClearly * mean_variance(micrograph, frame.noise, image)) continue;
@@ -64,7 +64,7 @@ Optimum with_settled_weights(const Task& task, Optimum optimum) {
     for (int g = 0; g < task.frames(); ++g) {
       Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
       frame.sigma =
-          standard_deviation(task.micrograph(g), frame.noise, fitted_image(task, optimum.frames, g, optimum.theta));
+          standard_deviation(task.picture(g), frame.noise, fitted_image(task, optimum.frames, g, optimum.theta));
     }
     const Candidate before{optimum.searched, 0, projected_information(*optimum.problem)};
     rebuild(task, optimum);
@@ -81,7 +81,7 @@ Optimum with_settled_plans(const Task& task, Optimum optimum) {
     for (int g = 0; g < task.frames(); ++g) {
       RenderPlan& planned = optimum.frames[static_cast<std::size_t>(g)].plan;
       try {
-        RenderPlan now = plan(task.micrograph(g).scene, optimum.theta);
+        RenderPlan now = task.planned(g, optimum.theta);
         if (!asks_for_more(now, planned)) continue;
         planned = std::move(now);
         grown = true;
@@ -102,7 +102,7 @@ Optimum with_settled_plans(const Task& task, Optimum optimum) {
 }
 
 Outliers outliers_of(const Task& task, const Optimum& optimum, int g) {
-  const Micrograph& micrograph = task.micrograph(g);
+  const Picture& micrograph = task.picture(g);
   const Image& sigma = optimum.frames[static_cast<std::size_t>(g)].sigma;
   const Image fitted = fitted_image(task, optimum.frames, g, optimum.theta);
   Image whitened(fitted.width(), fitted.height());
@@ -118,7 +118,7 @@ namespace {
 
 /// Judges a frame's pixels anew; true where others are left out than before.
 bool leave_out(const Task& task, Optimum& optimum, int g, bool first_round) {
-  const Micrograph& micrograph = task.micrograph(g);
+  const Picture& micrograph = task.picture(g);
   Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
   Outliers& before = optimum.left_out[static_cast<std::size_t>(g)];
   Outliers found = outliers_of(task, optimum, g);
@@ -138,7 +138,7 @@ bool leave_out(const Task& task, Optimum& optimum, int g, bool first_round) {
   for (const auto& [x, y] : usable)
     if (found.count == 0 || !found.pixels(x, y)) frame.pixels.push_back({x, y});
   if (frame.noise.estimated) {  // a scratch looks like noise
-    Micrograph seen = micrograph;
+    Picture seen = micrograph;
     for (std::size_t i = 0; found.count > 0 && i < seen.mask.values().size(); ++i)
       if (found.pixels.values()[i]) seen.mask.values()[i] = 0;
     const Image fitted = fitted_image(task, optimum.frames, g, optimum.theta);

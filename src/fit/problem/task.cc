@@ -1,0 +1,66 @@
+#include "fit/problem/task.h"
+
+#include "fit/problem/light.h"
+
+namespace birefit::estimation {
+namespace {
+
+/// Values as a row of pixels.
+std::shared_ptr<Picture> as_picture(const Readings& readings, const Scene& scene, const Eigen::VectorXd& values) {
+  auto picture = std::make_shared<Picture>();
+  const int width = static_cast<int>(values.size());
+  picture->name = readings.name;
+  picture->scene = scene;
+  picture->scene.view.width = width, picture->scene.view.height = 1;
+  picture->values = Image(width, 1);
+  std::copy(values.begin(), values.end(), picture->values.values().begin());
+  picture->mask = Mask(width, 1, 1);
+  picture->gain = readings.gain, picture->offset = readings.offset;
+  picture->noise = readings.noise;
+  return picture;
+}
+
+void add_sights(const Readings& readings, std::vector<Sight>& sights) {
+  if (readings.observable.quantity == Quantity::ring_radius_cm) {
+    sights.push_back({as_picture(readings, readings.rows.front(), readings.values), readings.observable, ""});
+    return;
+  }
+  for (std::size_t i = 0; i < readings.rows.size(); ++i) {
+    const auto picture = as_picture(readings, readings.rows[i], readings.values.segment(static_cast<Eigen::Index>(i), 1));
+    if (i < readings.lines.size()) picture->name += ":" + std::to_string(readings.lines[i]);
+    sights.push_back({picture, readings.observable, readings.name});
+  }
+}
+
+}  // namespace
+
+Unknowns Unknowns::of(const FitJob& job) {
+  Unknowns unknowns;
+  std::vector<bool> linear(job.parameters.size(), false);
+  const auto mark = [&](ParameterRef ref) {
+    if (ref) linear[static_cast<std::size_t>(ref.index)] = true;
+  };
+  for (const Measurement& measurement : job.measurements) {
+    if (const Picture* picture = std::get_if<Picture>(&measurement))
+      for (const LightTerm& term : light_terms(*picture)) mark(term.coefficient);
+    else
+      mark(std::get<Readings>(measurement).gain), mark(std::get<Readings>(measurement).offset);
+  }
+  for (int i = 0; i < job.parameters.size(); ++i)
+    if (job.parameters[i].free)
+      (linear[static_cast<std::size_t>(i)] ? unknowns.linear : unknowns.searched).push_back(i);
+  return unknowns;
+}
+
+std::vector<Sight> sights_of(const FitJob& job) {
+  std::vector<Sight> sights;
+  for (const Measurement& measurement : job.measurements) {
+    if (const Picture* picture = std::get_if<Picture>(&measurement))
+      sights.push_back({std::shared_ptr<const Picture>(std::shared_ptr<void>(), picture), {}, ""});  // the job keeps it
+    else
+      add_sights(std::get<Readings>(measurement), sights);
+  }
+  return sights;
+}
+
+}  // namespace birefit::estimation
