@@ -393,7 +393,7 @@ class BallImage final : public PixelModel<S> {
     if (edge > 0) return {};
     return view_.circle(edge_um_);
   }
-  std::vector<std::array<double, 2>> defects() const override { return defects_; }
+  const std::vector<std::array<double, 2>>& defects() const override { return defects_; }
   S rim(const P& column, const P& row) const override { return view_.within(column, row, inverse_edge_, by_inverse_edge_); }
   bool has_passing_light() const override { return !passing_.dark(); }
   S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
@@ -426,12 +426,19 @@ class BallImage final : public PixelModel<S> {
     const double towards = number(bipolar->axis.z) < 0 ? -1 : 1;
     const EdgeCircle circle = view_.circle(optics_.sphere.radius_um);
     for (const bool leaves : {true, false}) {
-      double nearest = 1e300, radius = 0;
-      constexpr int kAngles = 4000;
-      for (int i = 0; i <= kAngles; ++i) {
-        const double psi = rim_.psi_max() * i / kAngles, at = leaves ? 2 * std::asin(std::min(1.0, m * std::sin(psi))) - psi : psi;
-        if (std::abs(at - polar) < nearest) nearest = std::abs(at - polar), radius = circle.radius * rim_.rho_over_radius(psi);
+      const auto beside = [&](double psi) { return std::abs((leaves ? 2 * std::asin(std::min(1.0, m * std::sin(psi))) - psi : psi) - polar); };
+      // The nearest of a few angles, then of those between its neighbours.
+      constexpr int kAngles = 200, kHalvings = 60;
+      const double step = rim_.psi_max() / kAngles;
+      double nearest = 0;
+      for (int i = 1; i <= kAngles; ++i)
+        if (beside(step * i) < beside(nearest)) nearest = step * i;
+      double low = std::max(0.0, nearest - step), high = std::min(rim_.psi_max(), nearest + step);
+      for (int i = 0; i < kHalvings; ++i) {
+        const double third = (high - low) / 3;
+        (beside(low + third) < beside(high - third) ? high : low) += beside(low + third) < beside(high - third) ? -third : third;
       }
+      const double radius = circle.radius * rim_.rho_over_radius(0.5 * (low + high));
       const double sign = (leaves ? 1 : -1) * towards * radius / across;
       defects_.push_back({circle.column + sign * number(bipolar->axis.x), circle.row - sign * number(bipolar->axis.y)});
     }

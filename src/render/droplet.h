@@ -160,6 +160,7 @@ class DropletImage final : public PixelModel<S> {
     const P fraction = view_.at(column, row).rho_um * inverse(plain(edge == 0 ? edge_um_ : core_um_));
     return P(1.0) - fraction * fraction;
   }
+  bool round() const override { return true; }
   std::optional<EdgeCircle> circle(int edge) const override { return view_.circle(edge == 0 ? edge_um_ : core_um_); }
   S rim(const P& column, const P& row) const override { return view_.within(column, row, inverse_edge_, by_inverse_edge_); }
   bool has_passing_light() const override { return !passing_.dark(); }

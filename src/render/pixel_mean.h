@@ -59,6 +59,13 @@ struct WeightedPoints {
     const std::size_t at = more(1);
     x[at] = column, y[at] = row, w[at] = weight;
   }
+  /// Leaves out those from `first` on that have no weight.
+  void pack_from(std::size_t first) {
+    std::size_t kept = first;
+    for (std::size_t i = first; i < size; ++i)
+      if (w[i] != 0) x[kept] = x[i], y[kept] = y[i], w[kept++] = w[i];
+    size = kept;
+  }
   /// To whole packs.
   void fill_up(std::size_t lanes) {
     while (size % lanes != 0) add(x[size - 1], y[size - 1], 0);

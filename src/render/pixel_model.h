@@ -84,8 +84,13 @@ class PixelModel {
   /// Of a line that is no circle: about the distance, in pixels.
   virtual PlainOf<S> beyond_edge(int /*edge*/, const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const { return PlainOf<S>(-1.0); }
   /// Places (column, row), apart from the middle, about which light turns within a pixel.
-  virtual std::vector<std::array<double, 2>> defects() const { return {}; }
-  /// The line, where it is a circle.
+  virtual const std::vector<std::array<double, 2>>& defects() const {
+    static const std::vector<std::array<double, 2>> none;
+    return none;
+  }
+  /// Light changes with the azimuth about the middle of circle() as its fourth harmonic does, no faster.
+  virtual bool round() const { return false; }
+  /// The line, where it is a circle; all circles have the same middle.
   virtual std::optional<EdgeCircle> circle(int /*edge*/) const { return {}; }
   /// beyond_edge() of the rim with its derivatives.
   virtual S rim(const PlainOf<S>& column, const PlainOf<S>& row) const { return S(beyond_edge(0, column, row)); }
