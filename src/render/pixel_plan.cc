@@ -113,10 +113,15 @@ void measure_points(const Scene& scene, const PixelModel<Pack>& model, RenderPla
   std::vector<std::array<double, 2>> about;
   constexpr int kAbout = 24;
   for (const auto& [column, row] : model.defects())
-    for (int k = 0; k < kAbout; ++k) about.push_back({column + kDefectWithin * (2 * even_x(k) - 1), row + kDefectWithin * (2 * even_y(k) - 1)});
+    for (int k = 0; k < kAbout; ++k) {
+      const double within = k % 2 == 0 ? 0.5 : kDefectWithin;  // the hardest have it within
+      about.push_back({column + within * (2 * even_x(k) - 1), row + within * (2 * even_y(k) - 1)});
+    }
   if (!about.empty()) {
     double left = 0;
-    plan.defect_points = fewest_points(about, plan.edge_points, kMostPoints / 2, target, left, cut);
+    // With more than so many lines what is left is the table's own error about the defect.
+    constexpr int kMostAbout = 16;
+    plan.defect_points = fewest_points(about, plan.edge_points, std::max(kMostAbout, plan.edge_points), target, left, cut);
     worst = std::max(worst, left);
   }
   plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or a defect are finer than a pixel, {1} lines across rims and edges, measured: they are good to {2:.1e}",
