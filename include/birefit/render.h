@@ -58,6 +58,9 @@ struct RenderPlan {
   /// Samples per pixel side by distance from (sampling_center_x_px, _y_px), one entry per sampling_bin_px; 1 = the
   /// point value with a second-order correction to the pixel's mean, n > 1 = n x n Gauss points.
   std::vector<int> samples;
+  /// The same of pixels at a sphere's rim or a core's edge, which take Gauss points of their own (render/edge_pixels.h).
+  int edge_points = 4;
+  int defect_points = 8;            ///< the same about a defect
   double sampling_bin_px = 1;
   double sampling_center_x_px = 0, sampling_center_y_px = 0;
   double series_reach_um = 0;       ///< > 0: the exact series, tabulated out to this image radius

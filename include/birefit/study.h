@@ -31,7 +31,8 @@ struct ChartScene {
 /// A whole 500 x 500 frame as the planner would compute it for an asked accuracy; errors against accuracy 1e-10.
 struct ChartFrame {
   std::string scene, method;
-  double asked = 0, seconds = 0, worst_error = 0, rms_error = 0;
+  double asked = 0, seconds = 0, worst_error = 0, rms_error = 0;  ///< against pixels nine times finer
+  int worst_column = 0, worst_row = 0;                            ///< the worst pixel
 };
 
 struct MethodChart {

@@ -338,6 +338,7 @@ class BallImage final : public PixelModel<S> {
       while ((reach_ = table(plain_, plain(edge_um_), panels)).tail() > kExact && panels < kMostPanels) panels *= 2;
       if constexpr (ScalarTraits<S>::derivatives > 0) reach_and_slopes_ = table(optics_, edge_um_, panels);
     }
+    find_poles();
     std::vector<int> steps;
     for (const DiscSquare& q : plan.disc) steps.push_back(q.steps);
     std::sort(steps.begin(), steps.end());
@@ -375,17 +376,27 @@ class BallImage final : public PixelModel<S> {
   S intensity(const P& column, const P& row) const override {
     const auto place = view_.at(column, row);
     const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
-    const S beside = passing_.at(view_, place);
-    if (birefit::none(inside)) return beside;
-    return beside + select(inside, through(place, inside), S(0.0));
+    if (birefit::none(inside)) return S(0.0);
+    return select(inside, through(place, inside), S(0.0));
   }
-  bool has_edge() const override { return shell_in(optics_) != nullptr; }
-  P beyond_edge(const P& column, const P& row) const override {
+  int edges() const override { return shell_in(optics_) ? 2 : 1; }
+  P beyond_edge(int edge, const P& column, const P& row) const override {
     const auto place = view_.at(column, row);
+    const P fraction = place.rho_um * plain(inverse_edge_);
+    if (edge == 0) return P(1.0) - fraction * fraction;
     P core_x, core_y;
     seen_at_core(root(max_of(P(1.0) - place.rho_um * plain(inverse_edge_), P(0.0))), P(place.x * place.inverse_rho), P(place.y * place.inverse_rho), core_x, core_y);
-    return select(place.rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));  // beyond the sphere's rim there is none
+    const double half_core_px = 0.5 * lane(plain(shell_in(plain_)->core), 0) * lane(plain(optics_.sphere.radius_um), 0) / view_.pixel_um();
+    return P(half_core_px) * select(place.rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));  // beyond the sphere's rim there is none
   }
+  std::optional<EdgeCircle> circle(int edge) const override {
+    if (edge > 0) return {};
+    return view_.circle(edge_um_);
+  }
+  const std::vector<std::array<double, 2>>& defects() const override { return defects_; }
+  S rim(const P& column, const P& row) const override { return view_.within(column, row, inverse_edge_, by_inverse_edge_); }
+  bool has_passing_light() const override { return !passing_.dark(); }
+  S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
   /// Light at a place of a PolarTable.
@@ -405,6 +416,33 @@ class BallImage final : public PixelModel<S> {
   }
 
  private:
+  /// Where boojums are seen: at polar angles psi where rays of that angle of incidence come in, at psi - 2 (psi - psi') from the axis where they leave.
+  void find_poles() {
+    const auto* bipolar = std::get_if<BipolarField<S>>(&optics_.field);
+    if (!bipolar) return;
+    const auto number = [](const S& x) { return lane(plain(x), 0); };
+    const double across = std::hypot(number(bipolar->axis.x), number(bipolar->axis.y)), polar = std::atan2(across, std::abs(number(bipolar->axis.z))), m = number(optics_.sphere.ratio);
+    if (across < 1e-9) return;  // in the middle, which has points of its own
+    const double towards = number(bipolar->axis.z) < 0 ? -1 : 1;
+    const EdgeCircle circle = view_.circle(optics_.sphere.radius_um);
+    for (const bool leaves : {true, false}) {
+      const auto beside = [&](double psi) { return std::abs((leaves ? 2 * std::asin(std::min(1.0, m * std::sin(psi))) - psi : psi) - polar); };
+      // The nearest of a few angles, then of those between its neighbours.
+      constexpr int kAngles = 200, kHalvings = 60;
+      const double step = rim_.psi_max() / kAngles;
+      double nearest = 0;
+      for (int i = 1; i <= kAngles; ++i)
+        if (beside(step * i) < beside(nearest)) nearest = step * i;
+      double low = std::max(0.0, nearest - step), high = std::min(rim_.psi_max(), nearest + step);
+      for (int i = 0; i < kHalvings; ++i) {
+        const double third = (high - low) / 3;
+        (beside(low + third) < beside(high - third) ? high : low) += beside(low + third) < beside(high - third) ? -third : third;
+      }
+      const double radius = circle.radius * rim_.rho_over_radius(0.5 * (low + high));
+      const double sign = (leaves ? 1 : -1) * towards * radius / across;
+      defects_.push_back({circle.column + sign * number(bipolar->axis.x), circle.row - sign * number(bipolar->axis.y)});
+    }
+  }
   /// place_at_core() at a fraction 1 - v^2 of the way to the disc's edge.
   void seen_at_core(const P& v, const P& c, const P& s, P& x, P& y) const {
     const P basis[3] = {P(1.0), c, s};
@@ -519,6 +557,7 @@ class BallImage final : public PixelModel<S> {
   Sensitivity<S> by_inverse_edge_;
   S inverse_radius_;
   std::unique_ptr<BallRays<S>> rays_of_table_, rays_;
+  std::vector<std::array<double, 2>> defects_;
   bool core_apart_;
   DiscMap map_, core_map_;
   PolarTable<S> table_;

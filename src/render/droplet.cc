@@ -367,11 +367,10 @@ template <class S>
 S DropletImage<S>::intensity(const P& column, const P& row) const {
   const auto place = view_.at(column, row);
   const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
-  const S result = passing_.at(view_, place);
-  if (birefit::none(inside)) return result;
+  if (birefit::none(inside)) return S(P(0.0));
   const P rho_um = select(inside, place.rho_um, plain(edge_um_) * P(0.5));
   const S light = rest_panels_ == 0 ? traced(rho_um, place) : read(rho_um, place);
-  return result + select(inside, light, S(0.0));
+  return select(inside, light, S(0.0));
 }
 
 template <class S>

@@ -155,11 +155,16 @@ class DropletImage final : public PixelModel<S> {
   void tabulate(PixelModel<S>::Wanted, int threads) override;
   S intensity(const P& column, const P& row) const override;
   Symmetry symmetry() const override { return symmetry_; }
-  bool has_edge() const override { return shell_ && lane(plain(core_um_), 0) > 0; }
-  P beyond_edge(const P& column, const P& row) const override {
-    const P of_core = view_.at(column, row).rho_um * inverse(plain(core_um_));
-    return P(1.0) - of_core * of_core;
+  int edges() const override { return shell_ && lane(plain(core_um_), 0) > 0 ? 2 : 1; }
+  P beyond_edge(int edge, const P& column, const P& row) const override {
+    const P fraction = view_.at(column, row).rho_um * inverse(plain(edge == 0 ? edge_um_ : core_um_));
+    return P(1.0) - fraction * fraction;
   }
+  bool round() const override { return true; }
+  std::optional<EdgeCircle> circle(int edge) const override { return view_.circle(edge == 0 ? edge_um_ : core_um_); }
+  S rim(const P& column, const P& row) const override { return view_.within(column, row, inverse_edge_, by_inverse_edge_); }
+  bool has_passing_light() const override { return !passing_.dark(); }
+  S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
   /// The image is sum_k basis_k(azimuth) f_k(radius). Tables hold the f_k in two parts, each over v in [0, 1]: the
   /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim; of a shell what is seen
   /// through the core, up to the kink at its edge, and what is seen beside it.

@@ -120,7 +120,7 @@ template <class S>
 S EikonalImage<S>::intensity(const P& column, const P& row) const {
   constexpr bool kSlopes = ScalarTraits<S>::derivatives > 0;
   const auto place = view_.at(column, row);
-  S result = passing_.at(view_, place);
+  S result(P(0.0));
   const auto basis = RoundView<S>::basis(place);
   [[maybe_unused]] std::array<P, RoundView<S>::kMostTerms> turned;
   if constexpr (kSlopes) turned = RoundView<S>::turned(place);

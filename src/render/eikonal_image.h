@@ -21,6 +21,8 @@ class EikonalImage final : public PixelModel<S> {
   void tabulate(PixelModel<S>::Wanted, int threads) override;
   S intensity(const P& column, const P& row) const override;
   Symmetry symmetry() const override { return symmetry_; }
+  bool has_passing_light() const override { return !passing_.dark(); }
+  S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
 
   // For the planner.
   std::vector<double> ends_um() const;  ///< from the axis outwards

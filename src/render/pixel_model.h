@@ -1,9 +1,11 @@
 #pragma once
 // What the image assembly needs of a scene: the intensity at points of the image, for any scalar.
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -52,6 +54,11 @@ inline constexpr int kLanesOf = std::is_same_v<PlainOf<S>, Pack> ? kLanes : 1;
 /// What leaves a picture as it is: half a turn about its middle, or a mirror that exchanges its upper and its lower half.
 enum class Symmetry { none, half_turn, mirror };
 
+/// A circle in the picture, in pixels.
+struct EdgeCircle {
+  double column, row, radius;
+};
+
 struct FringeScratch;
 
 /// Intensity at image points (pixel units; docs/conventions.md), one a lane.
@@ -70,10 +77,26 @@ class PixelModel {
   virtual FringeTraits fringe_traits() const { return {}; }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
-  /// Light may have a line along which its slope has no bound on one side, like a root's: a core's edge.
-  virtual bool has_edge() const { return false; }
-  /// Positive on that side of the line, negative on the other, and all but linear across a few pixels of it, where it does not end (at a rim).
-  virtual PlainOf<S> beyond_edge(const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const { return PlainOf<S>(-1.0); }
+  /// Lines along which the slope of intensity() has no bound on one side, like a root's (edge_pixels.h). The first, if there is any, is the rim of
+  /// all light that intensity() knows; a second one a core's edge, where it is continuous.
+  virtual int edges() const { return 0; }
+  /// Positive on the side of that slope, negative on the other, and all but linear across a few pixels of the line, where it does not end (at a rim).
+  /// Of a line that is no circle: about the distance, in pixels.
+  virtual PlainOf<S> beyond_edge(int /*edge*/, const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const { return PlainOf<S>(-1.0); }
+  /// Places (column, row), apart from the middle, about which light turns within a pixel.
+  virtual const std::vector<std::array<double, 2>>& defects() const {
+    static const std::vector<std::array<double, 2>> none;
+    return none;
+  }
+  /// Light changes with the azimuth about the middle of circle() as its fourth harmonic does, no faster.
+  virtual bool round() const { return false; }
+  /// The line, where it is a circle; all circles have the same middle.
+  virtual std::optional<EdgeCircle> circle(int /*edge*/) const { return {}; }
+  /// beyond_edge() of the rim with its derivatives.
+  virtual S rim(const PlainOf<S>& column, const PlainOf<S>& row) const { return S(beyond_edge(0, column, row)); }
+  /// The mean over a pixel of the light that goes past the sample, which intensity() leaves out.
+  virtual bool has_passing_light() const { return false; }
+  virtual S passing(const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const { return S(0.0); }
   /// Of the picture and every derivative.
   virtual Symmetry symmetry() const { return Symmetry::none; }
   enum class Wanted { points, picture };

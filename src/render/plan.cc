@@ -17,6 +17,7 @@
 #include "render/cone_view.h"
 #include "render/fringe_table.h"
 #include "render/pilots.h"
+#include "render/pixel_plan.h"
 #include "render/planar.h"
 #include "render/retardance.h"
 #include "render/sampling.h"
@@ -118,13 +119,13 @@ double droplet_phase(const DropletOptics<double>& o, double psi) {
   });
 }
 
-void sample_by_phase(RenderPlan& plan, double center_x, double center_y, double bins,
-                     const std::function<double(double)>& phase_step) {
+/// points(r): a pixel side, of pixels whose middles are about r pixels from the centre.
+void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double bins, const std::function<int(double)>& points) {
   plan.sampling_center_x_px = center_x;
   plan.sampling_center_y_px = center_y;
   plan.sampling_bin_px = 1;
   plan.samples.clear();
-  for (int i = 0; i < bins; ++i) plan.samples.push_back(samples_for(phase_step(i + 0.5)));
+  for (int i = 0; i < bins; ++i) plan.samples.push_back(points(i + 0.5));
 }
 
 /// Of the accuracy asked for: the table's error stays far below it, so that neither the image nor its slope shows the
@@ -266,6 +267,13 @@ void note_ring(const Scene& scene, const Values<double>& value, RenderPlan& plan
         balance.core_length > most ? "out" : "in", model));
 }
 
+/// measure_points() of a droplet whose rays are planned.
+void measure_points_of(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
+  const std::unique_ptr<PixelModel<Pack>> model = make_droplet_model(scene, plan, value.as<Pack>());
+  model->tabulate(PixelModel<Pack>::Wanted::picture, 0);
+  measure_points(scene, *model, plan);
+}
+
 RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
   RenderPlan plan;
   const BallOptics<double> o = ball_optics(scene, value);
@@ -298,19 +306,17 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
       before = here;
     }
   }
-  sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
-    if (r < 3) return r < 2 ? 9.0 : 5.0;  // where a defect may be
-    if (std::abs(r * px - edge) < 1.5 * px) return 3.0;
+  sample_by_radius(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
+    if (r < 3) return r < 2 ? 8 : 6;  // where a defect may be
     const double f = std::min(kRadii - 1e-9, r * px / edge * kRadii);
-    return std::max(gradient[static_cast<std::size_t>(f)], gradient[static_cast<std::size_t>(f) + 1]);
+    return samples_for(std::max(gradient[static_cast<std::size_t>(f)], gradient[static_cast<std::size_t>(f) + 1]), scene.intensity_accuracy);
   });
-  plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel",
-                                     *std::max_element(plan.samples.begin(), plan.samples.end())));
   if (scene.method == "auto")
     plan_disc_squares(scene, value, std::max(kSquaresShare * scene.intensity_accuracy, 1e-10), plan);
   else
     plan.reasons.push_back("the droplet does not look the same from all sides of the viewing axis: one ray a point");
   plan.samples.push_back(1);  // outside
+  measure_points_of(scene, value, plan);
   note_rays(scene, value, o.sphere, plan);
   note_illumination(scene, value, largest_phase, plan);
   return plan;
@@ -333,19 +339,16 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
   std::vector<double> step;
   for (int i = -1; i < 2 * bins + 4; ++i) step.push_back(phase_at(std::abs(0.5 * (i + 1) * px)) - phase_at(std::abs(0.5 * i * px)));
   const auto across = [&](std::size_t i) { return std::abs(step[i]) + std::abs(step[i + 1]) + 2 * std::abs(step[i + 1] - step[i]); };
-  sample_by_phase(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
+  sample_by_radius(plan, value(scene.view.center_x_px), value(scene.view.center_y_px), bins + 1, [&](double r) {
     const double low = std::max(0.0, (r - 0.5) * px), high = (r + 0.5) * px;
-    // The cross turns within the innermost pixels; at the rim intensity ends like a root.
-    if (r < 3) return r < 2 ? 9.0 : 5.0;
+    // The cross turns within the innermost pixels.
+    if (r < 3) return r < 2 ? 8 : 6;
     for (const double jump : jumps)
-      if (high > jump - px && low < jump + px) return 9.0;
-    if (high > edge - px && low < edge + px) return 3.0;
+      if (high > jump - px && low < jump + px) return 8;
     // Of pixels whose middles lie in this bin, r - 1/2 to r + 1/2.
     const std::size_t first = static_cast<std::size_t>(std::lround(2 * r - 1));
-    return std::max({across(first), across(first + 1), across(first + 2)});
+    return samples_for(std::max({across(first), across(first + 1), across(first + 2)}), scene.intensity_accuracy);
   });
-  const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
-  plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or the rim are finer than a pixel", most));
   // Outside the droplet one sample is enough.
   plan.samples.push_back(1);
   note_rays(scene, value, o, plan);
@@ -378,6 +381,8 @@ RenderPlan plan_curved(const Scene& scene, const Values<double>& value) {
   const std::vector<double> ends = image.ends_um();
   plan.reasons.push_back(fmt::format("light of either mode begins or ends at {} radii: {} rays between them, one a radius, serve all pixels (interpolated to {})", ends.size(), radii, sci(left)));
   sample_round(scene, value, o, ends.empty() ? o.radius_um : ends.back(), ends, plan);
+  plan.reasons.push_back(fmt::format("pixels are means over their area: up to {0} x {0} points where light jumps or fringes are finer than a pixel",
+                                     *std::max_element(plan.samples.begin(), plan.samples.end())));
   return plan;
 }
 
@@ -416,6 +421,7 @@ RenderPlan plan_droplet(const Scene& scene, const Values<double>& value) {
 
   sample_round(scene, value, o, rim.rho_max() * o.radius_um, {}, plan);
   plan_radial_table(scene, value, plan);
+  measure_points_of(scene, value, plan);
   return plan;
 }
 
@@ -726,10 +732,10 @@ RenderPlan plan_planar(const Scene& scene, const Values<double>& value) {
       plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
       plan_fringe_blocks(scene, value, plan);
     } else {
-      sample_by_phase(plan, cx, cy, bins, [&](double r) {
+      sample_by_radius(plan, cx, cy, bins, [&](double r) {
         const double f = std::min(23.999, r / bins * 24);
         const std::size_t i = static_cast<std::size_t>(f);
-        return std::max(gradient[i], gradient[i + 1]);
+        return samples_for(std::max(gradient[i], gradient[i + 1]), scene.intensity_accuracy);
       });
       const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
       plan.reasons.push_back(fmt::format("pixel means from up to {} x {} rays a pixel", most, most));
@@ -781,11 +787,11 @@ RenderPlan plan_disc(const Scene& scene, const Values<double>& value) {
       gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(disc_phase(o, x + h, y) - disc_phase(o, x - h, y), disc_phase(o, x, y + h) - disc_phase(o, x, y - h)));
     }
   const int bins = std::max(2, static_cast<int>(std::ceil(radius_px)) + 2);
-  sample_by_phase(plan, o.center_x_px, o.center_y_px, bins, [&](double r) {
-    if (std::abs(r - radius_px) < 2) return 9.0;  // the edge
+  sample_by_radius(plan, o.center_x_px, o.center_y_px, bins, [&](double r) {
+    if (std::abs(r - radius_px) < 2) return 8;  // the edge
     const double f = std::min(119.999, r / radius_px * 120);
     const std::size_t i = static_cast<std::size_t>(f);
-    return std::max(gradient[i], gradient[i + 1]);
+    return samples_for(std::max(gradient[i], gradient[i + 1]), scene.intensity_accuracy);
   });
   plan.samples.push_back(1);  // outside
   const double fastest = *std::max_element(gradient.begin(), gradient.end());

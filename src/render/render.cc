@@ -49,23 +49,6 @@ int samples_at(const RenderPlan& plan, double column, double row) {
   return plan.samples[std::min(bin, plan.samples.size() - 1)];
 }
 
-const PixelRule& rule_of(int n) {
-  static const std::array<PixelRule, 9> rules = [] {
-    std::array<PixelRule, 9> r;
-    for (int i = 1; i <= 8; ++i) r[static_cast<std::size_t>(i)] = pixel_rule(i);
-    return r;
-  }();
-  return rules[static_cast<std::size_t>(n)];
-}
-
-template <class P>
-P load_lanes(const double* x) {
-  if constexpr (std::is_same_v<P, Pack>)
-    return Pack::load_unaligned(x);
-  else
-    return *x;
-}
-
 /// load_lanes(x + shift), shift = 0 to 4 and x at a register's boundary: two loads for all of them, none across a cache line's end.
 template <class P>
 BIREFIT_INLINE P load_shifted(const double* x, int shift) {
@@ -91,43 +74,6 @@ constexpr std::array<double, kLanes> kCount = [] {
   return a;
 }();
 
-/// Of a pixel in each lane.
-template <class S>
-S mean_over_pixel(const PixelModel<S>& model, const PlainOf<S>& column, const PlainOf<S>& row, int n) {
-  const PixelRule& rule = rule_of(n);
-  S sum(0.0);
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const std::size_t a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
-      sum = sum + (rule.w[a] * rule.w[b]) * model.intensity(column + PlainOf<S>(rule.x[a]), row + PlainOf<S>(rule.x[b]));
-    }
-  return sum;
-}
-
-/// Of one pixel, a sample in each lane: neighbours, which read the same parts of tables. n n must be a multiple of the lanes.
-template <class S>
-S mean_over_one_pixel(const PixelModel<S>& model, double column, double row, int n) {
-  static const std::array<std::array<std::vector<double>, 3>, 9> all = [] {
-    std::array<std::array<std::vector<double>, 3>, 9> r;
-    for (std::size_t m = 1; m <= 8; ++m) {
-      const PixelRule& rule = rule_of(static_cast<int>(m));
-      for (std::size_t j = 0; j < m; ++j)
-        for (std::size_t i = 0; i < m; ++i) {
-          r[m][0].push_back(rule.x[i]);
-          r[m][1].push_back(rule.x[j]);
-          r[m][2].push_back(rule.w[i] * rule.w[j]);
-        }
-    }
-    return r;
-  }();
-  using P = PlainOf<S>;
-  const auto& [x, y, w] = all[static_cast<std::size_t>(n)];
-  S sum(0.0);
-  for (std::size_t i = 0; i < x.size(); i += static_cast<std::size_t>(kLanesOf<S>))
-    sum = sum + S(load_lanes<P>(&w[i])) * model.intensity(P(column) + load_lanes<P>(&x[i]), P(row) + load_lanes<P>(&y[i]));
-  return over_lanes(sum);
-}
-
 /// Writes lanes [first, first + count) to `to`.
 template <class P>
 BIREFIT_INLINE void store_lanes(const P& x, double* to, int first, int count) {
@@ -145,6 +91,15 @@ BIREFIT_INLINE void store(const S& value, const std::array<double*, N>& out, int
   store_lanes(plain(value), out[0], first, count);
   if constexpr (ScalarTraits<S>::derivatives > 0)
     for (int j = 1; j < planes; ++j) store_lanes(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)], first, count);
+}
+
+/// The value, or its derivative of number plane - 1.
+template <class S>
+const PlainOf<S>& plain_of_plane(const S& x, [[maybe_unused]] int plane) {
+  if constexpr (ScalarTraits<S>::derivatives > 0)
+    return plane == 0 ? x.value : x.d[static_cast<std::size_t>(plane - 1)];
+  else
+    return x;
 }
 
 /// samples_at() of a part of one row of the picture. Rings of equal samples are painted from the inside out; a root a ring and row instead of one a pixel.
@@ -276,7 +231,7 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
     band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes, reach);
     for (int r = -2 * reach; r < rows + 2 * reach; ++r) rings.fill(std::clamp(top + r, -reach, h - 1 + reach), -kRim, band.samples(r), wide);
-    if (model->has_edge()) {
+    if (model->edges() > 0) {
       thread_local EdgeMarks marks;
       marks.look(*model, top - 2 * reach, rows + 4 * reach, -kRim, wide);
       for (int r = -2 * reach; r < rows + 2 * reach; ++r) marks.mark(r + 2 * reach, band.samples(r));
@@ -362,18 +317,18 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       const auto flush = [&](std::size_t most) {
         double columns[kLanes];
         for (int k = 0; k < kStep; ++k) columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
-        const S v = mean_over_pixel(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(top + r)), static_cast<int>(most));
+        const S v = mean_over_pixels(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(top + r)), static_cast<int>(most));
         for (int k = 0; k < count[most]; ++k) store(v, targets(waiting[most][static_cast<std::size_t>(k)]), planes, k, 1);
         count[most] = 0;
       };
       for (int c = 0; c < w; ++c) {
         if (n[c] == 1) continue;
         if (n[c] & kEdgePixel) {
-          store(mean_over_edge_pixel(*model, c, top + r, n[c] - kEdgePixel), targets(c), planes, 0, 1);
+          store(mean_over_cut_pixel(*model, plan, c, top + r), targets(c), planes, 0, 1);
           continue;
         }
         const std::size_t most = n[c];
-        if ((n[c] * n[c]) % kStep == 0) {
+        if (n[c] > 8 || (n[c] * n[c]) % kStep == 0) {
           store(mean_over_one_pixel(*model, c, top + r, n[c]), targets(c), planes, 0, 1);
           continue;
         }
@@ -383,9 +338,21 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       for (std::size_t most = 2; most < 9; ++most)
         if (count[most] > 0) flush(most);
     };
+    const auto add_passing = [&](int r) {
+      for (int c0 = 0; c0 < w; c0 += kStep) {
+        const S v = model->passing(load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(static_cast<double>(c0)), PlainOf<S>(static_cast<double>(top + r)));
+        for (int p = 0; p < planes; ++p) {
+          const PlainOf<S>* light = &plain_of_plane(v, p);
+          double* out = images[static_cast<std::size_t>(p)]->row(top + r) + c0;
+          for (int k = 0; k < std::min(kStep, w - c0); ++k) out[k] += lane(*light, k);
+        }
+      }
+    };
     for (int r = -reach; r < rows + reach; ++r) {
       compute(r);
-      if (r >= reach) finish(r - reach);
+      if (r < reach) continue;
+      finish(r - reach);
+      if (model->has_passing_light()) add_passing(r - reach);
     }
     if (symmetry == Symmetry::none) return;
     for (int row = top; row < top + rows; ++row)
@@ -416,7 +383,7 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
       const auto& [x, y] = pixels[static_cast<std::size_t>(i)];
       std::uint8_t& k = samples[static_cast<std::size_t>(i)];
       k = static_cast<std::uint8_t>(samples_at(plan, x, y));
-      if (model->has_edge() && is_edge_pixel(*model, x, y)) k |= kEdgePixel;
+      if (model->edges() > 0 && (is_edge_pixel(*model, x, y) || is_defect_pixel(*model, x, y))) k = kEdgePixel;
     }
   });
   std::array<std::size_t, 257> place{};  // where those of 255, 254, .. samples begin
@@ -432,7 +399,9 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   const int edges = static_cast<int>(std::count_if(samples.begin(), samples.end(), [](std::uint8_t k) { return (k & kEdgePixel) != 0; })), groups = (n - edges + kStep - 1) / kStep;
   parallel_for(edges, threads, [&](int i) {
     const std::size_t pixel = order[static_cast<std::size_t>(i)];
-    put(pixel, mean_over_edge_pixel(*model, pixels[pixel][0], pixels[pixel][1], samples[pixel] - kEdgePixel), 0);
+    S v = mean_over_cut_pixel(*model, plan, pixels[pixel][0], pixels[pixel][1]);
+    if (model->has_passing_light()) v = v + model->passing(PlainOf<S>(pixels[pixel][0]), PlainOf<S>(pixels[pixel][1]));
+    put(pixel, v, 0);
   });
   const int together = std::clamp(groups / 64, 1, 16);
   parallel_for((groups + together - 1) / together, threads, [&](int block) {
@@ -454,8 +423,9 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
           for (int i = 0; i < 3; ++i) p[j][i] = model->fringe(column + PlainOf<S>(i - 1.0), row + PlainOf<S>(j - 1.0));
         v = model->in_phase() ? fringe_mean<false>(p) : fringe_mean<true>(p);
       } else {
-        v = mean_over_pixel(*model, column, row, std::max(most, 2));  // the point value alone is no pixel mean
+        v = mean_over_pixels(*model, column, row, std::max(most, 2));  // the point value alone is no pixel mean
       }
+      if (model->has_passing_light()) v = v + model->passing(column, row);
       for (int k = 0; k < std::min(kStep, n - edges - g * kStep); ++k) put(at[static_cast<std::size_t>(k)], v, k);
     }
   });

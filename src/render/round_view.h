@@ -1,7 +1,9 @@
 #pragma once
 // Pictures that are the same all around a centre: sums of a few functions of the radius times cosines and sines of the azimuth.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/scalar.h"
 #include "render/pixel_model.h"
@@ -61,6 +63,16 @@ class CentredView {
     by_center_y_.add(around * p.x + outwards * p.y, light);
   }
   double pixel_um() const { return pixel_um_; }
+  EdgeCircle circle(const S& radius_um) const { return {lane(center_x_, 0), lane(center_y_, 0), lane(plain(radius_um), 0) / pixel_um_}; }
+  /// 1 - (rho/radius)^2, with its derivatives.
+  S within(const P& column, const P& row, const S& inverse_radius, const Sensitivity<S>& by_inverse_radius) const {
+    const Place p = at(column, row);
+    const P fraction = p.rho_um * plain(inverse_radius);
+    S result(P(1.0) - fraction * fraction);
+    add_moves(p, P(-2.0) * fraction * plain(inverse_radius), P(0.0), result);
+    by_inverse_radius.add(P(-2.0) * fraction * p.rho_um, result);
+    return result;
+  }
 
  private:
   double pixel_um_;
@@ -102,25 +114,75 @@ class RoundView : public CentredView<S> {
   Sensitivity<S> by_sum_;
 };
 
-/// Light that passes by a ball, averaged over a pixel along the radius.
+/// The part of a unit square about (x, y) that lies within a circle of `radius` about the origin, and its derivatives by these three.
+struct SquareInCircle {
+  double area = 0, by_x = 0, by_y = 0, by_radius = 0;
+  SquareInCircle(double x, double y, double radius) {
+    const double r2 = radius * radius, left = x - 0.5, right = x + 0.5, low = y - 0.5, high = y + 0.5;
+    const auto half_chord = [&](double a) { return std::sqrt(std::max(0.0, (radius - a) * (radius + a))); };
+    // The integral from 0 to b of min(height, half_chord), odd in either.
+    const auto below = [&](double b, double height) {
+      const double sign = (b < 0 ? -1 : 1) * (height < 0 ? -1 : 1), h = std::min(std::abs(height), radius), to = std::min(std::abs(b), radius), flat = half_chord(h);
+      if (to <= flat) return sign * h * to;
+      // Two triangles and the sector between them; by small angles, where a large circle all but touches a side.
+      const double at_end = half_chord(to);
+      return sign * 0.5 * (h * flat + to * at_end + r2 * (std::atan2(h, flat) - std::atan2(at_end, to)));
+    };
+    area = below(right, high) - below(left, high) - below(right, low) + below(left, low);
+    // What a side that moves outwards takes in is as much of it as lies within the circle; all of the area's change by the radius follows, as areas go
+    // with the square of lengths: 2 area = radius by_radius + the sides' distances from the origin times these lengths.
+    const auto within = [&](double side, double from, double to) {
+      const double h = half_chord(side);
+      return std::clamp(to, -h, h) - std::clamp(from, -h, h);
+    };
+    const double at_right = within(right, low, high), at_left = within(left, low, high), at_high = within(high, left, right), at_low = within(low, left, right);
+    by_x = at_right - at_left, by_y = at_high - at_low;
+    by_radius = (2 * area - right * at_right + left * at_left - high * at_high + low * at_low) / radius;
+  }
+};
+
+/// Light that passes by a ball: the mean over a pixel.
 template <class S>
 class PassingLight {
  public:
   using P = PlainOf<S>;
   PassingLight() = default;
-  PassingLight(double pixel_um, const S& radius_um, const S& cos_between) : pixel_um_(pixel_um), radius_um_(radius_um), open_(cos_between * cos_between) {
+  PassingLight(double pixel_um, const S& radius_um, const S& cos_between) : pixel_um_(pixel_um), radius_px_(radius_um * (1 / pixel_um)), open_(cos_between * cos_between) {
     dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
   }
-  S at(const CentredView<S>& view, const typename CentredView<S>::Place& place) const {
-    if (dark_ || birefit::all(place.rho_um < plain(radius_um_) - P(pixel_um_))) return S(P(0.0));
-    S rho(place.rho_um);
-    view.add_moves(place, P(1.0), P(0.0), rho);
-    return open_ * min_of(max_of((rho - radius_um_) * (1 / pixel_um_) + 0.5, S(0.0)), S(1.0));
+  bool dark() const { return dark_; }
+  S mean(const CentredView<S>& view, const typename CentredView<S>::Place& place) const {
+    const double radius = lane(plain(radius_px_), 0);
+    const P per_pixel(1 / pixel_um_), nothing(0.0);
+    constexpr double kCorner = 0.7072;
+    const P from_middle = place.rho_um * per_pixel;
+    if (birefit::none(from_middle < P(radius + kCorner))) return open_;
+    if (birefit::none(from_middle > P(radius - kCorner))) return S(nothing);
+    alignas(64) std::array<double, kLanes> area{}, by_x{}, by_y{}, by_radius{};
+    for (std::size_t k = 0; k < static_cast<std::size_t>(kLanesOf<S>); ++k) {
+      const int i = static_cast<int>(k);
+      const SquareInCircle part(lane(place.x, i) / pixel_um_, lane(place.y, i) / pixel_um_, radius);
+      area[k] = part.area, by_x[k] = part.by_x, by_y[k] = part.by_y, by_radius[k] = part.by_radius;
+    }
+    const auto load = [](const std::array<double, kLanes>& a) {
+      if constexpr (kLanesOf<S> == 1)
+        return a[0];
+      else
+        return Pack::load_aligned(a.data());
+    };
+    S inside(load(area));
+    if constexpr (ScalarTraits<S>::derivatives > 0) {
+      const P x = load(by_x), y = load(by_y);
+      for (std::size_t j = 0; j < inside.d.size(); ++j) inside.d[j] = load(by_radius) * radius_px_.d[j];
+      // From x, y to the radius and the azimuth, by which add_moves() asks.
+      view.add_moves(place, (x * place.x + y * place.y) * place.inverse_rho * per_pixel, (y * place.x - x * place.y) * per_pixel, inside);
+    }
+    return open_ * (S(P(1.0)) - inside);
   }
 
  private:
   double pixel_um_ = 1;
-  S radius_um_, open_;
+  S radius_px_, open_;
   bool dark_ = true;
 };
 

@@ -189,7 +189,7 @@ RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
     for (int i = 0; i < kPixels; ++i) {
       const double radius = over * (i + 0.5) / kPixels, azimuth = 2.399963 * i, column = std::round(cx + radius * std::cos(azimuth)), row = std::round(cy + radius * std::sin(azimuth));
       if (column < 0 || row < 0 || column >= scene.view.width || row >= scene.view.height) continue;
-      left = std::max(left, 3 * std::abs(pixel_mean(image, column, row, n) - pixel_mean(image, column, row, 16)));
+      left = std::max(left, 3 * std::abs(lane(mean_over_one_pixel(image, column, row, n) - mean_over_one_pixel(image, column, row, 16), 0)));
     }
     if (left <= 0.5 * scene.intensity_accuracy || n >= 8) break;
   }

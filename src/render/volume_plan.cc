@@ -47,11 +47,11 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
       bool whole = column >= 0 && row >= 0 && column < w && row < h;
       for (const auto& [x, y] : {std::pair{-1.5, -1.5}, {-1.5, 1.5}, {1.5, -1.5}, {1.5, 1.5}}) whole = whole && within(column + x, row + y);
       if (!whole) continue;
-      const double exact = pixel_mean(*model, column, row, kReference);
+      const double exact = lane(mean_over_one_pixel(*model, column, row, kReference), 0);
       double error = 0;
       int n = 1;
       for (; n <= kMost; n += n < 4 ? 1 : 2) {
-        error = std::abs(pixel_mean(*model, column, row, n) - exact);
+        error = std::abs(lane(mean_over_one_pixel(*model, column, row, n), 0) - exact);
         if (error <= target || n == kMost) break;
       }
       left = std::max(left, error);

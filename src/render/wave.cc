@@ -291,6 +291,7 @@ RenderPlan plan_wave(const Scene& scene, const Values<double>& value) {
 }
 
 bool outgrown(const RenderPlan& now, const RenderPlan& before) {
+  if (now.edge_points > before.edge_points || now.defect_points > before.defect_points) return true;
   if (!now.wave || !before.wave) return static_cast<bool>(now.wave) != static_cast<bool>(before.wave) || outgrown_disc(now.disc, before.disc);
   const double ratio = now.wave->radius_um / before.wave->radius_um;
   return ratio > 1.04 || ratio < 0.8;

@@ -199,6 +199,26 @@ PixelTruth pixel_truth(Scene scene, const Theta& theta) {
   return truth;
 }
 
+/// The frame of pixels so many times finer, averaged: none of its pixels is planned as the frame's are.
+Image by_finer_pixels(Scene scene, Theta theta) {
+  constexpr int kFiner = 9;
+  const int w = scene.view.width, h = scene.view.height;
+  scene.view.width *= kFiner, scene.view.height *= kFiner, scene.view.pixel_size_um /= kFiner;
+  for (const ParameterRef& centre : {scene.view.center_x_px, scene.view.center_y_px}) {
+    double& at = theta[static_cast<std::size_t>(centre.index)];
+    at = (at + 0.5) * kFiner - 0.5;  // pixel centres are whole numbers
+  }
+  const Image fine = render(scene, plan(scene, theta), theta).intensity;
+  Image mean(w, h);
+  for (int row = 0; row < h; ++row)
+    for (int j = 0; j < kFiner; ++j) {
+      const double* from = fine.row(kFiner * row + j);
+      for (int column = 0; column < w; ++column)
+        for (int i = 0; i < kFiner; ++i) mean(column, row) += from[kFiner * column + i] / (kFiner * kFiner);
+    }
+  return mean;
+}
+
 void measure_frames(MethodChart& chart, const std::function<void(const std::string&)>& say) {
   for (FrameScene& f : frame_scenes()) {
     if (say) say("frames of " + f.name);
@@ -210,13 +230,14 @@ void measure_frames(MethodChart& chart, const std::function<void(const std::stri
       some = pixel_truth(f.scene, theta);
     } else {
       f.scene.intensity_accuracy = 1e-10;
-      exact = render(f.scene, plan(f.scene, theta), theta).intensity;
+      exact = by_finer_pixels(f.scene, theta);
     }
     for (const double asked : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
       if (by_pixels && asked < 1e-4) break;  // kinks of its splines keep the modes from less: minutes by magnus4
       f.scene.intensity_accuracy = asked;
       const RenderPlan chosen = plan(f.scene, theta);
-      ChartFrame frame{f.name, chosen.method, asked, 0, 0, 0};
+      ChartFrame frame;
+      frame.scene = f.name, frame.method = chosen.method, frame.asked = asked;
       Rendering rendering;
       frame.seconds = seconds_of([&] { render(f.scene, chosen, theta, {}, 0, rendering); });
       const Image& image = rendering.intensity;
@@ -226,7 +247,10 @@ void measure_frames(MethodChart& chart, const std::function<void(const std::stri
         const double d = by_pixels ? image(some.pixels[i][0], some.pixels[i][1]) - some.intensity[static_cast<Eigen::Index>(i)]
                                    : image.values()[i] - exact.values()[i];
         sum += d * d;
-        frame.worst_error = std::max(frame.worst_error, std::abs(d));
+        if (std::abs(d) <= frame.worst_error) continue;
+        frame.worst_error = std::abs(d);
+        frame.worst_column = by_pixels ? some.pixels[i][0] : static_cast<int>(i) % image.width();
+        frame.worst_row = by_pixels ? some.pixels[i][1] : static_cast<int>(i) / image.width();
       }
       frame.rms_error = std::sqrt(sum / static_cast<double>(count));
       chart.frames.push_back(frame);

@@ -19,6 +19,8 @@ struct IndependentDroplet {
   double diameter_um = 9.3, n_o = 1.52, n_e = 1.74, n_host = 1.43, wavelength_um = 0.59;
   double center_x_px = 0, center_y_px = 0, pixel_um = 0.05, polarizer_deg = 0;
 
+  bool surfaces = true;  ///< reflect; without, all light goes through them
+
   /// Angle of the director from the viewing axis at (rho, z) over the radius, upper half; the lower half mirrors it. Not
   /// set: the radial hedgehog.
   std::function<double(double, double)> angle_from_axis;
@@ -61,6 +63,12 @@ struct IndependentDroplet {
     return 2 * simpson(0, half, f(0), f(half / 2), f(half), 20);
   }
 
+  /// Image radius beyond which there is no light.
+  double edge_um() const {
+    const double radius = diameter_um / 2, m = n_host / n_o, b = radius * std::min(1.0, 1 / m) * (1 - 1e-12);
+    return b / std::cos(2 * (std::asin(b / radius) - std::asin(m * b / radius)));
+  }
+
   /// |E_cross|^2 / sin^2(2 phi) at image radius rho.
   double ring(double rho) const {
     const double radius = diameter_um / 2, m = n_host / n_o;
@@ -81,7 +89,7 @@ struct IndependentDroplet {
     const double rs = (n_host * c1 - n_o * c2) / (n_host * c1 + n_o * c2);
     const double root = n_host * std::sqrt(n_e * n_e - n_host * n_host * s1 * s1);
     const double rp = (n_o * n_e * c1 - root) / (n_o * n_e * c1 + root);
-    const double p = (1 - rp * rp) * cosine, s = 1 - rs * rs;
+    const double p = (surfaces ? 1 - rp * rp : 1.0) * cosine, s = surfaces ? 1 - rs * rs : 1.0;
     const double delta = 2 * M_PI / wavelength_um * retardance_um(m * b);
     const double tube = b / (rho * slope) / cosine;
     return 0.25 * tube * (p * p + s * s - 2 * p * s * std::cos(delta));
