@@ -267,7 +267,7 @@ TEST(Planner, ShippedScenesTakeAtMostHalfMoreSamplesThanTheCheapestMethod) {
       continue;
     }
     const Theta theta = config.job.parameters.values();
-    const RenderPlan planned = plan(config.scene, theta);
+    const RenderPlan planned = plan(config.scene, theta, config.observable);
     if (planned.physics == "wave") continue;  // no rays whose samples could be counted
     const double ratio = planned_over_cheapest(config.scene, theta, planned);
     judged += ratio > 0;

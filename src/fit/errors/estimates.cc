@@ -29,7 +29,11 @@ struct Question {
 /// nothing when it stays below that up to the bound, or when the physical limit at its lower bound is itself excluded.
 /// Needed where the curvature at the estimate says nothing: a director below its threshold hardly answers to the
 /// voltage, above it does.
-std::optional<double> upper_limit(const Question& q) {
+struct UpperLimit {
+  double value = 0;
+  Eigen::VectorXd change;  ///< of all unknowns, from the estimate to there
+};
+std::optional<UpperLimit> upper_limit(const Question& q) {
   const Parameter& parameter = q.parameter();
   const std::optional<JointPrior>& joint = q.task.job.prior;
   const bool prior =
@@ -38,6 +42,15 @@ std::optional<double> upper_limit(const Question& q) {
   const double allowed = std::pow(student_t_quantile(0.95, q.result.interval_degrees_of_freedom), 2);
   Profile profile = q.profile();
   if (profile.rise(parameter.lower, allowed) > allowed) return std::nullopt;
+  const auto limit_at = [&](double value) {
+    q.optimum.problem->evaluate(profile.place_nearest(value), false);
+    UpperLimit limit{value, Eigen::VectorXd(q.task.unknowns.size())};
+    for (int j = 0; j < q.task.unknowns.size(); ++j) {
+      const auto at = static_cast<std::size_t>(q.task.unknowns.table_index(j));
+      limit.change[j] = q.optimum.problem->theta()[at] - q.optimum.theta[at];
+    }
+    return limit;
+  };
   constexpr int kSteps = 40, kHalvings = 12;  // the limit to 1e-5 of the range
   double inside = q.optimum.theta[static_cast<std::size_t>(q.task.unknowns.table_index(q.unknown))];
   const double step = (parameter.upper - inside) / kSteps;
@@ -52,7 +65,7 @@ std::optional<double> upper_limit(const Question& q) {
       const double middle = 0.5 * (inside + outside);
       (profile.rise(middle, allowed) <= allowed ? inside : outside) = middle;
     }
-    return outside;
+    return limit_at(outside);
   }
   return std::nullopt;
 }
@@ -166,27 +179,51 @@ bool settle_at_bound(const Parameter& parameter, double gradient, ParameterEstim
 
 }  // namespace
 
+namespace {
+
+/// Of a searched unknown that nature keeps from falling any further, and that no bound of the user's holds.
+bool may_have_a_limit(const Question& q, const ParameterEstimate& estimate, bool at_upper) {
+  const bool limited = !estimate.limit.empty() && estimate.limit_value < q.parameter().upper;
+  return !estimate.linear && q.parameter().lower == q.parameter().physical_lower && !limited && !at_upper;
+}
+
+/// What others owe to an unknown that is known to lie below a limit and nowhere in particular: at the limit they are
+/// elsewhere, and where the picture answers to its square, as at nature's zero, no curvature at the estimate says so.
+void pay_for_limit(const UpperLimit& limit, double t, int unknown, FitResult& result) {
+  Eigen::VectorXd change = limit.change / t;
+  change[unknown] = 0;
+  result.covariance += change * change.transpose();
+}
+
+}  // namespace
+
 void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noise, FitResult& result) {
   const Eigen::VectorXd gradient = optimum.problem->gradient();
   const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
+  const auto question = [&](int j) { return Question{task, optimum, of_noise, result, j}; };
+  // The curvature at the estimate need not be that of the way to nature's bound: ask there.
+  std::vector<std::optional<UpperLimit>> limits(static_cast<std::size_t>(task.unknowns.size()));
   for (int j = 0; j < task.unknowns.size(); ++j) {
-    const Parameter& parameter = task.job.parameters[task.unknowns.table_index(j)];
+    ParameterEstimate estimate = estimate_of(task, optimum, result.covariance, j);
+    FitResult unused;
+    const bool at_upper = settle_at_bound(question(j).parameter(), gradient[j], estimate, unused);
+    if (!may_have_a_limit(question(j), estimate, at_upper)) continue;
+    limits[static_cast<std::size_t>(j)] = upper_limit(question(j));
+    if (const auto& limit = limits[static_cast<std::size_t>(j)]) pay_for_limit(*limit, t, j, result);
+  }
+  for (int j = 0; j < task.unknowns.size(); ++j) {
     ParameterEstimate estimate = estimate_of(task, optimum, result.covariance, j);
     estimate.interval95_low = estimate.value - t * estimate.stderr_;
     estimate.interval95_high = estimate.value + t * estimate.stderr_;
-    const bool at_upper = settle_at_bound(parameter, gradient[j], estimate, result);
-    // The curvature at the estimate need not be that of the way to nature's bound: ask there.
-    const bool limited = !estimate.limit.empty() && estimate.limit_value < parameter.upper;
-    const Question question{task, optimum, of_noise, result, j};
-    if (!estimate.linear && parameter.lower == parameter.physical_lower && !limited && !at_upper)
-      if (const std::optional<double> limit = upper_limit(question)) {
-        estimate.limit = "upper";
-        estimate.limit_value = *limit;
-        estimate.interval95_low = parameter.lower;
-        estimate.interval95_high = *limit;
-      }
-    if (!estimate.linear && !estimate.at_bound && estimate.limit.empty()) settle_interval(question, estimate);
-    result.names.push_back(parameter.name);
+    settle_at_bound(question(j).parameter(), gradient[j], estimate, result);
+    if (const auto& limit = limits[static_cast<std::size_t>(j)]) {
+      estimate.limit = "upper";
+      estimate.limit_value = limit->value;
+      estimate.interval95_low = question(j).parameter().lower;
+      estimate.interval95_high = limit->value;
+    }
+    if (!estimate.linear && !estimate.at_bound && estimate.limit.empty()) settle_interval(question(j), estimate);
+    result.names.push_back(question(j).parameter().name);
     result.parameters.push_back(std::move(estimate));
   }
   optimum.problem->evaluate(optimum.searched, true);  // profiles moved it

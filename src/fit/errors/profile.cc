@@ -29,10 +29,7 @@ Eigen::VectorXd Profile::along(const Eigen::VectorXd& from, double value) const 
 }
 
 double Profile::rise(double value, double enough) {
-  const auto nearest = std::min_element(places_.begin(), places_.end(), [&](const Place& a, const Place& b) {
-    return std::abs(a.value - value) < std::abs(b.value - value);
-  });
-  Eigen::VectorXd x = along(nearest->searched, value);
+  Eigen::VectorXd x = along(place_nearest(value), value);
   problem_.evaluate(x, false);
   if (problem_.objective() - least_ > enough) {
     SolveOptions options;
@@ -138,6 +135,14 @@ double Profile::lowest() const {
 const Eigen::VectorXd& Profile::lowest_place() const {
   return std::min_element(places_.begin(), places_.end(),
                           [](const Place& a, const Place& b) { return a.rise < b.rise; })
+      ->searched;
+}
+
+const Eigen::VectorXd& Profile::place_nearest(double value) const {
+  return std::min_element(places_.begin(), places_.end(),
+                          [&](const Place& a, const Place& b) {
+                            return std::abs(a.value - value) < std::abs(b.value - value);
+                          })
       ->searched;
 }
 

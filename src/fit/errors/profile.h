@@ -26,6 +26,8 @@ class Profile {
   /// Of all rises so far; clearly below zero: the estimate was not the minimum.
   double lowest() const;
   const Eigen::VectorXd& lowest_place() const;
+  /// All searched unknowns at the place that was asked for nearest to `value`.
+  const Eigen::VectorXd& place_nearest(double value) const;
   /// The rise `allowed`^(1/2) standard errors up and down, the others following along straight lines, over `allowed`:
   /// both 1 where the objective is a parabola. Clipped at the bounds.
   std::array<double, 2> straightness(double allowed);

@@ -135,13 +135,13 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
     if (change) covariance += *change * change->transpose();
   result.log_share = log_share(projected_information(*optimum.problem), task.job, task.unknowns);
   result.covariance = covariance;
-  const Eigen::VectorXd inverse_sd =
-      covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
-  result.correlation = inverse_sd.asDiagonal() * covariance * inverse_sd.asDiagonal();
-  result.correlation.diagonal().setOnes();
   result.covariance_kind = covariance_words(task, optimum, covariances, left_out);
 
   report_parameters(task, optimum, covariances.of_noise, result);
+  const Eigen::VectorXd inverse_sd =
+      result.covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
+  result.correlation = inverse_sd.asDiagonal() * result.covariance * inverse_sd.asDiagonal();
+  result.correlation.diagonal().setOnes();
   judge_identifiability(result, task.job, task.unknowns, covariances.factor, covariances.of_noise);
   weigh_inputs(task, optimum, covariances.of_noise, result);
   const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
