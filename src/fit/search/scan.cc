@@ -104,14 +104,11 @@ std::vector<Axis> fine_axes_of(const Task& task, const std::vector<PicturePhase>
   return axes;
 }
 
-/// Of those that may still be the best; where a picture costs next to nothing, to the end of the longest valley.
-constexpr int kLastSteps = 20, kLastStepsOfCells = 200;
-
 /// Solves from every start, a few steps for all and the rest for those that may still be the best, and adds the minima
 /// found to the result. Returns the lowest objective.
 double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options,
                    std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists, int steps,
-                   double hopeless_above, const SameMinimum& same = {}, int last_steps = kLastSteps) {
+                   double hopeless_above, const SameMinimum& same = {}) {
   const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
   SolveOptions polish;
   polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
@@ -148,8 +145,7 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
       continue;
     Candidate candidate;
     candidate.searched = from;
-    polish.max_iterations = last_steps;
-    if (last_steps > kLastSteps) polish.function_tolerance = 1e-9;  // valleys that bend are walked in small steps
+    polish.max_iterations = 20;
     result.interrupted = problem.solve(candidate.searched, polish).interrupted || result.interrupted;
     candidate.objective = problem.objective();
     candidate.information = projected_information(problem);
@@ -358,13 +354,6 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
   if (product > 0)
     starts = product <= most ? survey.minima_of_grid()
                              : survey.best_of_box(most, 4 * kMostBatches * static_cast<std::size_t>(candidates));
-  // Valleys that bend between the axes have no minimum on the grid: from anywhere, too, where that costs next to nothing.
-  constexpr int kAnywhere = 48;
-  for (int i = 0; cheap && !axes.empty() && i < kAnywhere; ++i) {
-    Eigen::VectorXd x = spread_point(i, axes, start);
-    problem.evaluate(x, false);
-    if (std::isfinite(problem.objective())) starts.emplace_back(problem.objective(), std::move(x));
-  }
   const Effort effort = effort_of(problem, result.points, candidates);
   // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet
   // believed: the next ones, then, as long as there are any.
@@ -378,8 +367,7 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
     if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
     best = std::min(best,
-                    polish_into(result, problem, options, std::move(some), effort.finalists, kSteps, hopeless_above, {},
-                                cheap ? kLastStepsOfCells : kLastSteps));
+                    polish_into(result, problem, options, std::move(some), effort.finalists, kSteps, hopeless_above));
     // Where pictures cost next to nothing, all of them: minima may be as good as each other.
     if ((best < rows + kDoubtful * std::sqrt(2 * rows) && !cheap) || best > hopeless_above) break;
   }

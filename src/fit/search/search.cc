@@ -82,10 +82,10 @@ PixelSet mean_of(const Picture& micrograph, const Frame& frame) {
           Eigen::VectorXd::Constant(1, 1 / std::sqrt(weights))};
 }
 
-/// Rough enough to be quick, and finer than a lamp's jitter: where the minima are on all pixels is found out by the
-/// plan.
+/// Rough enough to be quick, and finer than what the mean of a frame is known to: what the plan is off by would be
+/// another minimum's advantage.
 RenderPlan rough_plan(Scene scene, const Observable& observable, const Theta& theta) {
-  constexpr double kRough = 1e-3;
+  constexpr double kRough = 1e-4;
   scene.intensity_accuracy = std::max(scene.intensity_accuracy, kRough);
   return plan(scene, theta, observable);
 }
