@@ -8,7 +8,9 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,8 @@ struct Count {
   int timid = 0;
   int wrong = 0;  ///< an answer with a searched parameter more than five standard errors off
   double seconds = 0;
+  int inside = 0, intervals = 0;        ///< 95 % intervals of answers that hold the truth, limits left out
+  std::map<std::string, int> warnings;  ///< in how many right answers, names and numbers left out
 };
 constexpr double kClear = 20;
 
@@ -159,6 +163,28 @@ void describe(const RandomProblem& p, const Posed& posed, const Outcome& o, cons
   std::printf(" %s\n", r.has_answer() || r.ambiguous ? r.covariance_kind.c_str() : r.verdict.c_str());
 }
 
+/// A warning without what differs from picture to picture.
+std::string kind_of(const std::string& warning) {
+  std::string kind;
+  const std::size_t name = warning.find(": ");
+  for (const char c : warning.substr(name == std::string::npos ? 0 : name + 2))
+    if (!std::isdigit(static_cast<unsigned char>(c)) && std::string("+-.e").find(c) == std::string::npos) kind += c;
+  return kind;
+}
+
+void count_intervals(const RandomProblem& p, const FitResult& of, const std::vector<Theta>& truths, Count& count) {
+  const Theta& truth = *std::min_element(truths.begin(), truths.end(), [&](const Theta& a, const Theta& b) {
+    return errors_off(p, of, of.theta, a) < errors_off(p, of, of.theta, b);
+  });
+  for (const ParameterEstimate& e : of.parameters) {
+    if (e.linear || !e.limit.empty()) continue;
+    const int k = p.b.table.find(e.name).index;
+    const double true_one = e.value + difference(p, k, truth[static_cast<std::size_t>(k)], e.value);
+    ++count.intervals;
+    count.inside += true_one >= e.interval95_low && true_one <= e.interval95_high;
+  }
+}
+
 Count solve(const Family& family, int problems, int first = 1, Ceiling ceiling = Ceiling::one_way) {
   Count count;
   std::mutex mutex;
@@ -178,26 +204,40 @@ Count solve(const Family& family, int problems, int first = 1, Ceiling ceiling =
       ++count.wrong;
     } else {
       ++(o.limit ? count.limits : count.right);
+      std::set<std::string> kinds;
+      for (const std::string& warning : o.found.warnings) kinds.insert(kind_of(warning));
+      for (const std::string& kind : kinds) ++count.warnings[kind];
     }
+    if (o.found.has_answer()) count_intervals(p, o.found, equivalents(p, posed.truth), count);
     if (!o.right()) describe(p, posed, o, family.name, first + i);
     std::fflush(stdout);
   });
   std::printf(
       "  %s: %d problems, %d right, %d limits, %d undecided, %d ambiguous without the right one, %d without an answer, "
       "%d WRONG; "
-      "%d timid; %.2f s each\n",
+      "%d timid; %.1f %% of %d intervals hold the truth; %.2f s each\n",
       family.name.c_str(), count.problems, count.right, count.limits, count.undecided, count.without_right,
-      count.refused, count.wrong, count.timid, count.seconds / std::max(1, count.problems));
+      count.refused, count.wrong, count.timid, 100.0 * count.inside / std::max(1, count.intervals), count.intervals,
+      count.seconds / std::max(1, count.problems));
+  for (const auto& [words, number] : count.warnings)
+    if (10 * number > count.right) std::printf("    warned %d times: %.200s\n", number, words.c_str());
   return count;
+}
+
+/// What the rules for all families ask of counts.
+void expect_sound(const Family& family, const Count& count) {
+  EXPECT_EQ(count.wrong, 0);
+  EXPECT_LE(count.timid, count.problems / 10);
+  constexpr int kEnough = 100;  // of right answers, to say how often something stands in them
+  for (const auto& [words, number] : count.warnings)
+    if (count.right >= kEnough && 20 * number > count.right) ADD_FAILURE() << family.name << ": " << number << " times " << words;
 }
 
 class GlobalSearch : public ::testing::TestWithParam<Family> {};
 
 TEST_P(GlobalSearch, FindsTheOrder) {
   if (GetParam().quick == 0) GTEST_SKIP() << "one takes seconds: only in the long tests";
-  const Count count = solve(GetParam(), GetParam().quick);
-  EXPECT_EQ(count.wrong, 0);
-  EXPECT_LE(count.timid, count.problems / 10);
+  expect_sound(GetParam(), solve(GetParam(), GetParam().quick));
 }
 
 // Between two rings of this droplet the retardance has its maximum: planned by what changes from one end of a pixel to
@@ -211,8 +251,11 @@ TEST(PixelMeansInAFit, APictureWhoseRetardanceTurnsBackWithinAPixel) {
 class LongGlobalSearch : public GlobalSearch {};
 TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   const Count count = solve(GetParam(), problems_or(GetParam().many), first_problem());
-  EXPECT_EQ(count.wrong, 0);
-  EXPECT_LE(count.timid, count.problems / 10);
+  expect_sound(GetParam(), count);
+  // Straight rays through a droplet are held to their interval: of two thousand intervals 95 % scatter by half a percent.
+  if (GetParam().name != std::string("Droplet") || count.intervals < 2000) return;
+  EXPECT_GE(count.inside, 0.93 * count.intervals);
+  EXPECT_LE(count.inside, 0.97 * count.intervals);
 }
 
 // The same on pictures by wave optics, for the families that are finite: 100 of each. Ripples of large droplets may be
