@@ -248,6 +248,21 @@ TEST(PixelMeansInAFit, APictureWhoseRetardanceTurnsBackWithinAPixel) {
   EXPECT_EQ(count.right, 1);
 }
 
+// The modulus of these helices may be anything from nothing to its limit, and the pitch goes with it: at nothing, where
+// light answers to the modulus' square, no derivative says so, and the pitch was 7 to 54 errors off.
+TEST(LimitsInAFit, OthersPayForWhatIsOnlyKnownToBeBelowALimit) {
+  for (const int number : {157, 355, 608, 684, 719}) {
+    const Count count = solve(family("HelixCell"), 1, number);
+    EXPECT_EQ(count.limits, 1) << number;
+  }
+}
+
+// Two valleys as good as each other: by plans a third of the noise of a frame's mean off, one of them was no minimum.
+TEST(ScanInAFit, IsMadeByPlansFinerThanTheMeanOfAFrame) {
+  const Count count = solve(family("TwistedCell"), 1, 476);
+  EXPECT_EQ(count.undecided, 1);
+}
+
 class LongGlobalSearch : public GlobalSearch {};
 TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   const Count count = solve(GetParam(), problems_or(GetParam().many), first_problem());

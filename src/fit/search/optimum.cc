@@ -22,6 +22,17 @@ SolveSummary solve(const Task& task, Optimum& optimum, Eigen::VectorXd& searched
   if (optimum.per_pixel > kMissed) options.function_tolerance = std::max(options.function_tolerance, kOfUnit / rows);
   if (!label.empty()) options.iterations = &optimum.iterations;
   const SolveSummary summary = optimum.problem->solve(searched, options);
+  // Rounding's distance from a bound is the bound: a square's slope there is of no meaning, and not zero.
+  constexpr double kRounding = 1e-9;
+  bool moved = false;
+  for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j) {
+    const Parameter& parameter = task.searched(j);
+    double& x = searched[static_cast<Eigen::Index>(j)];
+    const double width = parameter.upper - parameter.lower;
+    for (const double bound : {parameter.lower, parameter.upper})
+      if (std::isfinite(width) && x != bound && std::abs(x - bound) < kRounding * width) x = bound, moved = true;
+  }
+  if (moved) optimum.problem->evaluate(searched, true);
   optimum.per_pixel = optimum.problem->objective() / std::max(1.0, rows);
   optimum.stopped = optimum.stopped || summary.interrupted;
   return summary;
