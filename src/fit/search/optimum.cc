@@ -16,8 +16,8 @@ SolveSummary solve(const Task& task, Optimum& optimum, Eigen::VectorXd& searched
   options.label = label;
   // Propagation takes a tenth of a second and more an image: to a thousandth of a chi-square unit, not to rounding.
   if (by_waves(optimum.frames)) options.function_tolerance = 3e-8;
-  // Of what is not described, to a thousandth of the unit that its misfit makes of chi-square.
-  constexpr double kMissed = 4, kOfUnit = 1e-3;
+  // Of what is not described, to a thirtieth of the unit that its misfit makes of chi-square.
+  constexpr double kMissed = 4, kOfUnit = 3e-2;
   const double rows = static_cast<double>(optimum.problem->pixel_rows());
   if (optimum.per_pixel > kMissed) options.function_tolerance = std::max(options.function_tolerance, kOfUnit / rows);
   if (!label.empty()) options.iterations = &optimum.iterations;

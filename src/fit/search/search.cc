@@ -42,6 +42,11 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
   return centred;
 }
 
+bool has_own_rays(const Task& task, const Frame& frame, int g) {
+  return std::holds_alternative<Droplet>(task.picture(g).scene.sample) && frame.plan.radial_panels == 0 &&
+         !frame.plan.wave;
+}
+
 /// How many pixels of a frame the search looks at: where every pixel is rays of its own, no more than it takes.
 std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
   const std::size_t share =
@@ -89,6 +94,12 @@ RenderPlan rough_plan(Scene scene, const Observable& observable, const Theta& th
   scene.intensity_accuracy = std::max(scene.intensity_accuracy, kRough);
   return plan(scene, theta, observable);
 }
+/// Of hundreds of pixels, each with noise of its own, that are rays of their own: a third of a percent tells valleys.
+RenderPlan rougher_plan(Scene scene, const Theta& theta) {
+  constexpr double kRough = 3e-3;
+  scene.intensity_accuracy = std::max(scene.intensity_accuracy, kRough);
+  return plan(scene, theta);
+}
 
 /// The problem of what the grid looks at.
 std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, const Theta& theta) {
@@ -100,7 +111,9 @@ std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, co
     sets.push_back(is_one_number(micrograph)
                        ? mean_of(micrograph, frame)
                        : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g))));
-    plans.push_back(is_one_number(micrograph) ? rough_plan(micrograph.scene, task.observable(g), theta) : frame.plan);
+    plans.push_back(is_one_number(micrograph)  ? rough_plan(micrograph.scene, task.observable(g), theta)
+                    : has_own_rays(task, frame, g) ? rougher_plan(micrograph.scene, theta)
+                                                   : frame.plan);
   }
   auto problem = std::make_unique<LeastSquares>(task, std::move(plans), std::move(sets));
   problem->set_misfit(misfit_expected(task, frames, theta));

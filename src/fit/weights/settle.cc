@@ -61,6 +61,9 @@ Optimum with_settled_weights(const Task& task, Optimum optimum) {
     const bool by_signal = std::any_of(optimum.frames.begin(), optimum.frames.end(),
                                        [](const Frame& f) { return f.noise.counts_per_photon != 0; });
     if (pass > 0 && !by_signal) break;  // the weights do not depend on the signal
+    // Nor do they matter to what a model misses by many times its noise, once they are the fitted signal's.
+    constexpr double kMissed = 10;
+    if (pass > 0 && optimum.per_pixel > kMissed) break;
     for (int g = 0; g < task.frames(); ++g) {
       Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
       frame.sigma =
@@ -69,8 +72,8 @@ Optimum with_settled_weights(const Task& task, Optimum optimum) {
     const Candidate before{optimum.searched, 0, projected_information(*optimum.problem)};
     rebuild(task, optimum);
     solve_again(task, optimum, "reweighted");
-    constexpr double kStill = 0.02;  // standard errors
-    if (separation(before, optimum.searched) < kStill) break;
+    constexpr double kStill = 0.02;  // standard errors, as a misfit makes them
+    if (separation(before, optimum.searched) < kStill * std::sqrt(std::max(1.0, optimum.per_pixel))) break;
   }
   return optimum;
 }
