@@ -61,9 +61,11 @@ Optimum with_settled_weights(const Task& task, Optimum optimum) {
     const bool by_signal = std::any_of(optimum.frames.begin(), optimum.frames.end(),
                                        [](const Frame& f) { return f.noise.counts_per_photon != 0; });
     if (pass > 0 && !by_signal) break;  // the weights do not depend on the signal
-    // Nor do they matter to what a model misses by many times its noise, once they are the fitted signal's.
+    // Nor do they matter to what a model misses by many times its noise, once they are the fitted signal's; where one of
+    // several frames seems missed, its own weights may be all that is wrong.
     constexpr double kMissed = 10;
-    if (pass > 0 && optimum.per_pixel > kMissed) break;
+    const bool missed = task.frames() == 1 && optimum.per_pixel > kMissed;
+    if (pass > 0 && missed) break;
     for (int g = 0; g < task.frames(); ++g) {
       Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
       frame.sigma =
@@ -73,7 +75,7 @@ Optimum with_settled_weights(const Task& task, Optimum optimum) {
     rebuild(task, optimum);
     solve_again(task, optimum, "reweighted");
     constexpr double kStill = 0.02;  // standard errors, as a misfit makes them
-    if (separation(before, optimum.searched) < kStill * std::sqrt(std::max(1.0, optimum.per_pixel))) break;
+    if (separation(before, optimum.searched) < kStill * (missed ? std::sqrt(optimum.per_pixel) : 1)) break;
   }
   return optimum;
 }
