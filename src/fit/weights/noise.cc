@@ -281,6 +281,15 @@ NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
   if (samples.size() < 9) return noise;
   const std::vector<Bin> bins = binned(std::move(samples), codes, order);
   if (bins.empty()) return noise;
+  // Levels no farther apart than noise alone takes pixels tell one variance, and no slope: a frame of even light.
+  constexpr double kApart = 4;  // standard deviations
+  double count = 0, variance = 0;
+  for (const Bin& bin : bins) count += bin.count, variance += bin.count * bin.variance;
+  variance = std::max(variance / count, codes.floor());
+  if (bins.back().signal - bins.front().darkest < kApart * std::sqrt(variance)) {
+    noise.read_counts = std::sqrt(variance);
+    return noise;
+  }
   // Calibration took the black level off, a cut is one.
   std::optional<double> black = codes.cut();
   if (!micrograph.variance_scale.empty()) black = 0;
