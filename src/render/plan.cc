@@ -799,7 +799,7 @@ RenderPlan plan_disc(const Scene& scene, const Values<double>& value) {
                                      largest_phase, fastest, *std::max_element(plan.samples.begin(), plan.samples.end()),
                                      *std::max_element(plan.samples.begin(), plan.samples.end())));
   if (fastest > 2 * kPi)
-    plan.warnings.push_back(fmt::format("Fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um leaves these out.", fastest));
+    plan.reasons.push_back(fmt::format("fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um leaves these out", fastest));
   Scene one_colour = scene;  // the bandwidth is part of a disc's model
   one_colour.microscope.bandwidth_nm = 0;
   note_illumination(one_colour, value, largest_phase, plan);
