@@ -120,8 +120,8 @@ struct InputEffect {
 struct Strip {
   std::array<int, 4> roi_px{};    ///< columns and rows x0, y0, x1, y1, ends exclusive
   double frame_scatter = 0;       ///< standard deviation of its frames' mean residuals, of the model intensity; 0 of one frame
-  double reduced_chi_square = 0;  ///< about the fit of the whole, by noise alone
-  std::vector<double> value, stderr_;  ///< searched parameters as the strip has them, to first order; errors with its own misfit
+  double reduced_chi_square = 0;  ///< about its own fit, by noise alone
+  std::vector<double> value, stderr_;  ///< searched parameters by a few steps from the fit of the whole; errors with its own misfit
 };
 
 /// The scan before the solver: objective along one parameter (for the report's chart).
@@ -178,7 +178,7 @@ struct FitResult {
   std::vector<FisherDirection> directions;
   std::vector<InputEffect> inputs;     ///< those that shift a searched parameter by a tenth of its standard error or more; largest first
   std::vector<Strip> strips;           ///< empty where strips agree, or the sample has none
-  std::optional<std::array<int, 4>> trusted_px;  ///< the strips that both agree between frames and are described best; a proposal
+  std::optional<std::array<int, 4>> trusted_px;  ///< columns and rows as Strip::roi_px: strips in which frames agree far better than elsewhere and the model no worse; a proposal
   std::vector<MicrographResult> micrographs;
   std::vector<ScanTrace> scans;
   std::vector<ProfileTrace> profiles;  ///< of the parameters whose interval is `profiled`

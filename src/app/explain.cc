@@ -82,7 +82,7 @@ int run_explain(const Arguments& arguments) {
   for (const auto& more : {config.job.taken_as_exact, chosen.warnings, chosen.left_out}) warnings.insert(warnings.end(), more.begin(), more.end());
 
   // A profile's directions and the rows of a table make no picture.
-  const bool picture = !config.job.measurements.empty() && std::holds_alternative<Picture>(config.job.measurements.front()) && config.scene.microscope.directions.empty() && config.scene.view.width * config.scene.view.height > 1;
+  const bool picture = !config.job.measurements.empty() && config.scene.microscope.directions.empty() && config.scene.view.width * config.scene.view.height > 1;
   bool fitted = false;
   for (int i = 0; i < table.size(); ++i) fitted = fitted || table[i].free;
   constexpr double kMostSeconds = 60;  // images with derivatives

@@ -41,18 +41,15 @@ double quantile(const Picture& m, double share) {
   return *at;
 }
 
-Picture& picture_of(Measurement& measurement) {
-  if (Picture* picture = std::get_if<Picture>(&measurement)) return *picture;
-  throw UserError(Where{}, "a table of signals has no next image", "explain --next is for images");
-}
 const Picture& first_picture(const FitJob& job) { return std::get<Picture>(job.measurements.front()); }
 
 Planned planned(const FitJob& job) {
   Planned p{job, {}, {}, ""};
-  for (Measurement& measurement : p.job.measurements) {
-    Picture& m = picture_of(measurement);
+  std::vector<Picture> seen;
+  for (const Sight& sight : sights_of(job)) {
+    Picture m = *sight.picture;
     const Theta theta = p.job.parameters.values();
-    p.plans.push_back(plan(m.scene, theta));
+    p.plans.push_back(plan(m.scene, theta, sight.observable));
     const Image light = render(m.scene, p.plans.back(), theta, {}, job.options.threads).intensity;
     const auto [low, high] = std::minmax_element(light.values().begin(), light.values().end());
     const double range = *high - *low;
@@ -96,6 +93,14 @@ Planned planned(const FitJob& job) {
       set.sigma[i] = sigma(x, y);
     }
     p.sets.push_back(std::move(set));
+    seen.push_back(std::move(m));
+  }
+  // Masks and noise as they are seen: another shot has the same.
+  for (std::size_t g = 0, at = 0; g < p.job.measurements.size(); ++g) {
+    if (Picture* own = std::get_if<Picture>(&p.job.measurements[g]))
+      *own = std::move(seen[at++]);
+    else
+      at += std::get<Readings>(p.job.measurements[g]).rows.size();
   }
   return p;
 }
@@ -169,6 +174,9 @@ Outlook outlook(const FitJob& job) {
 }
 
 std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
+  for (const Measurement& measurement : job.measurements)
+    if (!std::holds_alternative<Picture>(measurement))
+      throw UserError(Where{}, "a table of numbers has no next image", "explain --next is for images");
   const Unknowns unknowns = Unknowns::of(job);
   int wanted = -1;
   std::string names;

@@ -481,7 +481,7 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   return true;
 }
 
-/// Replaces a reference everywhere in a micrograph.
+/// Replaces a reference everywhere in a scene, or in a picture with its light.
 void replace_ref(Scene& scene, ParameterRef from, ParameterRef to) {
   for_each_ref(scene, [&](ParameterRef& ref) {
     if (ref == from) ref = to;

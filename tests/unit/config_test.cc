@@ -495,6 +495,22 @@ sample:
 microscope: {light: {wavelength_nm: 550}}
 )";
 
+// The radii of a table's rings are one measurement, which tells what is expected of a fit as a picture does.
+TEST(RingTable, IsReadingsOfOneSceneWithAnOutlook) {
+  const birefit::Config config = load_config(BIREFIT_SOURCE_DIR "/fit_configs/linbo3_rings.yaml", ConfigUse::plan);
+  ASSERT_EQ(config.job.measurements.size(), 1u);
+  const Readings& rings = readings(config.job, 0);
+  EXPECT_EQ(rings.observable.quantity, Quantity::ring_radius_cm);
+  EXPECT_EQ(rings.rows.size(), 1u);
+  ASSERT_EQ(static_cast<std::size_t>(rings.values.size()), rings.observable.ring_numbers.size());
+  for (Eigen::Index i = 1; i < rings.values.size(); ++i) EXPECT_GT(rings.values[i], rings.values[i - 1]);  // rings grow outwards
+  for (const ParameterEstimate& expected : outlook(config.job).parameters) {
+    EXPECT_TRUE(std::isfinite(expected.stderr_)) << expected.name;
+    EXPECT_GT(expected.stderr_, 0) << expected.name;
+  }
+  EXPECT_THROW(next_shots(config.job, "birefringence"), UserError);
+}
+
 // No polarizer, no gain: the table has the birefringence itself. Rows of other kinds, texts and all, are left alone.
 TEST_F(Config, TakesTheRowsAndUnitsThatASignalAsksFor) {
   write("a.csv", "kind,celsius,dn,remark\nnematic,20,0.1,ok\nisotropic,58,0,clear\nnematic,30,0.09,\nnematic,40.5,0.08,\nnematic,52,0.01,late\nother,none,x,\n");

@@ -363,7 +363,7 @@ TEST(Fit, MisfitSharedByPixelsWidensTheErrors) {
   EXPECT_NE(wrong.covariance_kind.find("scaled by reduced chi-square"), std::string::npos);
 }
 
-/// 80 one-pixel rows of a sweep whose misfit, far above the noise, is correlated from row to row by `rho`.
+/// 80 rows of a table whose misfit, far above the noise, is correlated from row to row by `rho`.
 FitResult sweep(unsigned seed, double rho) {
   Bar bar(0, 0);
   bar.free(bar.half_wave, 1420, 1300, 1700);
@@ -374,11 +374,22 @@ FitResult sweep(unsigned seed, double rho) {
   for (int row = 0; row < 80; ++row) {
     const double voltage = 50 + 25 * row;
     Picture& micrograph = bar.add_image(1, 1, bar.job.parameters.add_constant("bias", voltage), true);
-    micrograph.name = "sweep.csv:" + std::to_string(row + 2);
-    micrograph.noise = NoiseModel{0.0005, 0, false};
     misfit = rho * misfit + std::sqrt(1 - rho * rho) * gaussian();
     expose(micrograph, 0.8, 0.01, voltage, 0, [&](int, int, double) { return 0.01 * misfit + 0.0005 * gaussian(); });
   }
+  const Picture& first = picture(bar.job, 0);
+  Readings table;
+  table.name = "sweep.csv";
+  table.gain = first.gain, table.offset = first.offset;
+  table.noise = NoiseModel{0.0005, 0, false};
+  table.values.resize(80);
+  for (int row = 0; row < 80; ++row) {
+    const Picture& of = picture(bar.job, static_cast<std::size_t>(row));
+    table.rows.push_back(of.scene);
+    table.lines.push_back(row + 2);
+    table.values[row] = of.values(0, 0);
+  }
+  bar.job.measurements = {table};
   return fit(bar.job);
 }
 

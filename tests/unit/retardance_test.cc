@@ -84,7 +84,11 @@ FitResult fitted_with_prior(double prior, double noise) {
   Parameter& thickness = cell.b.table[cell.thickness];
   thickness.free = true, thickness.value = prior, thickness.lower = 1, thickness.upper = 5000, thickness.prior_sd = 4;
   FitJob job;
-  Readings table{.name = "table", .observable = cell.observable, .gain = cell.b.fixed("gain", 1), .offset = cell.b.fixed("offset", 0), .noise = NoiseModel{noise, 0}};
+  Readings table;
+  table.name = "table";
+  table.observable = cell.observable;
+  table.gain = cell.b.fixed("gain", 1), table.offset = cell.b.fixed("offset", 0);
+  table.noise = NoiseModel{noise, 0};
   table.values.resize(12);
   for (int i = 0; i < 12; ++i) {
     Scene scene = cell.scene;

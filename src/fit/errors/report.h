@@ -36,7 +36,7 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
 bool judge_description(const Task& task, const Optimum& optimum, double chi_square, int places, FitResult& result);
 void report_micrographs(const Task& task, const Optimum& optimum, FitResult& result);
 /// Where strips of a bar, plate or disc that the model does not describe tell different things: result.strips, a
-/// warning, and a region where both the frames' scatter and chi-square are far lower than elsewhere.
+/// warning, and a region where frames scatter far less than elsewhere and chi-square is below its median.
 void compare_strips(const Task& task, const Optimum& optimum, FitResult& result);
 void collect_warnings(const Task& task, const Optimum& optimum, FitResult& result);
 

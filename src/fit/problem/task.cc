@@ -22,7 +22,7 @@ std::shared_ptr<Picture> as_picture(const Readings& readings, const Scene& scene
 
 void add_sights(const Readings& readings, std::vector<Sight>& sights) {
   if (readings.observable.quantity == Quantity::ring_radius_cm) {
-    sights.push_back({as_picture(readings, readings.rows.front(), readings.values), readings.observable, ""});
+    sights.push_back({as_picture(readings, readings.rows.front(), readings.values), readings.observable, readings.name});
     return;
   }
   for (std::size_t i = 0; i < readings.rows.size(); ++i) {
@@ -56,7 +56,7 @@ std::vector<Sight> sights_of(const FitJob& job) {
   std::vector<Sight> sights;
   for (const Measurement& measurement : job.measurements) {
     if (const Picture* picture = std::get_if<Picture>(&measurement))
-      sights.push_back({std::shared_ptr<const Picture>(std::shared_ptr<void>(), picture), {}, ""});  // the job keeps it
+      sights.push_back({std::shared_ptr<const Picture>(std::shared_ptr<void>(), picture), {}, picture->name});  // the job keeps it
     else
       add_sights(std::get<Readings>(measurement), sights);
   }

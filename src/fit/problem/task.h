@@ -29,7 +29,7 @@ struct Unknowns {
 struct Sight {
   std::shared_ptr<const Picture> picture;  ///< the job's, or its own
   Observable observable;
-  std::string table;  ///< name of the table that it is a row of; "" for pictures and rings
+  std::string table;  ///< name of the table that it is a row of; of pictures and rings their own
 };
 
 /// The sights of a job's measurements, in their order. The job has to outlive them.
