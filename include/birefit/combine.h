@@ -13,8 +13,8 @@ namespace birefit {
 struct Posterior {
   std::vector<std::string> names;  ///< order of mean and covariance
   Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;      ///< positive definite
-  double degrees_of_freedom = 0;   ///< of the Student t behind its intervals
+  Eigen::MatrixXd covariance;     ///< positive definite
+  double degrees_of_freedom = 0;  ///< of the Student t behind its intervals
 };
 
 /// The named parameters alone, the others integrated out; nothing where one is missing or has no positive variance.
@@ -26,11 +26,13 @@ struct SharedEstimate {
   double chi_square = 0;       ///< of the fits' own values about the common ones
   int chi_square_degrees = 0;  ///< its expectation
   int fits = 0;
-  bool consistent = true;      ///< false: chi_square is exceeded by chance less than once in a thousand times; covariance is scaled by chi_square / degrees
+  /// false: chi_square is exceeded by chance less than once in a thousand times; covariance is scaled by chi_square /
+  /// degrees
+  bool consistent = true;
 };
 
-/// Combines fits that share nothing but these parameters: posteriors over the same names in the same order, each of which
-/// holds `prior` (of all or some of them), which counts once.
+/// Combines fits that share nothing but these parameters: posteriors over the same names in the same order, each of
+/// which holds `prior` (of all or some of them), which counts once.
 SharedEstimate combine(const std::vector<Posterior>& fits, const std::optional<Posterior>& prior);
 
 /// The posterior of one fit once the others have been heard about what is shared.

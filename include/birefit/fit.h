@@ -19,23 +19,25 @@
 namespace birefit {
 
 struct FitOptions {
-  int threads = 0;             ///< 0 = all cores
+  int threads = 0;  ///< 0 = all cores
   int max_iterations = 100;
-  int scan_pixels = 4000;      ///< at most, of the coarse scan, spread over all micrographs
-  int scan_candidates = 12;    ///< starts polished after the scan, of four times as many looked at; more where the image is described badly
+  int scan_pixels = 4000;  ///< at most, of the coarse scan, spread over all micrographs
+  /// starts polished after the scan, of four times as many looked at; more where the image is described badly
+  int scan_candidates = 12;
   bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
-  bool choose_waves = false;   ///< Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
+  /// Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
+  bool choose_waves = false;
   double max_seconds = 60;
-  bool choose_rays = false;    ///< straight or curved rays (Scene::rays) by what curved ones would change
+  bool choose_rays = false;  ///< straight or curved rays (Scene::rays) by what curved ones would change
   std::function<void(const std::string&)> progress;  ///< called with one line now and then; may be empty
   const std::atomic<bool>* interrupted = nullptr;    ///< set by Ctrl-C: end with the best state so far
 };
 
 /// One of several states that a sample may be in and that no parameter leads from one to the other.
 struct SampleBranch {
-  std::string name;            ///< "hedgehog", "ring"
-  std::vector<Sample> samples; ///< of each picture in this branch
-  std::vector<int> idle;       ///< parameters that this branch does not have
+  std::string name;             ///< "hedgehog", "ring"
+  std::vector<Sample> samples;  ///< of each picture in this branch
+  std::vector<int> idle;        ///< parameters that this branch does not have
 };
 
 struct FitJob {
@@ -45,14 +47,16 @@ struct FitJob {
   std::optional<JointPrior> prior;
   FitOptions options;
   std::vector<std::string> warnings;  ///< gathered while reading the input
-  std::vector<std::string> taken_as_exact;  ///< sentences: what nobody has stated and the model therefore takes for granted
+  /// sentences: what nobody has stated and the model therefore takes for granted
+  std::vector<std::string> taken_as_exact;
 };
 
 struct ParameterEstimate {
   std::string name, unit;
-  double value = 0, stderr_ = 0;       ///< standard error; NaN when not identifiable
+  double value = 0, stderr_ = 0;                   ///< standard error; NaN when not identifiable
   double interval95_low = 0, interval95_high = 0;  ///< Student t with FitResult::interval_degrees_of_freedom
-  bool profiled = false;   ///< interval95 is where the profile likelihood falls as far: value +- t stderr is not that place here
+  /// interval95 is where the profile likelihood falls as far: value +- t stderr is not that place here
+  bool profiled = false;
   double start = 0, lower = 0, upper = 0;
   std::optional<double> prior_value, prior_sd;
   bool at_bound = false;
@@ -69,47 +73,54 @@ inline constexpr double kAmbiguousOdds = 0.01;
 struct RivalMinimum {
   Theta theta;
   double chi_square = 0;
-  /// Of its evidence against the reported minimum's: likelihood_ratio times the ratio of the shares of the bounds that either takes up.
+  /// Of its evidence against the reported minimum's: likelihood_ratio times the ratio of the shares of the bounds that
+  /// either takes up.
   double odds = 0;
-  double likelihood_ratio = 0;  ///< exp(-delta chi-square / 2 / max(1, reduced chi-square)); above 1 where the reported minimum owes its odds to its width
-  /// Makes the answer ambiguous: odds or likelihood_ratio above kAmbiguousOdds; among a sphere's ripples odds alone, and not within two standard errors of the reported minimum.
+  /// exp(-delta chi-square / 2 / max(1, reduced chi-square)); above 1 where the reported minimum owes its odds to its
+  /// width
+  double likelihood_ratio = 0;
+  /// Makes the answer ambiguous: odds or likelihood_ratio above kAmbiguousOdds; among a sphere's ripples odds alone,
+  /// and not within two standard errors of the reported minimum.
   bool counts = true;
 };
 
 /// How one branch of the sample did.
 struct BranchResult {
   std::string name;
-  double chi_square = 0;   ///< all branches by the noise of the best one
-  int parameters = 0;      ///< free ones
-  double odds = 0;         ///< of its evidence against the reported branch's: exp(-difference of (chi-square / max(1, reduced) + priors' - 2 log_share) / 2)
+  double chi_square = 0;  ///< all branches by the noise of the best one
+  int parameters = 0;     ///< free ones
+  /// of its evidence against the reported branch's: exp(-difference of (chi-square / max(1, reduced) + priors' - 2
+  /// log_share) / 2)
+  double odds = 0;
   bool reported = false;
 };
 
 /// One eigen-direction of the scaled Fisher matrix (each parameter in units of its start range or value).
 struct FisherDirection {
   std::vector<std::pair<std::string, double>> weights;  ///< unit vector, scaled
-  double stderr_ = 0;     ///< of the scaled combination
+  double stderr_ = 0;                                   ///< of the scaled combination
   bool identifiable = true;
-  std::string words;      ///< "birefringence up 0.01 with diameter_um down 0.4: only their combination is known ..."
+  std::string words;  ///< "birefringence up 0.01 with diameter_um down 0.4: only their combination is known ..."
 };
 
 /// What became of one frame: a picture, or a table's row, or its rings, as an image of as many pixels.
 struct MicrographResult {
   std::string name;
-  Image fitted;     ///< in units of the micrograph's values
-  Image residual;   ///< values - fitted; NaN where not used
-  Image sigma;      ///< standard deviation used for whitening
-  int used = 0;     ///< pixels
-  int outside = 0;  ///< usable pixels that the sample takes out: around a disc's forces, along its rim and beyond
-  int outliers = 0; ///< pixels left out because they stood out of the residual (FitOptions::leave_out_outliers)
+  Image fitted;      ///< in units of the micrograph's values
+  Image residual;    ///< values - fitted; NaN where not used
+  Image sigma;       ///< standard deviation used for whitening
+  int used = 0;      ///< pixels
+  int outside = 0;   ///< usable pixels that the sample takes out: around a disc's forces, along its rim and beyond
+  int outliers = 0;  ///< pixels left out because they stood out of the residual (FitOptions::leave_out_outliers)
   double chi_square = 0;
-  double residual_rms = 0;        ///< units of the values
-  double signal_range = 0;        ///< of the fitted values, for judging the rms; of a one-pixel row, its table's
+  double residual_rms = 0;  ///< units of the values
+  double signal_range = 0;  ///< of the fitted values, for judging the rms; of a one-pixel row, its table's
   NoiseModel noise;
   RenderPlan plan;
 };
 
-/// What the estimates hang on: an input that all micrographs share and the fit takes as exact, and what `step` more of it would do to them.
+/// What the estimates hang on: an input that all micrographs share and the fit takes as exact, and what `step` more of
+/// it would do to them.
 struct InputEffect {
   std::string name, unit;
   double value = 0, step = 0;  ///< step: 1 deg, 1 px, else 1 % of the value
@@ -118,10 +129,12 @@ struct InputEffect {
 
 /// A strip of a bar, plate or disc by itself, the rest of the image left out.
 struct Strip {
-  std::array<int, 4> roi_px{};    ///< columns and rows x0, y0, x1, y1, ends exclusive
-  double frame_scatter = 0;       ///< standard deviation of its frames' mean residuals, of the model intensity; 0 of one frame
+  std::array<int, 4> roi_px{};  ///< columns and rows x0, y0, x1, y1, ends exclusive
+  /// standard deviation of its frames' mean residuals, of the model intensity; 0 of one frame
+  double frame_scatter = 0;
   double reduced_chi_square = 0;  ///< about its own fit, by noise alone
-  std::vector<double> value, stderr_;  ///< searched parameters by a few steps from the fit of the whole; errors with its own misfit
+  /// searched parameters by a few steps from the fit of the whole; errors with its own misfit
+  std::vector<double> value, stderr_;
 };
 
 /// The scan before the solver: objective along one parameter (for the report's chart).
@@ -149,9 +162,10 @@ struct Coverage {
   int wrong = 0;              ///< answered, with a searched parameter more than 5 standard errors off: what must not be
   struct Of {
     std::string name;
-    double inside68 = 0, inside95 = 0;  ///< fractions of the answered fits whose interval holds the value simulated with
-    double spread = 0;                  ///< standard deviation of the estimates over the mean standard error
-    double bias = 0;                    ///< mean error over the mean standard error
+    /// fractions of the answered fits whose interval holds the value simulated with
+    double inside68 = 0, inside95 = 0;
+    double spread = 0;  ///< standard deviation of the estimates over the mean standard error
+    double bias = 0;    ///< mean error over the mean standard error
   };
   std::vector<Of> parameters;
 };
@@ -161,24 +175,32 @@ struct FitResult {
   bool interrupted = false;
   bool ambiguous = false;
   bool identifiable = true;
-  bool pinned = false;   ///< at a bound that is no physical limit
-  bool described = true; ///< false: the model leaves more than half of what the images show beyond their noise
-  double left_over = 0;  ///< that share: 0 a perfect model, 1 no better than a constant image (below 0 by chance; 0 too where there is nothing to compare with)
+  bool pinned = false;    ///< at a bound that is no physical limit
+  bool described = true;  ///< false: the model leaves more than half of what the images show beyond their noise
+  /// that share: 0 a perfect model, 1 no better than a constant image (below 0 by chance; 0 too where there is nothing
+  /// to compare with)
+  double left_over = 0;
   std::vector<ParameterEstimate> parameters;  ///< free ones in table order: searched first, then linear
   std::vector<std::string> names;             ///< order of correlation and covariance
   Eigen::MatrixXd covariance, correlation;    ///< parameters' own units
-  std::string covariance_kind;  ///< "white noise" | "scaled by reduced chi-square" | "clustered by image" | ..., in words
-  double interval_degrees_of_freedom = 0;     ///< of the t quantile behind interval95
+  /// "white noise" | "scaled by reduced chi-square" | "clustered by image" | ..., in words
+  std::string covariance_kind;
+  double interval_degrees_of_freedom = 0;  ///< of the t quantile behind interval95
   double chi_square = 0, reduced_chi_square = 0;
   int degrees_of_freedom = 0;
   std::optional<JointPrior::FrameScatter> frame_scatter;  ///< several images in one fit
-  double log_share = 0;  ///< ln of the share of the bounds that the answer takes up: its highest likelihood times this share is the branch's evidence
+  /// ln of the share of the bounds that the answer takes up: its highest likelihood times this share is the branch's
+  /// evidence
+  double log_share = 0;
   std::vector<RivalMinimum> rivals;
   std::vector<BranchResult> branches;  ///< empty unless the job had several
   std::vector<FisherDirection> directions;
-  std::vector<InputEffect> inputs;     ///< those that shift a searched parameter by a tenth of its standard error or more; largest first
-  std::vector<Strip> strips;           ///< empty where strips agree, or the sample has none
-  std::optional<std::array<int, 4>> trusted_px;  ///< columns and rows as Strip::roi_px: strips in which frames agree far better than elsewhere and the model no worse; a proposal
+  /// those that shift a searched parameter by a tenth of its standard error or more; largest first
+  std::vector<InputEffect> inputs;
+  std::vector<Strip> strips;  ///< empty where strips agree, or the sample has none
+  /// columns and rows as Strip::roi_px: strips in which frames agree far better than elsewhere and the model no worse;
+  /// a proposal
+  std::optional<std::array<int, 4>> trusted_px;
   std::vector<MicrographResult> micrographs;
   std::vector<ScanTrace> scans;
   std::vector<ProfileTrace> profiles;  ///< of the parameters whose interval is `profiled`
@@ -186,34 +208,38 @@ struct FitResult {
   std::vector<Iteration> iterations;
   int evaluations = 0;
   double seconds = 0;
-  std::vector<std::string> warnings;   ///< sentences; empty when there is nothing to warn of
-  std::vector<std::string> taken_as_exact;  ///< sentences: what the model takes for granted wherever such a sample is fitted so
-  std::string verdict;                 ///< one paragraph in words
-  std::string solver_report;           ///< Ceres' own
-  Theta theta;                         ///< full table at the optimum
+  std::vector<std::string> warnings;  ///< sentences; empty when there is nothing to warn of
+  /// sentences: what the model takes for granted wherever such a sample is fitted so
+  std::vector<std::string> taken_as_exact;
+  std::string verdict;        ///< one paragraph in words
+  std::string solver_report;  ///< Ceres' own
+  Theta theta;                ///< full table at the optimum
 
   /// True when the run deserves exit code 0.
   bool has_answer() const { return converged && !ambiguous && identifiable && !pinned && described && !interrupted; }
 };
 
-/// Estimates every free parameter; of several branches, those of the one with the best odds, and `ambiguous` when another
-/// has odds above kAmbiguousOdds. Deterministic: same job, same bits, whatever the number of threads.
-/// A job without usable pixels throws UserError; everything about the data's quality is in the result.
+/// Estimates every free parameter; of several branches, those of the one with the best odds, and `ambiguous` when
+/// another has odds above kAmbiguousOdds. Deterministic: same job, same bits, whatever the number of threads. A job
+/// without usable pixels throws UserError; everything about the data's quality is in the result.
 FitResult fit(const FitJob& job);
 
-/// Does the interval hold what it says? `draws` images simulated at `result`, fitted as `job` asks, on all threads. Where the fit's misfit
-/// exceeds its noise, its residuals serve as noise, in blocks drawn with replacement and turned in sign, so that what neighbouring pixels
-/// share stays shared. Deterministic. Ends early, with fewer draws, when interrupted.
+/// Does the interval hold what it says? `draws` images simulated at `result`, fitted as `job` asks, on all threads.
+/// Where the fit's misfit exceeds its noise, its residuals serve as noise, in blocks drawn with replacement and turned
+/// in sign, so that what neighbouring pixels share stays shared. Deterministic. Ends early, with fewer draws, when
+/// interrupted.
 Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws);
 
-/// What images of the job's scenes tell of its free parameters, at their start values: before a fit, or before the image is taken.
+/// What images of the job's scenes tell of its free parameters, at their start values: before a fit, or before the
+/// image is taken.
 struct Outlook {
   std::vector<ParameterEstimate> parameters;  ///< value = start, stderr_ = Cramer-Rao bound (NaN: not determined)
   std::vector<FisherDirection> directions;
   bool identifiable = true;
-  std::string noise;                          ///< where the noise comes from, in words
+  std::string noise;  ///< where the noise comes from, in words
 };
-/// Micrographs may be without values: then their scene's view counts, the noise model given, or else 1 % of the image's range.
+/// Micrographs may be without values: then their scene's view counts, the noise model given, or else 1 % of the image's
+/// range.
 Outlook outlook(const FitJob& job);
 
 /// One more image beside the job's own, with a gain and an offset of its own.
@@ -221,8 +247,8 @@ struct Shot {
   std::string words;   ///< "analyser turned by 45 deg"
   double stderr_ = 0;  ///< of the parameter asked for, with the job's images and this one
 };
-/// Which image to take next: candidates, best first; "the same again" is among them. Throws UserError when `parameter` is not a free
-/// parameter of the job (suggests the nearest) or the job is a table of signals.
+/// Which image to take next: candidates, best first; "the same again" is among them. Throws UserError when `parameter`
+/// is not a free parameter of the job (suggests the nearest) or the job is a table of signals.
 std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter);
 
 }  // namespace birefit

@@ -12,35 +12,37 @@ namespace birefit {
 
 /// A table of signal against something (`signal:`), which is the job's measurement of the same number.
 struct SignalTable {
-  std::string name;          ///< file name
-  std::size_t first = 0;     ///< of its rows among FitResult::micrographs
-  std::string path;          ///< parameter that its first column sets
-  std::vector<double> x;     ///< that column, growing
-  std::vector<int> line;     ///< of each row in the file
+  std::string name;                 ///< file name
+  std::size_t first = 0;            ///< of its rows among FitResult::micrographs
+  std::string path;                 ///< parameter that its first column sets
+  std::vector<double> x;            ///< that column, growing
+  std::vector<int> line;            ///< of each row in the file
   std::string quantity = "signal";  ///< what was measured, for its axis
 };
 
 struct Config;
-/// What the rows of a config's tables say about themselves, in sentences: which stand out of their neighbours, whether what is measured depends on when
-/// it was measured.
+/// What the rows of a config's tables say about themselves, in sentences: which stand out of their neighbours, whether
+/// what is measured depends on when it was measured.
 std::vector<std::string> describe_rows(const Config& config);
 
 /// What a config describes, read and checked completely; every mistake in it was reported at once (UserError).
 struct Config {
   std::filesystem::path path;
-  std::string text;       ///< the file as read, for the echo
-  FitJob job;             ///< measurements empty for render-only configs
-  std::vector<SignalTable> signals;  ///< empty when the job is of images
-  Scene scene;            ///< of the first measurement, or of `image_size_px`
-  Observable observable;  ///< what is measured in it
+  std::string text;                           ///< the file as read, for the echo
+  FitJob job;                                 ///< measurements empty for render-only configs
+  std::vector<SignalTable> signals;           ///< empty when the job is of images
+  Scene scene;                                ///< of the first measurement, or of `image_size_px`
+  Observable observable;                      ///< what is measured in it
   std::vector<std::filesystem::path> inputs;  ///< every file that was read beside the config
-  std::string fingerprint;  ///< of a frame of a series: all that determines its fit (birefit/series.h); goes into fit.json
+  /// of a frame of a series: all that determines its fit (birefit/series.h); goes into fit.json
+  std::string fingerprint;
 };
 
 enum class ConfigUse {
   fit,     ///< images are required and loaded, `fit: auto` starts come from them
   render,  ///< images are not loaded; the view comes from image_size_px or from the image's header
-  plan,    ///< as for a fit; where no image is named, the view comes from image_size_px and the micrograph has no values
+  /// as for a fit; where no image is named, the view comes from image_size_px and the micrograph has no values
+  plan,
 };
 
 /// Reads a config (docs/configuration.md). `image` replaces the single micrograph's file.
@@ -51,16 +53,16 @@ Config load_config(const std::filesystem::path& path, ConfigUse use,
 
 struct ImageRequest {
   std::filesystem::path path;
-  std::optional<int> page;             ///< of a multi-page file; required when there are several
-  std::string channel;                 ///< "r" | "g" | "b" | "mean"; "" = not chosen
-  Where where;                         ///< of the config entry, for errors
+  std::optional<int> page;  ///< of a multi-page file; required when there are several
+  std::string channel;      ///< "r" | "g" | "b" | "mean"; "" = not chosen
+  Where where;              ///< of the config entry, for errors
 };
 
 struct LoadedImage {
-  Image values;            ///< as stored: counts for integers, values for floats; linear light not yet applied
-  int bits = 0;            ///< 8 or 16 for integers, 32 for float
-  double top_code = 0;     ///< 255, 65535, or 0 for floats
-  double pixel_size_um = 0;  ///< 0 = the file does not state it
+  Image values;                    ///< as stored: counts for integers, values for floats; linear light not yet applied
+  int bits = 0;                    ///< 8 or 16 for integers, 32 for float
+  double top_code = 0;             ///< 255, 65535, or 0 for floats
+  double pixel_size_um = 0;        ///< 0 = the file does not state it
   std::vector<std::string> notes;  ///< "alpha channel ignored", ...
 };
 

@@ -23,8 +23,8 @@ struct NoiseModel {
   double black_counts = 0;       ///< the signal up to which there is read noise alone: a camera's black level
 };
 
-/// What light adds across an image: `coefficient`, in units of the values, times a shape; to the gain (uneven illumination, vignetting) or
-/// to the offset (a tilted background).
+/// What light adds across an image: `coefficient`, in units of the values, times a shape; to the gain (uneven
+/// illumination, vignetting) or to the offset (a tilted background).
 struct UnevenLight {
   /// X right, Y up, from the middle of the image, 1 at its edge along the longer side; square: X^2 + Y^2.
   enum class Shape { x, y, square };
@@ -35,12 +35,13 @@ struct UnevenLight {
 
 /// One micrograph. Values are counts, or transmission when calibration frames were given.
 struct Picture {
-  std::string name;   ///< for reports: the file name
+  std::string name;  ///< for reports: the file name
   Scene scene;
   Image values;
-  Mask mask;          ///< 1 = usable; dead, saturated, non-finite, user-masked and out-of-ROI pixels are 0
-  Image variance_scale;  ///< calibration: variance of a value per variance of a count, (1/(parallel - dark))^2; else empty
-  ParameterRef gain, offset;  ///< linear: value = gain * intensity + offset; several pictures may share one
+  Mask mask;  ///< 1 = usable; dead, saturated, non-finite, user-masked and out-of-ROI pixels are 0
+  /// calibration: variance of a value per variance of a count, (1/(parallel - dark))^2; else empty
+  Image variance_scale;
+  ParameterRef gain, offset;        ///< linear: value = gain * intensity + offset; several pictures may share one
   std::vector<UnevenLight> uneven;  ///< linear as well
   std::optional<NoiseModel> noise;  ///< in counts; else estimated from the image
   /// Pixel counts by reason, for the report.
@@ -50,12 +51,12 @@ struct Picture {
 /// A table of numbers. Every row is a measurement of its own, in a scene of its own; the radii of rings are all of one
 /// scene, `rows` then having one entry.
 struct Readings {
-  std::string name;           ///< of the table: the file name
-  Observable observable;      ///< what the values are
+  std::string name;       ///< of the table: the file name
+  Observable observable;  ///< what the values are
   std::vector<Scene> rows;
-  std::vector<int> lines;     ///< of the rows in the file, for messages
-  Eigen::VectorXd values;     ///< one a row, or one a ring
-  ParameterRef gain, offset;  ///< linear: value = gain * observable + offset
+  std::vector<int> lines;           ///< of the rows in the file, for messages
+  Eigen::VectorXd values;           ///< one a row, or one a ring
+  ParameterRef gain, offset;        ///< linear: value = gain * observable + offset
   std::optional<NoiseModel> noise;  ///< in units of the values; needed where rows are measurements of their own
 };
 

@@ -15,14 +15,14 @@ namespace birefit {
 
 /// What to do with a number: the three forms of docs/configuration.md.
 struct Parameter {
-  std::string name;   ///< config path, e.g. "sample.droplet.diameter_um"
-  std::string unit;   ///< "um", "deg", "V", "K", "px" or "" (dimensionless)
-  double value = 0;   ///< start of a fit, and what `render` uses
-  bool free = false;  ///< estimated by the fit
-  bool automatic = false;  ///< `fit: auto`: start (and bounds) come from the image
+  std::string name;                                         ///< config path, e.g. "sample.droplet.diameter_um"
+  std::string unit;                                         ///< "um", "deg", "V", "K", "px" or "" (dimensionless)
+  double value = 0;                                         ///< start of a fit, and what `render` uses
+  bool free = false;                                        ///< estimated by the fit
+  bool automatic = false;                                   ///< `fit: auto`: start (and bounds) come from the image
   double lower = -std::numeric_limits<double>::infinity();  ///< fit bound
   double upper = std::numeric_limits<double>::infinity();   ///< fit bound
-  std::optional<double> prior_sd;  ///< Gaussian prior centred on `value`
+  std::optional<double> prior_sd;                           ///< Gaussian prior centred on `value`
   /// A bound that equals one of these is a physical limit (a length of zero, a pure number range), so that a fit
   /// pinned there is an honest one-sided limit and not a failure.
   double physical_lower = -std::numeric_limits<double>::infinity();
@@ -68,7 +68,8 @@ struct JointPrior {
   /// What one whole frame is off by, as the earlier fit measured it between its frames (FitResult::frame_scatter);
   /// nothing when it had a single frame.
   struct FrameScatter {
-    double intensity_sd = 0;  ///< of an error added to the model intensity of every pixel of a frame (residual / |gain|)
+    /// of an error added to the model intensity of every pixel of a frame (residual / |gain|)
+    double intensity_sd = 0;
     double degrees_of_freedom = 0;
   };
   std::optional<FrameScatter> frame_scatter;

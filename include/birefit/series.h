@@ -1,6 +1,6 @@
 #pragma once
-// A series: many images of one setup, each fitted by itself from where its neighbour ended, with parameters of its own and
-// shared ones (docs/configuration.md, "A series").
+// A series: many images of one setup, each fitted by itself from where its neighbour ended, with parameters of its own
+// and shared ones (docs/configuration.md, "A series").
 
 #include <filesystem>
 #include <optional>
@@ -19,7 +19,8 @@ struct SeriesFrame {
     std::string text;
     Where where;
   };
-  std::string name;         ///< the file's name without extension, of which there is no second: the folder of its results
+  /// the file's name without extension, of which there is no second: the folder of its results
+  std::string name;
   std::string file;         ///< as found, from the config's folder on
   Where where;              ///< of the table's row, else of `files`
   std::vector<Cell> cells;  ///< one for each of ImageSeries::columns
@@ -44,11 +45,12 @@ ImageSeries load_series(const std::filesystem::path& path);
 /// The config of one frame, as if it were alone: it can be fitted.
 Config load_frame(const ImageSeries& series, std::size_t frame);
 
-/// Starts a frame where its neighbour ended. What has a start of its own keeps it: the centre of a prior, what is found in the image, and
-/// what the neighbour left at a bound, where derivatives may vanish.
+/// Starts a frame where its neighbour ended. What has a start of its own keeps it: the centre of a prior, what is found
+/// in the image, and what the neighbour left at a bound, where derivatives may vanish.
 void start_from(Config& frame, const FitResult& neighbour);
 
-/// All that determines a frame's fit, in 16 hexadecimal digits: program, config, row, starts and the content of every file read.
+/// All that determines a frame's fit, in 16 hexadecimal digits: program, config, row, starts and the content of every
+/// file read.
 std::string fingerprint_of(const Config& frame);
 
 /// A fit as its fit.json tells it: estimates, covariance, verdicts and warnings, no images.
@@ -65,7 +67,8 @@ std::string verdict_word(const FitResult& result);
 /// All frames with what they share settled.
 struct SeriesResult {
   std::vector<std::optional<FitResult>> alone;  ///< each frame by itself; nothing for those not fitted yet
-  /// The same, informed about the shared parameters by all other frames. Frames without an answer stay as they were: they inform none.
+  /// The same, informed about the shared parameters by all other frames. Frames without an answer stay as they were:
+  /// they inform none.
   std::vector<std::optional<FitResult>> frames;
   std::optional<SharedEstimate> shared;
   std::vector<std::string> warnings;

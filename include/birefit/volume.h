@@ -7,17 +7,20 @@
 
 namespace birefit {
 
-/// The tensor s n n^T at every node, n the director (unit length, sign without meaning), s the order there over the order that
-/// the material's birefringence belongs to; 0 = no liquid crystal or an isotropic one
-/// (to wave optics all zero is the host). Between nodes the tensor is
-/// interpolated, never the vector. Light passes from the first layer of z to the last; x points right and y up in the image.
+/// The tensor s n n^T at every node, n the director (unit length, sign without meaning), s the order there over the
+/// order that the material's birefringence belongs to; 0 = no liquid crystal or an isotropic one (to wave optics all
+/// zero is the host). Between nodes the tensor is interpolated, never the vector. Light passes from the first layer of
+/// z to the last; x points right and y up in the image.
 struct VolumeGrid {
-  int nx = 0, ny = 0, nz = 0;               ///< nodes, at least 2 along each
-  std::array<double, 3> spacing_um{};       ///< between nodes along x, y, z, > 0: the box is (nx - 1) spacing_um[0] wide
-  std::vector<std::array<double, 6>> nodes; ///< xx, yy, zz, xy, xz, yz; x runs fastest, then y
+  int nx = 0, ny = 0, nz = 0;  ///< nodes, at least 2 along each
+  /// between nodes along x, y, z, > 0: the box is (nx - 1) spacing_um[0] wide
+  std::array<double, 3> spacing_um{};
+  std::vector<std::array<double, 6>> nodes;  ///< xx, yy, zz, xy, xz, yz; x runs fastest, then y
 
   std::size_t at(int x, int y, int z) const {
-    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(nx) + static_cast<std::size_t>(x);
+    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(y)) *
+               static_cast<std::size_t>(nx) +
+           static_cast<std::size_t>(x);
   }
 };
 

@@ -28,8 +28,10 @@ std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) out += fmt::format("\\u{:04x}", static_cast<int>(c));
-    else out += c;
+    if (static_cast<unsigned char>(c) < 0x20)
+      out += fmt::format("\\u{:04x}", static_cast<int>(c));
+    else
+      out += c;
   }
   return out + "\"";
 }
@@ -42,12 +44,15 @@ std::string quoted(const std::vector<std::string>& list) {
 
 std::string json_number(double x) { return std::isfinite(x) ? fmt::format("{}", x) : "null"; }
 
-/// Of one image on one thread: measured, the best of three; as the planner says where it foresees more than a second, and of rays what
-/// some pixels one by one make of it where that is more than five: an upper bound then, since pictures share their rays.
+/// Of one image on one thread: measured, the best of three; as the planner says where it foresees more than a second,
+/// and of rays what some pixels one by one make of it where that is more than five: an upper bound then, since pictures
+/// share their rays.
 double seconds_an_image(const Scene& scene, const RenderPlan& chosen, const Theta& theta) {
   if (chosen.cost_seconds > 1) return chosen.cost_seconds;
   using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  const auto since = [](Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+  };
   const int width = scene.view.width, height = scene.view.height;
   if (scene.microscope.directions.empty() && !chosen.wave) {
     std::vector<std::array<int, 2>> some;
@@ -57,15 +62,18 @@ double seconds_an_image(const Scene& scene, const RenderPlan& chosen, const Thet
     render_pixels(scene, chosen, theta, {some[0]}, {}, 1);
     const auto begin = Clock::now();
     render_pixels(scene, chosen, theta, some, {}, 1);
-    const double shared = std::chrono::duration<double>(begin - first).count(), each = (since(begin) - shared) / static_cast<double>(some.size() - 1);
+    const double shared = std::chrono::duration<double>(begin - first).count(),
+                 each = (since(begin) - shared) / static_cast<double>(some.size() - 1);
     if (const double bound = shared + each * width * height; bound > 5) return bound;
   }
   double best = std::numeric_limits<double>::infinity(), all = 0;
   Rendering image;
   for (int i = 0; i < 3 && all < 1; ++i) {
     const auto begin = Clock::now();
-    if (scene.microscope.directions.empty()) render(scene, chosen, theta, {}, 1, image);
-    else jones(scene, chosen, theta);
+    if (scene.microscope.directions.empty())
+      render(scene, chosen, theta, {}, 1, image);
+    else
+      jones(scene, chosen, theta);
     const double seconds = since(begin);
     best = std::min(best, seconds);
     all += seconds;
@@ -79,42 +87,53 @@ int run_explain(const Arguments& arguments) {
   const Theta theta = table.values();
   const RenderPlan chosen = plan(config.scene, theta, config.observable);
   std::vector<std::string> warnings = config.job.warnings;
-  for (const auto& more : {config.job.taken_as_exact, chosen.warnings, chosen.left_out}) warnings.insert(warnings.end(), more.begin(), more.end());
+  for (const auto& more : {config.job.taken_as_exact, chosen.warnings, chosen.left_out})
+    warnings.insert(warnings.end(), more.begin(), more.end());
 
   // A profile's directions and the rows of a table make no picture.
-  const bool picture = !config.job.measurements.empty() && config.scene.microscope.directions.empty() && config.scene.view.width * config.scene.view.height > 1;
+  const bool picture = !config.job.measurements.empty() && config.scene.microscope.directions.empty() &&
+                       config.scene.view.width * config.scene.view.height > 1;
   bool fitted = false;
   for (int i = 0; i < table.size(); ++i) fitted = fitted || table[i].free;
   constexpr double kMostSeconds = 60;  // images with derivatives
   const double seconds = seconds_an_image(config.scene, chosen, theta);
   const bool quick = seconds * table.size() < kMostSeconds;
-  const std::optional<Outlook> expected = picture && fitted && quick ? std::optional(outlook(config.job)) : std::nullopt;
+  const std::optional<Outlook> expected =
+      picture && fitted && quick ? std::optional(outlook(config.job)) : std::nullopt;
   const std::vector<Shot> shots = arguments.next.empty() ? std::vector<Shot>{} : next_shots(config.job, arguments.next);
 
   if (arguments.json) {
     std::string free, next;
-    for (const Shot& shot : shots) next += fmt::format("{}\n    {{\"shot\": {}, \"stderr\": {}}}", next.empty() ? "" : ",", quoted(shot.words), json_number(shot.stderr_));
+    for (const Shot& shot : shots)
+      next += fmt::format("{}\n    {{\"shot\": {}, \"stderr\": {}}}", next.empty() ? "" : ",", quoted(shot.words),
+                          json_number(shot.stderr_));
     for (int i = 0; i < table.size(); ++i) {
       if (!table[i].free) continue;
       const double phase = table[i].linear ? 0 : fringe_phase_per_unit(config.scene, theta, i);
-      free += fmt::format("{}\n    {{\"name\": {}, \"unit\": {}, \"start\": {}, \"linear\": {}, \"fringe_rad_per_unit\": {}}}",
-                          free.empty() ? "" : ",", quoted(table[i].name), quoted(table[i].unit), table[i].value,
-                          table[i].linear, phase);
+      free += fmt::format(
+          "{}\n    {{\"name\": {}, \"unit\": {}, \"start\": {}, \"linear\": {}, \"fringe_rad_per_unit\": {}}}",
+          free.empty() ? "" : ",", quoted(table[i].name), quoted(table[i].unit), table[i].value, table[i].linear,
+          phase);
       for (const ParameterEstimate& p : expected ? expected->parameters : std::vector<ParameterEstimate>{})
-        if (p.name == table[i].name) free.insert(free.size() - 1, fmt::format(", \"expected_stderr\": {}", json_number(p.stderr_)));
+        if (p.name == table[i].name)
+          free.insert(free.size() - 1, fmt::format(", \"expected_stderr\": {}", json_number(p.stderr_)));
     }
     std::cout << fmt::format(
-        "{{\n  \"method\": {},\n  \"physics\": {},\n  \"reasons\": {},\n  \"numerical_error\": {},\n  \"model_error\": {},\n"
-        "  \"cost_seconds\": {},\n  \"warnings\": {},\n  \"identifiable\": {},\n  \"next\": [{}],\n  \"parameters\": [{}]\n}}\n",
-        quoted(chosen.method), quoted(chosen.physics), quoted(chosen.reasons), chosen.numerical_error, chosen.model_error,
-        seconds, quoted(warnings), expected ? (expected->identifiable ? "true" : "false") : "null", next, free);
+        "{{\n  \"method\": {},\n  \"physics\": {},\n  \"reasons\": {},\n  \"numerical_error\": {},\n  \"model_error\": "
+        "{},\n"
+        "  \"cost_seconds\": {},\n  \"warnings\": {},\n  \"identifiable\": {},\n  \"next\": [{}],\n  \"parameters\": "
+        "[{}]\n}}\n",
+        quoted(chosen.method), quoted(chosen.physics), quoted(chosen.reasons), chosen.numerical_error,
+        chosen.model_error, seconds, quoted(warnings), expected ? (expected->identifiable ? "true" : "false") : "null",
+        next, free);
     return kExitDone;
   }
   std::cout << fmt::format("Image      {} x {} pixels", config.scene.view.width, config.scene.view.height);
   if (config.scene.view.pixel_size_um > 0) std::cout << fmt::format(" of {:g} um", config.scene.view.pixel_size_um);
   std::cout << fmt::format("\nPhysics    {}\nMethod     {}\n", chosen.physics, chosen.method);
   for (const std::string& reason : chosen.reasons) std::cout << "           " << reason << "\n";
-  std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error, chosen.model_error,
+  std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error,
+                           chosen.model_error,
                            chosen.wave ? "RMS over the picture's own RMS" : "intensity, fraction of the incident");
   std::cout << fmt::format("Cost       {:.2g} s an image on one thread\n", seconds);
   bool any = false;
@@ -131,7 +150,8 @@ int run_explain(const Arguments& arguments) {
     const double phase = fringe_phase_per_unit(config.scene, theta, i);
     const double span = parameter.upper - parameter.lower;
     if (phase * span > 1)
-      std::cout << fmt::format(", forms fringes: {:.3g} rad between its bounds, scanned before the solver", phase * span);
+      std::cout << fmt::format(", forms fringes: {:.3g} rad between its bounds, scanned before the solver",
+                               phase * span);
     std::cout << "\n";
   }
   if (!any) std::cout << "Fitted     nothing\n";
@@ -140,9 +160,12 @@ int run_explain(const Arguments& arguments) {
     std::cout << fmt::format("Expected   at the start values, noise {}:\n", expected->noise);
     for (const ParameterEstimate& p : expected->parameters)
       if (!p.linear)
-        std::cout << (std::isfinite(p.stderr_) ? fmt::format("           {} to +- {:.2g} {}\n", p.name, p.stderr_, p.unit) : fmt::format("           {} not determined\n", p.name));
+        std::cout << (std::isfinite(p.stderr_)
+                          ? fmt::format("           {} to +- {:.2g} {}\n", p.name, p.stderr_, p.unit)
+                          : fmt::format("           {} not determined\n", p.name));
     for (const FisherDirection& direction : expected->directions)
-      if (!direction.identifiable && !direction.words.empty()) std::cout << "           Not identifiable: " << direction.words << "\n";
+      if (!direction.identifiable && !direction.words.empty())
+        std::cout << "           Not identifiable: " << direction.words << "\n";
   }
   if (!shots.empty()) {
     std::cout << fmt::format("Next       one more image beside this, for {}:\n", arguments.next);
@@ -158,9 +181,13 @@ int run_explain(const Arguments& arguments) {
       size += judge.values()[i] * judge.values()[i];
       worst = std::max(worst, std::abs(d));
     }
-    std::cout << fmt::format("Check      {:.2g} of the image's RMS (worst pixel {:.2g}) from Maxwell's equations marched through the sample, which leave out light reflected twice{}\n",
-                             std::sqrt(difference / size), worst,
-                             radial_twin(config.scene, theta) ? fmt::format(": {:.2g} of a radial twin's exact picture", march_error(config.scene, theta)) : "");
+    std::cout << fmt::format(
+        "Check      {:.2g} of the image's RMS (worst pixel {:.2g}) from Maxwell's equations marched through the "
+        "sample, which leave out light reflected twice{}\n",
+        std::sqrt(difference / size), worst,
+        radial_twin(config.scene, theta)
+            ? fmt::format(": {:.2g} of a radial twin's exact picture", march_error(config.scene, theta))
+            : "");
   }
   return kExitDone;
 }
@@ -168,12 +195,18 @@ int run_explain(const Arguments& arguments) {
 }  // namespace
 
 Command add_explain_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("explain", "which model and method would run, why, and what it costs and errs");
+  CLI::App* command =
+      app.add_subcommand("explain", "which model and method would run, why, and what it costs and errs");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
-  command->add_option("--next", arguments->next, "which image to take next to know this parameter better: candidates, best first");
+  command->add_option("--next", arguments->next,
+                      "which image to take next to know this parameter better: candidates, best first");
   command->add_flag("--json", arguments->json, "for scripts");
-  command->add_flag("--check", arguments->check, "droplets, shells and sampled fields: compare the picture with Maxwell's equations, marched through the sample (slow)")->excludes("--json");
+  command
+      ->add_flag("--check", arguments->check,
+                 "droplets, shells and sampled fields: compare the picture with Maxwell's equations, marched through "
+                 "the sample (slow)")
+      ->excludes("--json");
   return {command, [arguments] { return run_explain(*arguments); }};
 }
 

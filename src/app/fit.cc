@@ -28,8 +28,9 @@ int run_fit(const Arguments& arguments) {
   Problems problems;
   Config config;
   try {
-    config = load_config(arguments.config, ConfigUse::fit,
-                         arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image));
+    config =
+        load_config(arguments.config, ConfigUse::fit,
+                    arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image));
   } catch (const UserError& error) {
     problems.add(error);
   }
@@ -48,8 +49,7 @@ int run_fit(const Arguments& arguments) {
   const Interrupt interrupt;
   job.options.interrupted = &interrupt.flag();
   const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
-  if (terminal)
-    job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
+  if (terminal) job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
   FitResult result = fit(job);
   for (std::string& words : describe_rows(config)) result.warnings.push_back(std::move(words));
   if (arguments.coverage > 0 && result.has_answer() && config.signals.empty()) {
@@ -58,7 +58,8 @@ int run_fit(const Arguments& arguments) {
     if (terminal) std::cerr << fmt::format("\r\033[Kfitting {} simulated images", arguments.coverage) << std::flush;
     result.coverage = measure_coverage(job, result, arguments.coverage);
   } else if (arguments.coverage > 0) {
-    result.warnings.push_back(config.signals.empty() ? "--coverage: this fit has no answer to simulate images at." : "--coverage is for images, not for tables of signals.");
+    result.warnings.push_back(config.signals.empty() ? "--coverage: this fit has no answer to simulate images at."
+                                                     : "--coverage is for images, not for tables of signals.");
   }
   if (terminal) std::cerr << "\r\033[K" << std::flush;
   write_results(out, config, result);
@@ -81,7 +82,9 @@ Command add_fit_command(CLI::App& app) {
   command->add_option("--image", arguments->image, "use this image in place of micrograph.image");
   command->add_option("--out", arguments->out, "folder for the results; default: the config's name + \"-fit\", here");
   add_threads_option(*command, arguments->threads);
-  command->add_option("--coverage", arguments->coverage, "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
+  command
+      ->add_option("--coverage", arguments->coverage,
+                   "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
       ->check(CLI::Range(1, 100000));
   command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
   command->add_flag("--json", arguments->json, "print fit.json in place of the summary");

@@ -44,8 +44,10 @@ int run_jones(const Arguments& arguments) {
   const auto out = std::back_inserter(text);
   for (const JonesRow& row : rows) {
     // 17 digits: reading the table back gives the same bits.
-    if (slab) fmt::format_to(out, "{:.17g},{:.17g}", row.theta_deg, row.azimuth_deg);
-    else fmt::format_to(out, "{},{}", row.row, row.column);
+    if (slab)
+      fmt::format_to(out, "{:.17g},{:.17g}", row.theta_deg, row.azimuth_deg);
+    else
+      fmt::format_to(out, "{},{}", row.row, row.column);
     fmt::format_to(out, ",{:.17g}", row.wavelength_nm);
     for (const std::complex<double>& t : {row.ss, row.ps, row.sp, row.pp})
       fmt::format_to(out, ",{:.17g},{:.17g}", t.real(), t.imag());

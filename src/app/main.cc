@@ -22,19 +22,23 @@ namespace {
 
 int run(int argc, char** argv) {
   CLI::App app("Fits birefringence, field and thermal state to polarized micrographs.", "birefit");
-  app.set_version_flag("--version", fmt::format("birefit {} ({} rays side by side)", BIREFIT_VERSION, rays_side_by_side()));
+  app.set_version_flag("--version",
+                       fmt::format("birefit {} ({} rays side by side)", BIREFIT_VERSION, rays_side_by_side()));
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 done; 1 the fit has no answer; 2 the input is wrong; 3 an internal error.\n"
-             "birefit COMMAND --help tells more; `birefit new droplet > droplet.yaml` makes a config to start from.");
-  const std::vector<Command> commands = {add_fit_command(app), add_series_command(app), add_render_command(app), add_jones_command(app),
-                                         add_explain_command(app), add_chart_command(app), add_stress_command(app), add_new_command(app)};
+  app.footer(
+      "Exit codes: 0 done; 1 the fit has no answer; 2 the input is wrong; 3 an internal error.\n"
+      "birefit COMMAND --help tells more; `birefit new droplet > droplet.yaml` makes a config to start from.");
+  const std::vector<Command> commands = {add_fit_command(app),    add_series_command(app),  add_render_command(app),
+                                         add_jones_command(app),  add_explain_command(app), add_chart_command(app),
+                                         add_stress_command(app), add_new_command(app)};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const bool known = argc > 1 && std::any_of(commands.begin(), commands.end(),
-                                                [&](const Command& c) { return c.app->get_name() == argv[1]; });
+                                               [&](const Command& c) { return c.app->get_name() == argv[1]; });
     if (argc > 1 && argv[1][0] != '-' && !known) {
-      std::cerr << "birefit: unknown command " << argv[1] << "; known: fit, series, render, jones, explain, chart, stress and new\n";
+      std::cerr << "birefit: unknown command " << argv[1]
+                << "; known: fit, series, render, jones, explain, chart, stress and new\n";
       return kExitUserError;
     }
     // Help and version are "errors" of code 0 to CLI11; all others are the user's.

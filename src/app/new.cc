@@ -11,7 +11,8 @@
 namespace birefit {
 namespace {
 
-const char* const kDroplet = R"(# A nematic droplet between polarizers. `birefit fit THIS_FILE` estimates what is marked `fit`.
+const char* const kDroplet =
+    R"(# A nematic droplet between polarizers. `birefit fit THIS_FILE` estimates what is marked `fit`.
 micrograph:
   image: droplet.tif           # 8 or 16 bit or float; colour images also need channel: r | g | b | mean
   pixel_size_um: 0.05          # of the sample, not of the camera
@@ -148,7 +149,8 @@ microscope:
   analyzer_deg: 90
 )";
 
-const char* const kSlab = R"(# A depth profile: `birefit jones THIS_FILE --out jones.csv` gives its transmission matrices.
+const char* const kSlab =
+    R"(# A depth profile: `birefit jones THIS_FILE --out jones.csv` gives its transmission matrices.
 sample:
   slab:
     profile: profile.csv       # columns depth_um, ax, ay, az, n_o, n_e and optionally k_o, k_e
@@ -240,13 +242,17 @@ microscope:
 Command add_new_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("new", "print a commented config to start from");
   auto kind = std::make_shared<std::string>();
-  command->add_option("KIND", *kind, "droplet, shell, cell, freedericksz, plate, crystal, slab, disc or volume")->required();
+  command->add_option("KIND", *kind, "droplet, shell, cell, freedericksz, plate, crystal, slab, disc or volume")
+      ->required();
   return {command, [kind] {
             const std::map<std::string, const char*> templates = {
-                {"droplet", kDroplet}, {"shell", kShell}, {"cell", kCell}, {"freedericksz", kFreedericksz}, {"plate", kPlate}, {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc}, {"volume", kVolume}, {"series", kSeries}};
+                {"droplet", kDroplet}, {"shell", kShell},     {"cell", kCell}, {"freedericksz", kFreedericksz},
+                {"plate", kPlate},     {"crystal", kCrystal}, {"slab", kSlab}, {"disc", kDisc},
+                {"volume", kVolume},   {"series", kSeries}};
             const auto found = templates.find(*kind);
             if (found == templates.end())
-              throw UserError({}, "new " + *kind + ": unknown kind", "known: droplet, shell, cell, freedericksz, plate, crystal, slab, disc, volume");
+              throw UserError({}, "new " + *kind + ": unknown kind",
+                              "known: droplet, shell, cell, freedericksz, plate, crystal, slab, disc, volume");
             std::cout << found->second;
             return kExitDone;
           }};

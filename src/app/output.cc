@@ -51,7 +51,8 @@ OutputFolder::OutputFolder(const fs::path& folder) {
   }
   if (!can_write_in(folder)) {
     for (auto made = made_.rbegin(); made != made_.rend(); ++made) fs::remove(*made, code);
-    throw UserError({folder.string()}, "cannot be written to (permissions, or the disk is full)", "choose another --out");
+    throw UserError({folder.string()}, "cannot be written to (permissions, or the disk is full)",
+                    "choose another --out");
   }
 }
 
@@ -72,7 +73,8 @@ void check_output_file(const fs::path& file, const std::vector<std::string>& ext
   std::error_code code;
   if (fs::is_directory(file, code)) throw UserError({file.string()}, "is a folder, expected the name of a file");
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
-  if (!fs::is_directory(folder, code)) throw UserError({file.string()}, "its folder " + folder.string() + " does not exist");
+  if (!fs::is_directory(folder, code))
+    throw UserError({file.string()}, "its folder " + folder.string() + " does not exist");
   if (!can_write_in(folder))
     throw UserError({file.string()}, "its folder cannot be written to (permissions, or the disk is full)");
 }

@@ -16,7 +16,8 @@
 namespace birefit {
 namespace {
 
-/// Runs gnuplot without a shell, its input from one open file and its output to another; its exit code, or the error of starting it.
+/// Runs gnuplot without a shell, its input from one open file and its output to another; its exit code, or the error of
+/// starting it.
 int run_gnuplot(std::FILE* input, std::FILE* output) {
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
@@ -49,9 +50,12 @@ bool draw(const std::string& script, const std::filesystem::path& picture) {
   }
   output.reset();
   std::error_code failure;
-  if (done) std::filesystem::rename(part, picture, failure);
-  else std::filesystem::remove(part, failure);
-  if (!done || failure) std::cerr << "birefit: no picture: gnuplot is not there or failed; the tables are complete (Debian: gnuplot-nox)\n";
+  if (done)
+    std::filesystem::rename(part, picture, failure);
+  else
+    std::filesystem::remove(part, failure);
+  if (!done || failure)
+    std::cerr << "birefit: no picture: gnuplot is not there or failed; the tables are complete (Debian: gnuplot-nox)\n";
   return done && !failure;
 }
 
@@ -67,7 +71,8 @@ std::string plot_text(const std::string& text) {
 void make_folder(const std::string& folder) {
   std::error_code failure;
   std::filesystem::create_directories(folder, failure);
-  if (failure) throw UserError(Where{}, folder + " cannot be made: " + failure.message(), "name a folder that can be written");
+  if (failure)
+    throw UserError(Where{}, folder + " cannot be made: " + failure.message(), "name a folder that can be written");
 }
 
 std::string csv_number(double x) { return std::isfinite(x) ? fmt::format("{:.6g}", x) : std::string(); }

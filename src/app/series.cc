@@ -38,17 +38,20 @@ struct Arguments {
 void remove_parts(const fs::path& folder) {
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-    if (entry.path().extension() == ".part" && entry.path().filename().string().starts_with('.')) fs::remove(entry.path(), ignored);
+    if (entry.path().extension() == ".part" && entry.path().filename().string().starts_with('.'))
+      fs::remove(entry.path(), ignored);
 }
 
 /// "diameter (um)" of sample.droplet.diameter_um: the unit is part of every name.
 std::string axis_label(const std::string& path) {
   const std::size_t dot = path.rfind('.');
   std::string name = path.substr(dot + 1);
-  if (name.size() == 1 && dot != std::string::npos) return axis_label(path.substr(0, dot)) + ", " + name;  // "center (px), x"
-  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_v_per_um", "V/um"}, {"_mm2_s", "mm2/s"}, {"_per_k", "1/K"}, {"_um", "um"}, {"_nm", "nm"}, {"_cm", "cm"},
-                                                                      {"_mm", "mm"}, {"_deg", "degrees"}, {"_rad", "rad"}, {"_px", "px"}, {"_pn", "pN"}, {"_min", "min"},
-                                                                      {"_k", "K"}, {"_v", "V"}, {"_s", "s"}, {"_h", "h"}};
+  if (name.size() == 1 && dot != std::string::npos)
+    return axis_label(path.substr(0, dot)) + ", " + name;  // "center (px), x"
+  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {
+      {"_v_per_um", "V/um"}, {"_mm2_s", "mm2/s"}, {"_per_k", "1/K"}, {"_um", "um"}, {"_nm", "nm"}, {"_cm", "cm"},
+      {"_mm", "mm"},         {"_deg", "degrees"}, {"_rad", "rad"},   {"_px", "px"}, {"_pn", "pN"}, {"_min", "min"},
+      {"_k", "K"},           {"_v", "V"},         {"_s", "s"},       {"_h", "h"}};
   std::string unit;
   for (const auto& [suffix, word] : kUnits)
     if (name.size() > suffix.size() && name.ends_with(suffix)) {
@@ -66,8 +69,9 @@ std::optional<std::size_t> abscissa(const ImageSeries& series) {
   return series.columns.size() == 1 ? std::optional<std::size_t>(0) : std::nullopt;
 }
 
-/// A panel for every searched parameter: estimates with 95 % intervals; limits as triangles that point to what is allowed; frames without
-/// an answer as open circles. Of a shared parameter each frame's own estimate, and the common one as a band.
+/// A panel for every searched parameter: estimates with 95 % intervals; limits as triangles that point to what is
+/// allowed; frames without an answer as open circles. Of a shared parameter each frame's own estimate, and the common
+/// one as a band.
 std::string script_of(const ImageSeries& series, const SeriesResult& result) {
   std::vector<std::string> drawn;
   for (const auto& fit : result.alone)
@@ -81,12 +85,16 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result) {
   // Margins in pixels: the same whatever the number of panels.
   std::string script = fmt::format(
       "set terminal svg size {},{} dynamic font 'sans,13' background rgb 'white'\n"
-      "set grid lc rgb '#e4e4e4' lt 1\nset border lw 1.1\nset tics nomirror\nunset key\nset offsets 0, 0, graph 0.06, graph 0.06\n"
+      "set grid lc rgb '#e4e4e4' lt 1\nset border lw 1.1\nset tics nomirror\nunset key\nset offsets 0, 0, graph 0.06, "
+      "graph 0.06\n"
       "set multiplot layout {},{} margins {:.4f},{:.4f},{:.4f},{:.4f} spacing {:.4f},{:.4f}\n",
-      width, height, rows, columns, 100.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 110.0 / width, 22.0 / height);
+      width, height, rows, columns, 100.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 110.0 / width,
+      22.0 / height);
   for (std::size_t k = 0; k < drawn.size(); ++k) {
     const std::string& name = drawn[k];
-    const bool shared = result.shared && std::find(result.shared->posterior.names.begin(), result.shared->posterior.names.end(), name) != result.shared->posterior.names.end();
+    const bool shared = result.shared &&
+                        std::find(result.shared->posterior.names.begin(), result.shared->posterior.names.end(), name) !=
+                            result.shared->posterior.names.end();
     std::string points, limits[2], doubtful;
     double low_x = std::numeric_limits<double>::infinity(), high_x = -low_x;
     for (std::size_t i = 0; i < series.frames.size(); ++i) {
@@ -96,9 +104,12 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result) {
       if (!fit) continue;
       for (const ParameterEstimate& p : fit->parameters) {
         if (p.name != name || !std::isfinite(p.value)) continue;
-        if (!fit->has_answer() || (p.limit.empty() && !std::isfinite(p.interval95_low))) doubtful += fmt::format("{:.10g} {:.10g}\n", x, p.value);
-        else if (!p.limit.empty()) limits[p.limit == "lower"] += fmt::format("{:.10g} {:.10g}\n", x, p.limit_value);
-        else points += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, p.value, p.interval95_low, p.interval95_high);
+        if (!fit->has_answer() || (p.limit.empty() && !std::isfinite(p.interval95_low)))
+          doubtful += fmt::format("{:.10g} {:.10g}\n", x, p.value);
+        else if (!p.limit.empty())
+          limits[p.limit == "lower"] += fmt::format("{:.10g} {:.10g}\n", x, p.limit_value);
+        else
+          points += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, p.value, p.interval95_low, p.interval95_high);
       }
     }
     std::string plot;
@@ -110,9 +121,11 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result) {
     if (shared) {
       const Posterior& all = result.shared->posterior;
       const auto at = std::find(all.names.begin(), all.names.end(), name) - all.names.begin();
-      const double value = all.mean[at], half = interval95_factor(all.degrees_of_freedom) * std::sqrt(all.covariance(at, at));
+      const double value = all.mean[at],
+                   half = interval95_factor(all.degrees_of_freedom) * std::sqrt(all.covariance(at, at));
       std::string band;
-      for (const double x : {low_x, high_x}) band += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, value, value - half, value + half);
+      for (const double x : {low_x, high_x})
+        band += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, value, value - half, value + half);
       add("band", band, "using 1:3:4 with filledcurves fc rgb '#56B4E9' fs transparent solid 0.4 noborder");
       plot += fmt::format(", $band{} using 1:2 with lines lc rgb '#0072B2' lw 1.4", k);
     }
@@ -125,9 +138,11 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result) {
     const bool lowest = k + columns >= drawn.size();
     const std::string x_label = x_column ? axis_label(series.columns[*x_column].name) : "frame";
     const double room = high_x > low_x ? 0.03 * (high_x - low_x) : 1;
-    script += fmt::format("set xrange [{:.10g}:{:.10g}]\nset format x '{}'\nset ylabel {} noenhanced offset 1,0\nset xlabel {} noenhanced\n", low_x - room, high_x + room,
-                          lowest ? "%g" : "", plot_text(axis_label(name) + (shared ? ", shared" : "")),
-                          plot_text(lowest ? x_label : ""));
+    script += fmt::format(
+        "set xrange [{:.10g}:{:.10g}]\nset format x '{}'\nset ylabel {} noenhanced offset 1,0\nset xlabel {} "
+        "noenhanced\n",
+        low_x - room, high_x + room, lowest ? "%g" : "", plot_text(axis_label(name) + (shared ? ", shared" : "")),
+        plot_text(lowest ? x_label : ""));
     // A panel without a point keeps its place.
     script += plot.empty() ? "set multiplot next\n" : "plot " + plot + "\n";
   }
@@ -144,7 +159,8 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
   }
   std::string text = fmt::format("{} frames:", series.frames.size());
   std::string separator = " ";
-  for (const auto& [verdict, count] : verdicts) text += fmt::format("{}{} {}", separator, count, verdict), separator = ", ";
+  for (const auto& [verdict, count] : verdicts)
+    text += fmt::format("{}{} {}", separator, count, verdict), separator = ", ";
   text += "\n";
   if (result.shared) {
     const SharedEstimate& shared = *result.shared;
@@ -153,16 +169,19 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
       const auto at = static_cast<Eigen::Index>(i);
       const double value = shared.posterior.mean[at], error = std::sqrt(shared.posterior.covariance(at, at));
       const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 12);
-      text += fmt::format("  {} = {:.{}f} +/- {:.2g} [95%: {:.{}f} .. {:.{}f}], shared by {} frames\n", shared.posterior.names[i], value, digits, error, value - t * error,
-                          digits, value + t * error, digits, shared.fits);
+      text += fmt::format("  {} = {:.{}f} +/- {:.2g} [95%: {:.{}f} .. {:.{}f}], shared by {} frames\n",
+                          shared.posterior.names[i], value, digits, error, value - t * error, digits, value + t * error,
+                          digits, shared.fits);
     }
-    text += fmt::format("  the frames' own values about the shared ones: chi-square {:.4g} for {} degrees of freedom\n", shared.chi_square, shared.chi_square_degrees);
+    text += fmt::format("  the frames' own values about the shared ones: chi-square {:.4g} for {} degrees of freedom\n",
+                        shared.chi_square, shared.chi_square_degrees);
   }
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
   constexpr std::size_t kListed = 8;
   std::size_t listed = 0;
   for (const auto& [warning, count] : warnings) {
-    if (listed++ == kListed) return text + fmt::format("and {} more warnings, in the frames' reports\n", warnings.size() - kListed);
+    if (listed++ == kListed)
+      return text + fmt::format("and {} more warnings, in the frames' reports\n", warnings.size() - kListed);
     text += fmt::format("warning ({}): {}\n", count == 1 ? "1 frame" : fmt::format("{} frames", count), warning);
   }
   return text;
@@ -173,7 +192,8 @@ int run_series(const Arguments& arguments) {
   const fs::path out = arguments.out.empty() ? fs::path(arguments.config).stem().string() + "-series" : arguments.out;
   std::error_code code;
   if (!arguments.resume && (fs::exists(out / "frames", code) || fs::exists(out / "series.csv", code)))
-    throw UserError({out.string()}, "holds a series already", "--resume goes on with it and keeps what is up to date; another --out leaves it alone");
+    throw UserError({out.string()}, "holds a series already",
+                    "--resume goes on with it and keeps what is up to date; another --out leaves it alone");
   OutputFolder folder(out);
 
   remove_parts(out);
@@ -196,7 +216,10 @@ int run_series(const Arguments& arguments) {
       config.job.options.threads = threads;
       config.job.options.interrupted = &interrupt.flag();
       const std::string at = fmt::format("{} of {}: {}", i + 1, series.frames.size(), series.frames[i].name);
-      if (terminal) config.job.options.progress = [&](const std::string& line) { std::cerr << fmt::format("\r\033[K{}: {}", at, line) << std::flush; };
+      if (terminal)
+        config.job.options.progress = [&](const std::string& line) {
+          std::cerr << fmt::format("\r\033[K{}: {}", at, line) << std::flush;
+        };
       const FitResult result = fit(config.job);
       if (result.interrupted) return;  // the next run does it whole
       write_results(place, config, result);
@@ -206,13 +229,16 @@ int run_series(const Arguments& arguments) {
     }
     fits[i] = std::move(record->result);
   };
-  // The first alone, then a few at a time that all start where the frames before them ended: how many does not depend on the number
-  // of cores, so that neither do the results.
-  const int cores = thread_count(arguments.threads >= 0 ? arguments.threads : load_frame(series, 0).job.options.threads);
+  // The first alone, then a few at a time that all start where the frames before them ended: how many does not depend
+  // on the number of cores, so that neither do the results.
+  const int cores =
+      thread_count(arguments.threads >= 0 ? arguments.threads : load_frame(series, 0).job.options.threads);
   for (std::size_t first = 0, count; first < series.frames.size() && !interrupt.flag(); first += count) {
     count = std::min<std::size_t>(first == 0 ? 1 : kFramesTogether, series.frames.size() - first);
     const int side_by_side = std::min(cores, static_cast<int>(count)), each = cores / side_by_side;
-    parallel_for(static_cast<int>(count), side_by_side, [&](int k) { if (!interrupt.flag()) do_frame(first + static_cast<std::size_t>(k), each); });
+    parallel_for(static_cast<int>(count), side_by_side, [&](int k) {
+      if (!interrupt.flag()) do_frame(first + static_cast<std::size_t>(k), each);
+    });
     for (std::size_t i = first; i < first + count; ++i)
       if (fits[i] && fits[i]->has_answer()) neighbour = &*fits[i];
   }
@@ -233,11 +259,14 @@ int run_series(const Arguments& arguments) {
 }  // namespace
 
 Command add_series_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("series", "fit every image of a series, with parameters of its own and shared ones");
+  CLI::App* command =
+      app.add_subcommand("series", "fit every image of a series, with parameters of its own and shared ones");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML), with micrographs: {files: ..}")->required();
-  command->add_option("--out", arguments->out, "folder for the results; default: the config's name + \"-series\", here");
-  command->add_flag("--resume", arguments->resume, "go on with the series in that folder: frames that are up to date stay");
+  command->add_option("--out", arguments->out,
+                      "folder for the results; default: the config's name + \"-series\", here");
+  command->add_flag("--resume", arguments->resume,
+                    "go on with the series in that folder: frames that are up to date stay");
   add_threads_option(*command, arguments->threads);
   command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
   return {command, [arguments] { return run_series(*arguments); }};

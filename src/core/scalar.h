@@ -110,8 +110,8 @@ BIREFIT_INLINE Pack fused(const Pack& a, const Pack& b, const Pack& c) { return 
 #endif
 BIREFIT_INLINE void sin_cos(const Pack& x, Pack& s, Pack& c) {
 #ifdef BIREFIT_FUSED
-  // r = x - n pi/2: with fused multiply and add the first step is exact and the second leaves rounding and n 1.5e-33, so that one
-  // reduction serves any phase; a general library tests for large arguments first and is not inlined.
+  // r = x - n pi/2: with fused multiply and add the first step is exact and the second leaves rounding and n 1.5e-33,
+  // so that one reduction serves any phase; a general library tests for large arguments first and is not inlined.
   constexpr double kMostPhase = 1e9;
   if (xsimd::any(xsimd::abs(x) > Pack(kMostPhase))) [[unlikely]] {
     const auto both = xsimd::sincos(x);
@@ -124,12 +124,19 @@ BIREFIT_INLINE void sin_cos(const Pack& x, Pack& s, Pack& c) {
   const Pack r = fused(n, Pack(-6.123233995736766e-17), fused(n, Pack(-1.5707963267948966), x)), z = r * r;
   // Minimax polynomials on [-pi/4, pi/4]: S. L. Moshier, Cephes Mathematical Library, sin.c.
   const auto step = [&](const Pack& p, double a) { return fused(p, z, Pack(a)); };
-  const Pack p = step(step(step(step(step(Pack(1.58962301576546568060e-10), -2.50507477628578072866e-8), 2.75573136213857245213e-6),
-                                -1.98412698295895385996e-4), 8.33333333332211858878e-3), -1.66666666666666307295e-1);
-  const Pack q = step(step(step(step(step(Pack(-1.13585365213876817300e-11), 2.08757008419747316778e-9), -2.75573141792967388112e-7),
-                                2.48015872888517045348e-5), -1.38888888888730564116e-3), 4.16666666666665929218e-2);
+  const Pack p = step(
+      step(step(step(step(Pack(1.58962301576546568060e-10), -2.50507477628578072866e-8), 2.75573136213857245213e-6),
+                -1.98412698295895385996e-4),
+           8.33333333332211858878e-3),
+      -1.66666666666666307295e-1);
+  const Pack q = step(
+      step(step(step(step(Pack(-1.13585365213876817300e-11), 2.08757008419747316778e-9), -2.75573141792967388112e-7),
+                2.48015872888517045348e-5),
+           -1.38888888888730564116e-3),
+      4.16666666666665929218e-2);
   const Pack sine = fused(r * z, p, r), cosine = fused(z * z, q, fused(Pack(-0.5), z, Pack(1.0)));
-  // Quadrant n mod 4: odd ones exchange the two, the second and third turn the sine's sign, the first and second the cosine's.
+  // Quadrant n mod 4: odd ones exchange the two, the second and third turn the sine's sign, the first and second the
+  // cosine's.
   using Bits = xsimd::batch<std::int64_t>;
   const Bits quadrant = xsimd::bitwise_cast<Bits>(shifted), one(1), two(2);
   const auto exchange = xsimd::bool_cast((quadrant & one) == one);
@@ -201,8 +208,8 @@ struct Dual {
     for (B& x : d) x = B(0.0);
   }
   template <class T>
-    requires(std::is_arithmetic_v<T> && !std::is_same_v<T, B>)
-  BIREFIT_INLINE Dual(T v) : value(B(static_cast<double>(v))) {  // NOLINT
+  requires(std::is_arithmetic_v<T> && !std::is_same_v<T, B>) BIREFIT_INLINE Dual(T v)
+      : value(B(static_cast<double>(v))) {  // NOLINT
     for (B& x : d) x = B(0.0);
   }
   /// f(x) with derivative f'(x): the chain rule.
@@ -268,42 +275,30 @@ struct Dual {
   template <class T>
   static constexpr bool kIsBase = !std::is_same_v<T, double> && is_under<T, B>;
   template <class T>
-    requires(kIsBase<T>)
-  BIREFIT_INLINE friend Dual operator+(const Dual& a, const T& b) {
+  requires(kIsBase<T>) BIREFIT_INLINE friend Dual operator+(const Dual& a, const T& b) {
     Dual r = a;
     r.value = a.value + b;
     return r;
   }
   template <class T>
-    requires(kIsBase<T>)
-  BIREFIT_INLINE friend Dual operator+(const T& a, const Dual& b) {
-    return b + a;
-  }
+  requires(kIsBase<T>) BIREFIT_INLINE friend Dual operator+(const T& a, const Dual& b) { return b + a; }
   template <class T>
-    requires(kIsBase<T>)
-  BIREFIT_INLINE friend Dual operator-(const Dual& a, const T& b) {
+  requires(kIsBase<T>) BIREFIT_INLINE friend Dual operator-(const Dual& a, const T& b) {
     Dual r = a;
     r.value = a.value - b;
     return r;
   }
   template <class T>
-    requires(kIsBase<T>)
-  BIREFIT_INLINE friend Dual operator-(const T& a, const Dual& b) {
-    return -b + a;
-  }
+  requires(kIsBase<T>) BIREFIT_INLINE friend Dual operator-(const T& a, const Dual& b) { return -b + a; }
   template <class T>
-    requires(kIsBase<T>)
-  BIREFIT_INLINE friend Dual operator*(const Dual& a, const T& b) {
+  requires(kIsBase<T>) BIREFIT_INLINE friend Dual operator*(const Dual& a, const T& b) {
     Dual r;
     r.value = a.value * b;
     for (int i = 0; i < N; ++i) r.d[i] = a.d[i] * b;
     return r;
   }
   template <class T>
-    requires(kIsBase<T>)
-  BIREFIT_INLINE friend Dual operator*(const T& a, const Dual& b) {
-    return b * a;
-  }
+  requires(kIsBase<T>) BIREFIT_INLINE friend Dual operator*(const T& a, const Dual& b) { return b * a; }
 };
 
 template <class B, int N>
@@ -322,7 +317,8 @@ struct Raise {
   BIREFIT_INLINE R operator()(const S& x) const {
     R r(plain(x));
     if constexpr (ScalarTraits<S>::derivatives > 0)
-      for (std::size_t j = 0; j < to.size(); ++j) r.d[to[j]] = r.d[to[j]] + x.d[j];  // unused ones are 0 and may share a place
+      // unused ones are 0 and may share a place
+      for (std::size_t j = 0; j < to.size(); ++j) r.d[to[j]] = r.d[to[j]] + x.d[j];
     return r;
   }
 };
@@ -412,44 +408,44 @@ BIREFIT_INLINE Dual<B, N> erfc(const Dual<B, N>& x) {
 
 // Oracles such as ceres::Jet bring no sin_cos, select, ... of their own; these serve any scalar that has sin and cos.
 template <class S>
-  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-BIREFIT_INLINE void sin_cos(const S& x, S& s, S& c) {
+requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0) BIREFIT_INLINE
+    void sin_cos(const S& x, S& s, S& c) {
   s = sin(x);
   c = cos(x);
 }
 template <class S>
-  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-BIREFIT_INLINE S select(bool condition, const S& a, const S& b) {
+requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0) BIREFIT_INLINE S
+    select(bool condition, const S& a, const S& b) {
   return condition ? a : b;
 }
 template <class S>
-  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-BIREFIT_INLINE S max_of(const S& a, const S& b) {
+requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0) BIREFIT_INLINE S
+    max_of(const S& a, const S& b) {
   return a > b ? a : b;
 }
 template <class S>
-  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-BIREFIT_INLINE S min_of(const S& a, const S& b) {
+requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0) BIREFIT_INLINE S
+    min_of(const S& a, const S& b) {
   return a < b ? a : b;
 }
 
 template <class S>
-  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-S inverse(const S& x) {
+requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0) S
+    inverse(const S& x) {
   return S(1.0) / x;
 }
 template <class S>
-  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-S root(const S& x) {
+requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0) S
+    root(const S& x) {
   return sqrt(x);
 }
 template <class S>
-  requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0)
-S inverse_root(const S& x) {
+requires(!std::is_same_v<S, double> && !std::is_same_v<S, Pack> && ScalarTraits<S>::derivatives == 0) S
+    inverse_root(const S& x) {
   return S(1.0) / sqrt(x);
 }
 
-// ---- functions entire in their argument, so that value, derivative and lanes all survive at zero ----------------------
+// ---- functions entire in their argument, so that value, derivative and lanes all survive at zero -------------------
 
 /// cos(sqrt(q)), any real q (cosh for negative q). |q| small or moderate: phases of one step.
 /// sinc_sq(q) = sin(sqrt q)/sqrt q. Both from one sin_cos; derivatives from d cos_sq/dq = -sinc_sq/2,
@@ -468,8 +464,7 @@ BIREFIT_INLINE B sinc_slope(const B& q, const B& cos_sq, const B& sinc_sq) {
   return select(small, series, (cos_sq - sinc_sq) * (B(0.5) * inverse(safe)));
 }
 template <class S>
-  requires(ScalarTraits<S>::derivatives == 0)
-BIREFIT_INLINE CosSinc<S> cos_sinc_sq(const S& q) {
+requires(ScalarTraits<S>::derivatives == 0) BIREFIT_INLINE CosSinc<S> cos_sinc_sq(const S& q) {
   const S safe = max_of(q, S(1e-40));
   const S f = inverse_root(safe);
   S s, c;
@@ -482,7 +477,7 @@ BIREFIT_INLINE CosSinc<Dual<B, N>> cos_sinc_sq(const Dual<B, N>& q) {
   return {q.chain(f.cos_sq, f.sinc_sq * B(-0.5)), q.chain(f.sinc_sq, sinc_slope(q.value, f.cos_sq, f.sinc_sq))};
 }
 
-// ---- small vectors and complex numbers over any scalar -----------------------------------------------------------------
+// ---- small vectors and complex numbers over any scalar -------------------------------------------------------------
 
 template <class S>
 struct Vec3 {

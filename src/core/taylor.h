@@ -66,7 +66,8 @@ struct Taylor {
     Taylor r = of_order(std::max(a.order, b.order));
     for (int k = 0; k <= r.order; ++k) {
       B sum(0.0);
-      for (int j = std::max(0, k - b.order), last = std::min(k, a.order); j <= last; ++j) sum = sum + a.c[j] * b.c[k - j];
+      for (int j = std::max(0, k - b.order), last = std::min(k, a.order); j <= last; ++j)
+        sum = sum + a.c[j] * b.c[k - j];
       r.c[k] = sum;
     }
     return r;

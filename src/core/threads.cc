@@ -25,8 +25,8 @@ bool look_for(const Condition& condition) {
   return false;
 }
 
-/// Threads that wait for work. They live as long as the program: a picture takes a millisecond, of which making a thread
-/// and the memory it works in would be a third.
+/// Threads that wait for work. They live as long as the program: a picture takes a millisecond, of which making a
+/// thread and the memory it works in would be a third.
 class Helpers {
  public:
   static Helpers& instance() {
@@ -41,8 +41,8 @@ class Helpers {
     wake_.notify_all();
     for (std::thread& t : members_) t.join();
   }
-  /// Calls work() here and, where members are free before it returns, in up to `helpers` of them at the same time. A call
-  /// within work() is none the worse: who finds nobody free does all by himself.
+  /// Calls work() here and, where members are free before it returns, in up to `helpers` of them at the same time. A
+  /// call within work() is none the worse: who finds nobody free does all by himself.
   void run(int helpers, const std::function<void()>& work) {
     Job job{&work, helpers, 0};
     {
@@ -102,7 +102,8 @@ class Helpers {
 
 int thread_count(int requested) {
   if (requested > 0) return requested;
-  static const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));  // asks the system, which takes its time
+  // asks the system, which takes its time
+  static const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   return cores;
 }
 
@@ -145,7 +146,8 @@ void Barrier::arrive_and_wait() {
     phase_.notify_all();
     return;
   }
-  if (!look_for([&] { return phase_.load(std::memory_order_acquire) != phase; })) phase_.wait(phase, std::memory_order_acquire);
+  if (!look_for([&] { return phase_.load(std::memory_order_acquire) != phase; }))
+    phase_.wait(phase, std::memory_order_acquire);
 }
 
 }  // namespace birefit

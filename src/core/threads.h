@@ -17,8 +17,9 @@ void parallel_for(int n, int threads, const std::function<void(int)>& body);
 /// each other; a body must not throw. parallel_for promises no such thing, and is cheaper to call.
 void run_together(int threads, const std::function<void(int)>& body);
 
-/// Where those threads wait for each other. Phases of a picture last some ten microseconds and to be woken takes longer: who waits
-/// looks again for about as long before it sleeps (std::barrier sleeps after some 16 looks: two threads were hardly faster than one).
+/// Where those threads wait for each other. Phases of a picture last some ten microseconds and to be woken takes
+/// longer: who waits looks again for about as long before it sleeps (std::barrier sleeps after some 16 looks: two
+/// threads were hardly faster than one).
 class Barrier {
  public:
   explicit Barrier(int threads) : threads_(threads) {}

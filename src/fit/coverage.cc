@@ -63,7 +63,8 @@ Image simulated(const Picture& micrograph, const MicrographResult& of, std::mt19
     return values;
   }
   const Image sd = standard_deviation(micrograph, of.noise, of.fitted);
-  const bool photons = of.noise.counts_per_photon > 0 && of.noise.black_counts == 0 && micrograph.variance_scale.empty();
+  const bool photons =
+      of.noise.counts_per_photon > 0 && of.noise.black_counts == 0 && micrograph.variance_scale.empty();
   std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < values.size(); ++i) {
     double& value = values.values()[i];

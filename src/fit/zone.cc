@@ -49,8 +49,8 @@ Mask possible_pixels(const FitJob& job, const Picture& micrograph, const Theta& 
   const StressedDisc& disc = *disc_of(micrograph);
   const View& view = micrograph.scene.view;
   std::vector<Theta> places{theta};
-  for (const ParameterRef ref : {disc.diameter_um, view.center_x_px, view.center_y_px, disc.load_azimuth_deg,
-                                 view.rotation_deg}) {
+  for (const ParameterRef ref :
+       {disc.diameter_um, view.center_x_px, view.center_y_px, disc.load_azimuth_deg, view.rotation_deg}) {
     if (!ref || !job.parameters[ref].free) continue;
     const double lower = job.parameters[ref].lower, upper = job.parameters[ref].upper;
     if (!std::isfinite(upper - lower)) continue;

@@ -10,9 +10,9 @@
 
 #include "birefit/io.h"
 #include "io/config_disc.h"
-#include "io/config_rings.h"
 #include "io/config_pixels.h"
 #include "io/config_reader.h"
+#include "io/config_rings.h"
 #include "io/config_scene.h"
 #include "io/config_series.h"
 #include "io/config_signal.h"
@@ -96,7 +96,8 @@ void keep_positive(Parameter& gain) {
 }
 
 /// `gain` or `offset`: absent means `fit: auto`, a nuisance every real image has.
-ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::string& key, double start, bool automatic) {
+ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::string& key, double start,
+                         bool automatic) {
   const bool given = block.find(key) != nullptr;
   const ParameterRef ref = reader.number(block, key, linear_spec(), start);
   if (!given && automatic) make_automatic(reader, ref);
@@ -110,7 +111,8 @@ void read_center(ConfigReader& reader, const Block& block, const Scene& scene, M
   const bool droplet = std::holds_alternative<Droplet>(scene.sample);
   const Slab* slab = std::get_if<Slab>(&scene.sample);
   const bool disc = std::holds_alternative<StressedDisc>(scene.sample);
-  const bool cone = disc || std::holds_alternative<SampledVolume>(scene.sample) || std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
+  const bool cone = disc || std::holds_alternative<SampledVolume>(scene.sample) ||
+                    std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
   const YamlNode* node = block.find("center_px");
   const std::string path = "micrograph.center_px";
   if (node && node->is_sequence() && node->items.size() == 2) {
@@ -122,9 +124,9 @@ void read_center(ConfigReader& reader, const Block& block, const Scene& scene, M
     const YamlNode* fit = node && node->is_map() ? node->find("fit") : nullptr;
     const bool automatic = fit && fit->is_scalar() && fit->text == "auto" && node->entries.size() == 1;
     if (node && !automatic)
-      reader.problems.add(node->where, "center_px must be [x, y] (each a number or {value, fit}) or {fit: auto}, found " +
-                                           (node->is_sequence() ? std::to_string(node->items.size()) + " items"
-                                                                : node->describe()));
+      reader.problems.add(node->where,
+                          "center_px must be [x, y] (each a number or {value, fit}) or {fit: auto}, found " +
+                              (node->is_sequence() ? std::to_string(node->items.size()) + " items" : node->describe()));
     // Where a droplet lies is hardly ever known, and its image shows it.
     if (automatic || (!node && droplet && reader.use != ConfigUse::render)) {
       make_automatic(reader, settings.center_x);
@@ -156,10 +158,11 @@ void read_calibration(ConfigReader& reader, const Block& root, const Block& micr
 
 MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene, Quantity quantity) {
   MicrographSettings settings;
-  const Block block = reader.block(root, "micrograph",
-                                   {"image", "page", "channel", "pixel_size_um", "transfer", "gain", "offset", "illumination", "background", "center_px",
-                                    "rotation_deg", "roi_px", "mask", "saturation_counts", "noise", "calibration"},
-                                   false);
+  const Block block = reader.block(
+      root, "micrograph",
+      {"image", "page", "channel", "pixel_size_um", "transfer", "gain", "offset", "illumination", "background",
+       "center_px", "rotation_deg", "roi_px", "mask", "saturation_counts", "noise", "calibration"},
+      false);
   settings.where = block.where;
   const auto place = [&](const char* key) { return block.find(key) ? block.find(key)->where : block.where; };
   settings.image = reader.text(block, "image");
@@ -186,7 +189,8 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
       settings.transfer.kind = Transfer::Kind::srgb;
     }
   }
-  const bool scaled = !has_ring_table(scene) && quantity == Quantity::intensity;  // radii come in cm, retardances as what they are
+  // radii come in cm, retardances as what they are
+  const bool scaled = !has_ring_table(scene) && quantity == Quantity::intensity;
   settings.gain = read_linear(reader, block, "gain", 1, scaled);
   settings.offset = read_linear(reader, block, "offset", 0, scaled);
   settings.offset_automatic = reader.table[settings.offset].automatic;
@@ -194,7 +198,8 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   for (const auto& [key, of_intensity] : {std::pair("illumination", true), std::pair("background", false)}) {
     if (!block.find(key)) continue;
     const Block uneven = reader.block(block, key, {"x", "y", "square"}, false);
-    for (const auto& [name, shape] : {std::pair("x", Shape::x), std::pair("y", Shape::y), std::pair("square", Shape::square)}) {
+    for (const auto& [name, shape] :
+         {std::pair("x", Shape::x), std::pair("y", Shape::y), std::pair("square", Shape::square)}) {
       if (!uneven.find(name)) continue;
       const ParameterRef ref = reader.number(uneven, name, linear_spec(), 0);
       if (!std::isfinite(reader.table[ref].value)) reader.table[ref].value = 0;
@@ -233,7 +238,8 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
     level.lower = -1e9;
     model.black_counts = reader.plain(noise, "black_counts", level).value_or(0);
     const bool given = noise.find("read_counts") || noise.find("counts_per_photon");
-    if (noise.node && !given) reader.missing(noise, "read_counts or counts_per_photon", "leave noise out to estimate it");
+    if (noise.node && !given)
+      reader.missing(noise, "read_counts or counts_per_photon", "leave noise out to estimate it");
     else if (noise.node && model.read_counts == 0 && model.counts_per_photon == 0)
       reader.problems.add(noise.where, "micrograph.noise is zero: no image is exact", "leave noise out to estimate it");
     settings.noise = model;
@@ -260,7 +266,8 @@ std::vector<Item> read_items(ConfigReader& reader, const Block& root) {
   const YamlNode* list = root.find("micrographs");
   if (!list) return items;
   if (is_series(*list)) {
-    reader.problems.add(list->where, "micrographs with files are a series of fits", "run birefit series " + reader.file);
+    reader.problems.add(list->where, "micrographs with files are a series of fits",
+                        "run birefit series " + reader.file);
     return items;
   }
   if (!list->is_sequence() || list->items.empty()) {
@@ -293,8 +300,8 @@ std::vector<Item> read_items(ConfigReader& reader, const Block& root) {
 
 /// The calibration frames as what a micrograph needs of them.
 struct Calibration {
-  Image dark;    ///< counts in linear light
-  Image light;   ///< parallel - dark
+  Image dark;   ///< counts in linear light
+  Image light;  ///< parallel - dark
   Mask usable;
   Mask saturated;
   double crossed_median = 0, crossed_sd = 0;
@@ -309,8 +316,9 @@ bool check_roi(ConfigReader& reader, const MicrographSettings& settings, const I
   if (roi.x0 >= 0 && roi.y0 >= 0 && roi.x1 <= image.width() && roi.y1 <= image.height()) return true;
   reader.problems.add(settings.roi_where, "roi_px = [" + std::to_string(roi.x0) + ", " + std::to_string(roi.y0) + ", " +
                                               std::to_string(roi.x1) + ", " + std::to_string(roi.y1) +
-                                              "] reaches outside " + name + ", which is " + std::to_string(image.width()) +
-                                              " x " + std::to_string(image.height()) + " pixels");
+                                              "] reaches outside " + name + ", which is " +
+                                              std::to_string(image.width()) + " x " + std::to_string(image.height()) +
+                                              " pixels");
   return false;
 }
 
@@ -355,7 +363,8 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
     if (frame.values.width() == dark->values.width() && frame.values.height() == dark->values.height()) return true;
     reader.problems.add(where, name + " is " + std::to_string(frame.values.width()) + " x " +
                                    std::to_string(frame.values.height()) + " pixels, " + *settings.dark + " is " +
-                                   std::to_string(dark->values.width()) + " x " + std::to_string(dark->values.height()));
+                                   std::to_string(dark->values.width()) + " x " +
+                                   std::to_string(dark->values.height()));
     return false;
   };
   if (!same_size(*parallel, *settings.parallel, settings.parallel_where)) return std::nullopt;
@@ -369,7 +378,8 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
   for (LoadedImage* frame : {&*dark, &*parallel, crossed ? &*crossed : nullptr}) {
     if (!frame) continue;
     // The frames come from one camera: the code at which one saturates is the code for all.
-    mark_saturated(frame->values, find_saturation(*frame, area, settings.saturation_counts).from, calibration.saturated);
+    mark_saturated(frame->values, find_saturation(*frame, area, settings.saturation_counts).from,
+                   calibration.saturated);
     const double step = smallest_step(*frame);
     linearise(frame->values, settings.transfer, frame->top_code);
     for (std::size_t i = 0; i < frame->values.size(); ++i)
@@ -397,7 +407,8 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
   if (crossed) {
     Image transmission = crossed->values;
     for (std::size_t i = 0; i < transmission.size(); ++i)
-      transmission.values()[i] = (transmission.values()[i] - calibration.dark.values()[i]) / calibration.light.values()[i];
+      transmission.values()[i] =
+          (transmission.values()[i] - calibration.dark.values()[i]) / calibration.light.values()[i];
     const RobustSpread spread = robust_spread(transmission, calibration.usable, area);
     if (spread.count > 0) {
       calibration.has_crossed = true;
@@ -420,7 +431,8 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   const auto other_size = [&](int other_width, int other_height, const std::string& what, const Where& place) {
     if (other_width == width && other_height == height) return;
     reader.problems.add(place, what + " is " + std::to_string(other_width) + " x " + std::to_string(other_height) +
-                                   " pixels, " + name + " is " + std::to_string(width) + " x " + std::to_string(height));
+                                   " pixels, " + name + " is " + std::to_string(width) + " x " +
+                                   std::to_string(height));
   };
   if (user_mask) other_size(user_mask->width(), user_mask->height(), *settings.mask, settings.mask_where);
   if (calibration)
@@ -442,12 +454,18 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   int frame_dead = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      if (!area.contains(x, y)) ++micrograph.outside_roi;
-      else if (user_mask && !(*user_mask)(x, y)) ++micrograph.masked_by_user;
-      else if (!std::isfinite(image.values(x, y))) ++micrograph.non_finite;
-      else if (saturated(x, y) || (calibration && calibration->saturated(x, y))) ++micrograph.saturated;
-      else if (calibration && !calibration->usable(x, y)) ++frame_dead;
-      else micrograph.mask(x, y) = 1;
+      if (!area.contains(x, y))
+        ++micrograph.outside_roi;
+      else if (user_mask && !(*user_mask)(x, y))
+        ++micrograph.masked_by_user;
+      else if (!std::isfinite(image.values(x, y)))
+        ++micrograph.non_finite;
+      else if (saturated(x, y) || (calibration && calibration->saturated(x, y)))
+        ++micrograph.saturated;
+      else if (calibration && !calibration->usable(x, y))
+        ++frame_dead;
+      else
+        micrograph.mask(x, y) = 1;
     }
   }
   micrograph.dead = frame_dead + exclude_outliers(image.values, area, step, Smoothness::image, micrograph.mask);
@@ -499,7 +517,7 @@ void replace_ref(Picture& micrograph, ParameterRef from, ParameterRef to) {
 
 /// A micrograph of the shared scene with its own values of what its `set:` names.
 Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item, std::size_t index,
-                     const std::string& list = "micrographs") {
+                  const std::string& list = "micrographs") {
   Picture micrograph = shared;
   const std::map<std::string, NumberSpec> shared_specs = reader.specs;
   const std::map<std::string, ParameterRef> shared_refs = reader.refs;
@@ -529,16 +547,20 @@ Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item,
 }
 
 /// Starts and bounds of `fit: auto` from the image; the image's middle where there is none to look at.
-void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, const Mask* mask, const std::string& name) {
+void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, const Mask* mask,
+                       const std::string& name) {
   View& view = scene.view;
   auto* droplet = std::get_if<Droplet>(&scene.sample);
   const double middle_x = 0.5 * (view.width - 1), middle_y = 0.5 * (view.height - 1);
-  const auto open = [&](ParameterRef ref) { return ref && reader.table[ref].automatic && !std::isfinite(reader.table[ref].value); };
+  const auto open = [&](ParameterRef ref) {
+    return ref && reader.table[ref].automatic && !std::isfinite(reader.table[ref].value);
+  };
   DiscGuess disc{middle_x, middle_y, 0.25 * std::min(view.width, view.height), 0};
   const bool wanted = open(view.center_x_px) || open(view.center_y_px) || (droplet && open(droplet->diameter_um));
   if (wanted && droplet && values) {
     const DiscGuess found = find_disc(*values, *mask);
-    if (found.contrast >= kLeastDiscContrast) disc = found;
+    if (found.contrast >= kLeastDiscContrast)
+      disc = found;
     else
       reader.warnings.push_back(name + ": no disc is visible; the centre starts in the middle of the image. Give " +
                                 "center_px and diameter_um to start elsewhere.");
@@ -591,7 +613,8 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
   const Parameter& diameter = reader.table[droplet->diameter_um];
   const double diameter_px = diameter.value / view.pixel_size_um;
   const double field_px = std::max(view.width, view.height);
-  const std::string field = show(view.width * view.pixel_size_um) + " x " + show(view.height * view.pixel_size_um) + " um";
+  const std::string field =
+      show(view.width * view.pixel_size_um) + " x " + show(view.height * view.pixel_size_um) + " um";
   const auto plausible = [&](double value_um) {
     const double pixels = value_um / view.pixel_size_um;
     return pixels >= 3 && pixels <= 2 * field_px;
@@ -601,13 +624,14 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
     for (double factor : {1e3, 1e6})
       if (plausible(diameter.value * factor))
         hint = "did you mean " + show(diameter.value * factor) + "? the key is in um";
-    reader.problems.add(diameter.where, "diameter_um = " + show(diameter.value) + " is only " + show(diameter_px) +
-                                            " pixels in " + name, hint);
+    reader.problems.add(
+        diameter.where,
+        "diameter_um = " + show(diameter.value) + " is only " + show(diameter_px) + " pixels in " + name, hint);
   } else if (diameter_px > 10 * field_px) {
     const double smaller = diameter.value / 1e3;
-    reader.problems.add(diameter.where, "diameter_um = " + show(diameter.value) + " is " +
-                                            show(std::round(diameter_px / field_px)) + " times the field of view (" + field +
-                                            ") of " + name,
+    reader.problems.add(diameter.where,
+                        "diameter_um = " + show(diameter.value) + " is " + show(std::round(diameter_px / field_px)) +
+                            " times the field of view (" + field + ") of " + name,
                         plausible(smaller) ? "did you mean " + show(smaller) + "? the key is in um"
                                            : "check pixel_size_um = " + show(view.pixel_size_um));
   } else {
@@ -617,8 +641,9 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
     const double dy = std::max({-0.5 - y.value, y.value - (view.height - 0.5), 0.0});
     if (std::hypot(dx, dy) >= 0.5 * diameter_px)
       reader.problems.add(x.where.line > 0 ? x.where : diameter.where,
-                          "center_px = [" + show(x.value) + ", " + show(y.value) + "] puts the droplet outside " + name +
-                              ", which is " + std::to_string(view.width) + " x " + std::to_string(view.height) + " pixels");
+                          "center_px = [" + show(x.value) + ", " + show(y.value) + "] puts the droplet outside " +
+                              name + ", which is " + std::to_string(view.width) + " x " + std::to_string(view.height) +
+                              " pixels");
   }
 }
 
@@ -628,8 +653,7 @@ void set_view(ConfigReader& reader, const MicrographSettings& settings, int widt
   scene.view.width = width;
   scene.view.height = height;
   scene.view.pixel_size_um = settings.pixel_size_um.value_or(file_pixel_um);
-  if (settings.pixel_size_um && file_pixel_um > 0 &&
-      std::abs(*settings.pixel_size_um / file_pixel_um - 1) > 0.01)
+  if (settings.pixel_size_um && file_pixel_um > 0 && std::abs(*settings.pixel_size_um / file_pixel_um - 1) > 0.01)
     reader.warnings.push_back(name + " states a pixel size of " + show(file_pixel_um) + " um; the config's " +
                               show(*settings.pixel_size_um) + " um is used.");
 }
@@ -647,7 +671,8 @@ void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Sc
 }
 
 void read_fit_options(ConfigReader& reader, const Block& root, FitOptions& options) {
-  const Block block = reader.block(root, "fit", {"max_iterations", "threads", "scan_pixels", "scan_candidates", "outliers"}, false);
+  const Block block =
+      reader.block(root, "fit", {"max_iterations", "threads", "scan_pixels", "scan_candidates", "outliers"}, false);
   options.max_iterations = reader.integer(block, "max_iterations", 1, 100000).value_or(options.max_iterations);
   options.threads = reader.integer(block, "threads", 0, 1024).value_or(options.threads);
   options.scan_pixels = reader.integer(block, "scan_pixels", 100, 100000000).value_or(options.scan_pixels);
@@ -680,14 +705,15 @@ void read_prior(ConfigReader& reader, const Block& root, FitJob& job) {
       reader.problems.add(item.where, "prior.parameters must hold parameter paths, found " + item.describe());
       continue;
     }
-    const bool repeated = std::any_of(names.begin(), names.end(), [&](const auto& name) { return name.first == item.text; });
+    const bool repeated =
+        std::any_of(names.begin(), names.end(), [&](const auto& name) { return name.first == item.text; });
     if (repeated) {
       reader.problems.add(item.where, item.text + " is listed twice");
     } else if (std::find(free.begin(), free.end(), item.text) == free.end()) {
       const std::string near = nearest_word(item.text, free);
       const bool known = static_cast<bool>(reader.table.find(item.text));
       reader.problems.add(item.where, item.text + (known ? " is not fitted here" : " is no parameter of this config"),
-                          known           ? "give it {value: .., fit: [low, high]}"
+                          known          ? "give it {value: .., fit: [low, high]}"
                           : near.empty() ? "fitted here: " + list_words(free)
                                          : "did you mean " + near + "?");
     } else if (const Parameter& parameter = reader.table[reader.table.find(item.text)];
@@ -711,7 +737,8 @@ void read_prior(ConfigReader& reader, const Block& root, FitJob& job) {
     parameter.prior_sd.reset();
     parameter.value = std::clamp(mean, parameter.lower, parameter.upper);
     if (parameter.value != mean)
-      reader.warnings.push_back("The prior mean of " + parameter.name + ", " + show(mean) + ", lies outside its bounds.");
+      reader.warnings.push_back("The prior mean of " + parameter.name + ", " + show(mean) +
+                                ", lies outside its bounds.");
   }
   job.prior = std::move(prior);
 }
@@ -731,22 +758,25 @@ void read_prior(ConfigReader& reader, const Block& root, FitJob& job) {
   throw UserError(std::move(problems));
 }
 
-/// `image` replaces the single micrograph's file; with `series` the micrograph is one of its frames. Without `starts` nothing is looked
-/// for in the image: enough to know that a config is sound.
-Config load(const std::filesystem::path& path, std::string text, ConfigUse use, const std::optional<std::filesystem::path>& image,
-            const ImageSeries* series = nullptr, std::size_t frame = 0, bool starts = true) {
+/// `image` replaces the single micrograph's file; with `series` the micrograph is one of its frames. Without `starts`
+/// nothing is looked for in the image: enough to know that a config is sound.
+Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
+            const std::optional<std::filesystem::path>& image, const ImageSeries* series = nullptr,
+            std::size_t frame = 0, bool starts = true) {
   Config config;
   config.path = path;
   config.text = std::move(text);
   ConfigReader reader(path.string(), path.parent_path(), use);
   const YamlNode tree = parse_yaml(config.text, reader.file, reader.problems);
   const Block root{&tree, "", {reader.file}};
-  reader.check_keys(tree, "", {"micrograph", "micrographs", "calibration", "image_size_px", "sample", "microscope",
-                               "accuracy", "physics", "transport", "prior", "fit", "signal"});
+  reader.check_keys(tree, "",
+                    {"micrograph", "micrographs", "calibration", "image_size_px", "sample", "microscope", "accuracy",
+                     "physics", "transport", "prior", "fit", "signal"});
 
   const YamlNode* list = root.find("micrographs");
   const std::vector<YamlNode> cells = series ? cell_nodes(series->frames[frame]) : std::vector<YamlNode>{};
-  std::vector<Item> items = series ? std::vector<Item>{item_of(*series, series->frames[frame], cells)} : read_items(reader, root);
+  std::vector<Item> items =
+      series ? std::vector<Item>{item_of(*series, series->frames[frame], cells)} : read_items(reader, root);
   if (!items.empty()) {
     for (const auto& [name, node] : items[0].set) {
       const bool everywhere = std::all_of(items.begin(), items.end(), [&](const Item& item) {
@@ -759,7 +789,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   if (!signals.empty()) {
     const auto everywhere = [&](const std::string& path) {
       return std::all_of(signals.begin(), signals.end(), [&](const SignalItem& item) {
-        return std::any_of(item.columns.begin(), item.columns.end(), [&](const SignalItem::Column& c) { return c.path == path; }) ||
+        return std::any_of(item.columns.begin(), item.columns.end(),
+                           [&](const SignalItem::Column& c) { return c.path == path; }) ||
                std::any_of(item.set.begin(), item.set.end(), [&](const auto& entry) { return entry.first == path; });
       });
     };
@@ -771,7 +802,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   Picture shared;
   const Quantity quantity = signals.empty() ? Quantity::intensity : signals[0].quantity;
   for (const SignalItem& item : signals)
-    if (item.quantity != quantity) reader.problems.add(item.where, "every table of a config must have the same quantity");
+    if (item.quantity != quantity)
+      reader.problems.add(item.where, "every table of a config must have the same quantity");
   reader.polarizers = quantity == Quantity::intensity;
   shared.scene = read_scene(reader, root);
   config.observable.quantity = quantity;
@@ -779,7 +811,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   if (list && settings.image)
     reader.problems.add(settings.image_where, "micrograph.image is given beside micrographs", "give one of the two");
   if (list && image)
-    reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `micrographs:`");
+    reader.problems.add({reader.file},
+                        "--image replaces the image of `micrograph:`, but this config has `micrographs:`");
   shared.scene.view.center_x_px = settings.center_x;
   shared.scene.view.center_y_px = settings.center_y;
   shared.scene.view.rotation_deg = settings.rotation;
@@ -813,13 +846,16 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   std::vector<Picture> micrographs;
   std::vector<Readings> tables;
   if (!signals.empty()) {
-    if (image) reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `signal:`");
+    if (image)
+      reader.problems.add({reader.file}, "--image replaces the image of `micrograph:`, but this config has `signal:`");
     if (!std::holds_alternative<Cell>(shared.scene.sample) && reader.problems.empty())
       reader.problems.add(signals[0].where, "signal is for cells: every row sees the same light");
     if (const auto* cell = std::get_if<Cell>(&shared.scene.sample); cell && quantity != Quantity::intensity) {
       const auto* field = std::get_if<FreederickszDirector>(&cell->director);
       if (!std::holds_alternative<UniformDirector>(cell->director) && (!field || field->twist_deg || field->pitch_um))
-        reader.problems.add(signals[0].where, "the axis of this cell turns about the light: its retardance is not one number", "quantity: intensity");
+        reader.problems.add(signals[0].where,
+                            "the axis of this cell turns about the light: its retardance is not one number",
+                            "quantity: intensity");
     }
     set_view(reader, settings, 1, 1, 0, "the signal", shared.scene);
     if (reader.problems.empty()) resolve_automatic(reader, shared.scene, nullptr, nullptr, "the signal");
@@ -845,7 +881,9 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   // An image may have a focus of its own, which only waves know.
   for (const Picture& own : micrographs) {
     const ParameterRef focus = own.scene.microscope.focus_um;
-    if (!focus || focus == shared.scene.microscope.focus_um || own.scene.ceiling == Ceiling::wave || !is_defocused(reader, own.scene)) continue;
+    if (!focus || focus == shared.scene.microscope.focus_um || own.scene.ceiling == Ceiling::wave ||
+        !is_defocused(reader, own.scene))
+      continue;
     if (!reader.choose_waves) {
       add_defocus_problem(reader, own.scene);
       continue;
@@ -855,9 +893,12 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
   }
 
   // Without an image to look at there is only the view.
-  const bool view_only = use == ConfigUse::render || (use == ConfigUse::plan && !image && signals.empty() && std::none_of(items.begin(), items.end(), [&](const Item& i) {
-    return i.image && (!size || std::filesystem::exists(reader.resolve(*i.image)));  // named, but not yet taken
-  }));
+  const bool view_only =
+      use == ConfigUse::render ||
+      (use == ConfigUse::plan && !image && signals.empty() &&
+       std::none_of(items.begin(), items.end(), [&](const Item& i) {
+         return i.image && (!size || std::filesystem::exists(reader.resolve(*i.image)));  // named, but not yet taken
+       }));
   if (use != ConfigUse::render) {
     // A shared parameter that every image replaces by its own is no unknown of the fit.
     std::set<int> used;
@@ -873,12 +914,16 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     const bool sound = reader.problems.empty();  // else images may be missing
     for (int i = 0; i < reader.table.size(); ++i) {
       if (used.count(i) || !reader.table[i].free) continue;
-      if (!reader.replaced.count(i) && sound) reader.problems.add(reader.table[i].where, reader.table[i].name + " is fitted, but nothing here depends on it", "give it as a number, or leave it out");
+      if (!reader.replaced.count(i) && sound)
+        reader.problems.add(reader.table[i].where, reader.table[i].name + " is fitted, but nothing here depends on it",
+                            "give it as a number, or leave it out");
       reader.table[i].free = false;
     }
   }
 
-  const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample) || std::holds_alternative<StressedDisc>(shared.scene.sample) || std::holds_alternative<SampledVolume>(shared.scene.sample);
+  const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample) ||
+                                std::holds_alternative<StressedDisc>(shared.scene.sample) ||
+                                std::holds_alternative<SampledVolume>(shared.scene.sample);
   const auto demand_pixel_size = [&](const Scene& scene) {
     if (needs_pixel_size && !(scene.view.pixel_size_um > 0) && reader.problems.empty())
       reader.problems.add(settings.where.line > 0 ? settings.where : Where{reader.file},
@@ -900,7 +945,9 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     } else if (image || item.image) {
       const ImageRequest request{image ? *image : reader.resolve(*item.image), item.page, settings.channel,
                                  image ? Where{image->string()} : item.image_where};
-      if (const std::optional<LoadedImage> loaded = has_ring_table(scene) ? load_ring_table(reader, request.path, request.where, scene, config.observable) : try_load(reader, request)) {
+      if (const std::optional<LoadedImage> loaded =
+              has_ring_table(scene) ? load_ring_table(reader, request.path, request.where, scene, config.observable)
+                                    : try_load(reader, request)) {
         set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
         demand_pixel_size(scene);
         if (reader.problems.empty()) {
@@ -932,7 +979,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     if (settings.dark || settings.parallel) calibration = load_calibration(reader, settings);
     std::optional<Mask> user_mask;
     if (settings.mask) {
-      if (const auto loaded = try_load(reader, {reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where})) {
+      if (const auto loaded =
+              try_load(reader, {reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where})) {
         user_mask.emplace(loaded->values.width(), loaded->values.height(), 0);
         for (std::size_t i = 0; i < user_mask->size(); ++i)
           user_mask->values()[i] = loaded->values.values()[i] != 0 && std::isfinite(loaded->values.values()[i]);
@@ -949,22 +997,23 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
       const std::filesystem::path file = replaced ? *image : reader.resolve(*item.image);
       const Where where = replaced ? Where{file.string()} : item.image_where;
       micrograph.name = file.filename().string();
-      std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene) ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
-                                                                          : try_load(reader, {file, item.page, settings.channel, where});
+      std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene)
+                                              ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
+                                              : try_load(reader, {file, item.page, settings.channel, where});
       if (!loaded) continue;
       for (const std::string& note : loaded->notes) reader.warnings.push_back(micrograph.name + ": " + note);
       if (size && (loaded->values.width() != (*size)[0] || loaded->values.height() != (*size)[1]))
-        reader.problems.add(root.find("image_size_px")->where, "image_size_px differs from the size of " +
-                                                                   micrograph.name + ", " +
-                                                                   std::to_string(loaded->values.width()) + " x " +
-                                                                   std::to_string(loaded->values.height()),
+        reader.problems.add(root.find("image_size_px")->where,
+                            "image_size_px differs from the size of " + micrograph.name + ", " +
+                                std::to_string(loaded->values.width()) + " x " +
+                                std::to_string(loaded->values.height()),
                             "leave it out");
-      set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, micrograph.name,
-               micrograph.scene);
+      set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um,
+               micrograph.name, micrograph.scene);
       if (sound) demand_pixel_size(micrograph.scene);
       if (frames_missing || mask_missing) continue;
-      if (!fill_pixels(reader, settings, calibration ? &*calibration : nullptr, user_mask ? &*user_mask : nullptr, *loaded,
-                       where, micrograph))
+      if (!fill_pixels(reader, settings, calibration ? &*calibration : nullptr, user_mask ? &*user_mask : nullptr,
+                       *loaded, where, micrograph))
         continue;
       if (!sound || !reader.problems.empty() || !starts) continue;
       resolve_automatic(reader, micrograph.scene, &micrograph.values, &micrograph.mask, micrograph.name);
@@ -986,13 +1035,17 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     }
     for (Readings& table : tables) config.job.measurements.push_back(std::move(table));
     if (const auto* droplet = std::get_if<Droplet>(&config.scene.sample))
-      if (const auto* axial = std::get_if<AxialDirector>(&droplet->director); axial && axial->compare) add_branches(config.job);
-    if (reader.problems.empty()) read_prior(reader, root, config.job);
-    else if (root.find("prior")) reader.block(root, "prior", {"from", "parameters"}, true);
+      if (const auto* axial = std::get_if<AxialDirector>(&droplet->director); axial && axial->compare)
+        add_branches(config.job);
+    if (reader.problems.empty())
+      read_prior(reader, root, config.job);
+    else if (root.find("prior"))
+      reader.block(root, "prior", {"from", "parameters"}, true);
   }
   if (std::holds_alternative<Droplet>(config.scene.sample) && config.scene.microscope.objective_na == 0)
-    config.job.taken_as_exact.push_back("microscope.objective_na is not given: every ray that leaves the droplet is "
-                                        "taken to reach the image, and wave optics, which needs it, is left out.");
+    config.job.taken_as_exact.push_back(
+        "microscope.objective_na is not given: every ray that leaves the droplet is "
+        "taken to reach the image, and wave optics, which needs it, is left out.");
 
   if (!reader.problems.empty()) throw_sorted(reader);
   config.job.options.choose_rays = reader.choose_rays;
@@ -1001,11 +1054,13 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
     const Theta theta = reader.table.values();
     if (use == ConfigUse::fit) {
       config.job.options.choose_waves = true;
-    } else if (const WaveChoice choice = wave_choice(config.scene, theta); choice.seconds_an_image <= reader.max_seconds) {
+    } else if (const WaveChoice choice = wave_choice(config.scene, theta);
+               choice.seconds_an_image <= reader.max_seconds) {
       config.scene.ceiling = Ceiling::wave;
       for_each_scene(config.job.measurements, [](Scene& scene) { scene.ceiling = Ceiling::wave; });
     } else {
-      reader.warnings.push_back(choice.words + " Rays are taken instead: physics.max_seconds and ceiling: wave change that.");
+      reader.warnings.push_back(choice.words +
+                                " Rays are taken instead: physics.max_seconds and ceiling: wave change that.");
     }
   }
   config.job.parameters = std::move(reader.table);
@@ -1016,7 +1071,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use, 
 
 }  // namespace
 
-Config load_config(const std::filesystem::path& path, ConfigUse use, const std::optional<std::filesystem::path>& image) {
+Config load_config(const std::filesystem::path& path, ConfigUse use,
+                   const std::optional<std::filesystem::path>& image) {
   std::string text = read_text(path);
   if (use != ConfigUse::fit && holds_series(text)) {
     // What the frames have in common shows in the first.

@@ -15,13 +15,15 @@ NumberSpec positive(double upper, std::string unit) {
   return spec;
 }
 
-std::vector<ParameterRef> read_polynomial(ConfigReader& reader, const Block& block, const std::string& key, const std::string& terms, const NumberSpec& spec) {
+std::vector<ParameterRef> read_polynomial(ConfigReader& reader, const Block& block, const std::string& key,
+                                          const std::string& terms, const NumberSpec& spec) {
   std::vector<ParameterRef> refs;
   const YamlNode* list = block.find(key);
   if (!list) return refs;
   if (!list->is_sequence() || list->items.empty() || list->items.size() > 36) {
-    reader.problems.add(list->where, key + " must be a list of 1 to 36 coefficients of " + terms + ", found " +
-                                         (list->is_sequence() ? std::to_string(list->items.size()) + " items" : list->describe()));
+    reader.problems.add(list->where,
+                        key + " must be a list of 1 to 36 coefficients of " + terms + ", found " +
+                            (list->is_sequence() ? std::to_string(list->items.size()) + " items" : list->describe()));
     return refs;
   }
   for (std::size_t i = 0; i < list->items.size(); ++i)
@@ -34,8 +36,8 @@ std::vector<ParameterRef> read_polynomial(ConfigReader& reader, const Block& blo
 StressedDisc read_stressed_disc(ConfigReader& reader, const Block& parent) {
   StressedDisc disc;
   const Block block = reader.block(parent, "disc",
-                                   {"diameter_um", "thickness_um", "load_n", "stress_optic_brewster", "load_azimuth_deg", "contact_radius_um",
-                                    "rim_um", "residual", "illumination"},
+                                   {"diameter_um", "thickness_um", "load_n", "stress_optic_brewster",
+                                    "load_azimuth_deg", "contact_radius_um", "rim_um", "residual", "illumination"},
                                    true);
   disc.diameter_um = reader.number(block, "diameter_um", positive(1e7, "um"));
   NumberSpec load = positive(1e7, "N");

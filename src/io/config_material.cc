@@ -29,7 +29,8 @@ NumberSpec kelvins() { return within(100, 2000, "K"); }
 const std::vector<std::string> kRayKeys = {"file", "cauchy", "sellmeier", "range_nm"};
 
 bool is_ray_block(const YamlNode* node) {
-  return node && node->is_map() && std::any_of(kRayKeys.begin(), kRayKeys.end(), [&](const auto& key) { return node->find(key); });
+  return node && node->is_map() &&
+         std::any_of(kRayKeys.begin(), kRayKeys.end(), [&](const auto& key) { return node->find(key); });
 }
 
 /// A constant of the program's own: a parameter that the config cannot name.
@@ -82,11 +83,13 @@ RayIndices read_ray(ConfigReader& reader, const Block& parent, const std::string
   RayIndices ray;
   const NumberSpec limit = within(100, 100000, "nm");
   if (!range) {
-    reader.missing(block, "range_nm", "[low, high], the wavelengths the coefficients hold for: nothing is extrapolated");
+    reader.missing(block, "range_nm",
+                   "[low, high], the wavelengths the coefficients hold for: nothing is extrapolated");
   } else if (!range->is_sequence() || range->items.size() != 2) {
     reader.problems.add(range->where, "range_nm must be [low, high], found " + range->describe());
   } else {
-    const auto low = reader.value_of(range->items[0], "range_nm", limit), high = reader.value_of(range->items[1], "range_nm", limit);
+    const auto low = reader.value_of(range->items[0], "range_nm", limit),
+               high = reader.value_of(range->items[1], "range_nm", limit);
     if (low && high && *low >= *high) reader.problems.add(range->where, "range_nm must grow: [low, high]");
     ray.law.lower_um = low.value_or(100) / 1000;
     ray.law.upper_um = high.value_or(100000) / 1000;
@@ -103,7 +106,8 @@ RayIndices read_ray(ConfigReader& reader, const Block& parent, const std::string
     ray.law.form = Dispersion::Form::cauchy;
     if (!cauchy->is_sequence() || cauchy->items.empty() || cauchy->items.size() > 6) {
       reader.problems.add(cauchy->where, "cauchy must be [A, B, C], of n = A + B/l^2 + C/l^4 with l in um, found " +
-                                             (cauchy->is_sequence() ? std::to_string(cauchy->items.size()) + " items" : cauchy->describe()));
+                                             (cauchy->is_sequence() ? std::to_string(cauchy->items.size()) + " items"
+                                                                    : cauchy->describe()));
       return ray;
     }
     for (std::size_t i = 0; i < cauchy->items.size(); ++i) {
@@ -115,7 +119,10 @@ RayIndices read_ray(ConfigReader& reader, const Block& parent, const std::string
   ray.law.form = Dispersion::Form::sellmeier_2;
   constant(0);
   if (!sellmeier->is_sequence() || sellmeier->items.empty() || sellmeier->items.size() > 8) {
-    reader.problems.add(sellmeier->where, "sellmeier must be [[B1, C1], [B2, C2], ..], of n^2 = 1 + sum B l^2/(l^2 - C) with l in um, found " + sellmeier->describe());
+    reader.problems.add(
+        sellmeier->where,
+        "sellmeier must be [[B1, C1], [B2, C2], ..], of n^2 = 1 + sum B l^2/(l^2 - C) with l in um, found " +
+            sellmeier->describe());
     return ray;
   }
   for (std::size_t i = 0; i < sellmeier->items.size(); ++i) {
@@ -131,15 +138,17 @@ RayIndices read_ray(ConfigReader& reader, const Block& parent, const std::string
   return ray;
 }
 
-void only_one(ConfigReader& reader, const Block& block, const std::string& chosen, const std::vector<std::string>& others) {
+void only_one(ConfigReader& reader, const Block& block, const std::string& chosen,
+              const std::vector<std::string>& others) {
   for (const std::string& other : others)
     if (const YamlNode* node = block.find(other))
       reader.problems.add(node->where, other + " is given beside " + chosen, "give one of the two");
 }
 
 FourParameterIndices read_four_parameter(ConfigReader& reader, const Block& material) {
-  const Block block = reader.block(material, "four_parameter",
-                                   {"mean_index", "mean_slope_per_k", "birefringence_0k", "exponent", "clearing_k"}, true);
+  const Block block =
+      reader.block(material, "four_parameter",
+                   {"mean_index", "mean_slope_per_k", "birefringence_0k", "exponent", "clearing_k"}, true);
   FourParameterIndices::Set set;
   set.mean_index = reader.number(block, "mean_index", within(1, 4));
   set.mean_slope_per_k = reader.number(block, "mean_slope_per_k", within(-0.1, 0.1), 0);
@@ -150,7 +159,8 @@ FourParameterIndices read_four_parameter(ConfigReader& reader, const Block& mate
 }
 
 HallerLaw read_haller(ConfigReader& reader, const Block& material, std::optional<double> reference_k) {
-  const Block block = reader.block(material, "haller", {"reference_k", "clearing_k", "exponent", "mean_slope_per_k"}, true);
+  const Block block =
+      reader.block(material, "haller", {"reference_k", "clearing_k", "exponent", "mean_slope_per_k"}, true);
   HallerLaw law;
   if (!reference_k && block.node && !block.find("reference_k"))
     reader.missing(block, "reference_k", "the temperature at which the indices hold");
@@ -172,15 +182,16 @@ std::vector<double> extremes(const Parameter& p) {
 }  // namespace
 
 const std::vector<std::string>& law_material_keys() {
-  static const std::vector<std::string> keys = {"extraordinary", "file", "haller", "four_parameter", "birefringence_factor"};
+  static const std::vector<std::string> keys = {"extraordinary", "file", "haller", "four_parameter",
+                                                "birefringence_factor"};
   return keys;
 }
 
 bool is_law_material(const Block& material) {
   const auto& keys = law_material_keys();
   const YamlNode* name = material.find("name");
-  return std::any_of(keys.begin(), keys.end(), [&](const auto& key) { return material.find(key); }) || is_ray_block(material.find("ordinary")) ||
-         (name && (!name->is_scalar() || name->text != "E44-steinberg2020"));
+  return std::any_of(keys.begin(), keys.end(), [&](const auto& key) { return material.find(key); }) ||
+         is_ray_block(material.find("ordinary")) || (name && (!name->is_scalar() || name->text != "E44-steinberg2020"));
 }
 
 Material read_law_material(ConfigReader& reader, const Block& block, const Sample& sample) {
@@ -190,13 +201,15 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
   const Plate* plate = std::get_if<Plate>(&sample);
   const bool heated = plate && std::holds_alternative<HeatStep>(plate->heat);
   if (const YamlNode* name = block.find("name")) {
-    only_one(reader, block, "a material's name", {"ordinary", "extraordinary", "birefringence", "file", "four_parameter"});
+    only_one(reader, block, "a material's name",
+             {"ordinary", "extraordinary", "birefringence", "file", "four_parameter"});
     preset = name->is_scalar() ? find_material_preset(name->text) : nullptr;
     if (!preset) {
       std::vector<std::string> names{"E44-steinberg2020", "5CB", "E7", "E44"};
       for (const MaterialPreset& p : material_presets()) names.push_back(p.name);
       if (name->is_scalar() && name->text == "E44-steinberg2020")
-        reader.problems.add(name->where, "E44-steinberg2020 has a law of temperature and an uncertainty of its own", "leave haller and birefringence_factor out");
+        reader.problems.add(name->where, "E44-steinberg2020 has a law of temperature and an uncertainty of its own",
+                            "leave haller and birefringence_factor out");
       else
         reader.choice(block, "name", names);
       return ConstantIndices{};
@@ -216,8 +229,10 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
       FourParameterIndices four;
       for (const auto& s : preset->four_parameter) {
         const std::string path = "sample.material." + preset->name + show(1000 * s.wavelength_um);
-        four.sets.push_back({s.wavelength_um, hidden(reader, path + ".mean_index", s.mean_index), hidden(reader, path + ".mean_slope_per_k", s.mean_slope_per_k),
-                             hidden(reader, path + ".birefringence_0k", s.birefringence_0k), hidden(reader, path + ".exponent", s.exponent),
+        four.sets.push_back({s.wavelength_um, hidden(reader, path + ".mean_index", s.mean_index),
+                             hidden(reader, path + ".mean_slope_per_k", s.mean_slope_per_k),
+                             hidden(reader, path + ".birefringence_0k", s.birefringence_0k),
+                             hidden(reader, path + ".exponent", s.exponent),
                              hidden(reader, path + ".clearing_k", s.clearing_k)});
       }
       law.indices = four;
@@ -225,7 +240,8 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
       law.upper_k = preset->upper_k;
     }
   } else if (block.find("file")) {
-    only_one(reader, block, "a material's file", {"ordinary", "extraordinary", "birefringence", "four_parameter", "haller", "birefringence_factor"});
+    only_one(reader, block, "a material's file",
+             {"ordinary", "extraordinary", "birefringence", "four_parameter", "haller", "birefringence_factor"});
     const RayIndices ray = read_file(reader, block);
     known_at_k = ray.temperature_k;
     law.indices = DispersiveIndices{ray.law, ray.law};
@@ -234,25 +250,31 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
     law.indices = read_four_parameter(reader, block);
   } else if (is_ray_block(block.find("ordinary")) || block.find("extraordinary")) {
     only_one(reader, block, "laws of both rays", {"birefringence"});
-    if (!block.find("ordinary")) reader.missing(block, "ordinary", "the ordinary ray: {file: ..}, {cauchy: ..} or {sellmeier: ..}");
-    if (!block.find("extraordinary")) reader.missing(block, "extraordinary", "the extraordinary ray: {file: ..}, {cauchy: ..} or {sellmeier: ..}");
+    if (!block.find("ordinary"))
+      reader.missing(block, "ordinary", "the ordinary ray: {file: ..}, {cauchy: ..} or {sellmeier: ..}");
+    if (!block.find("extraordinary"))
+      reader.missing(block, "extraordinary", "the extraordinary ray: {file: ..}, {cauchy: ..} or {sellmeier: ..}");
     DispersiveIndices both;
     if (block.find("ordinary") && block.find("extraordinary")) {
       const RayIndices o = read_ray(reader, block, "ordinary"), e = read_ray(reader, block, "extraordinary");
       both = {o.law, e.law};
       known_at_k = o.temperature_k ? o.temperature_k : e.temperature_k;
       if (o.temperature_k && e.temperature_k && std::abs(*o.temperature_k - *e.temperature_k) > kTemperatureMargin_k)
-        reader.problems.add(block.where, "the two rays are given at " + show(*o.temperature_k) + " K and " + show(*e.temperature_k) + " K",
-                            "use files of one temperature");
+        reader.problems.add(
+            block.where,
+            "the two rays are given at " + show(*o.temperature_k) + " K and " + show(*e.temperature_k) + " K",
+            "use files of one temperature");
     }
     law.indices = both;
   } else {
-    const ConstantIndices constant{reader.number(block, "ordinary", within(1, 4)), reader.number(block, "birefringence", within(-1, 1))};
+    const ConstantIndices constant{reader.number(block, "ordinary", within(1, 4)),
+                                   reader.number(block, "birefringence", within(-1, 1))};
     law.indices = constant;
   }
   if (block.find("haller")) {
     if (preset && !preset->four_parameter.empty())
-      reader.problems.add(block.find("haller")->where, preset->name + " has a law of temperature of its own", "leave haller out");
+      reader.problems.add(block.find("haller")->where, preset->name + " has a law of temperature of its own",
+                          "leave haller out");
     else
       law.haller = read_haller(reader, block, known_at_k);
   }
@@ -265,7 +287,8 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
   }
   if (heated) {
     if (temperature)
-      reader.problems.add(temperature->where, "temperature_k is given beside a temperature profile (sample.plate.heat)", "leave it out");
+      reader.problems.add(temperature->where, "temperature_k is given beside a temperature profile (sample.plate.heat)",
+                          "leave it out");
     if (!by_temperature && block.node)
       reader.problems.add(block.where, "sample.plate.heat has no effect on indices without a law of temperature",
                           "add haller: {clearing_k: .., exponent: ..}, or leave heat out");
@@ -274,10 +297,13 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
   } else if (temperature) {
     const std::optional<double> given = reader.plain(block, "temperature_k", spec);
     if (given && !known_at_k)
-      reader.problems.add(temperature->where, "temperature_k has no effect on these indices", "leave it out, or add haller: {reference_k: .., clearing_k: .., exponent: ..}");
+      reader.problems.add(temperature->where, "temperature_k has no effect on these indices",
+                          "leave it out, or add haller: {reference_k: .., clearing_k: .., exponent: ..}");
     else if (given && std::abs(*given - *known_at_k) > kTemperatureMargin_k)
-      reader.problems.add(temperature->where, "temperature_k = " + show(*given) + ": these indices were measured at " + show(*known_at_k) + " K",
-                          "add haller: {clearing_k: .., exponent: ..}");
+      reader.problems.add(
+          temperature->where,
+          "temperature_k = " + show(*given) + ": these indices were measured at " + show(*known_at_k) + " K",
+          "add haller: {clearing_k: .., exponent: ..}");
   }
   if (block.find("birefringence_factor"))
     law.birefringence_factor = reader.number(block, "birefringence_factor", within(0, 10));
@@ -309,16 +335,20 @@ void check_material_ranges(ConfigReader& reader, const Block& root, const Scene&
     const double lower = 1000 * range->lower, upper = 1000 * range->upper;
     const std::string limits = "[" + show(lower) + ", " + show(upper) + "]";
     if (lower > upper) {
-      reader.problems.add(material ? material->where : sample.where, "the ranges of this scene's indices have no wavelength in common");
+      reader.problems.add(material ? material->where : sample.where,
+                          "the ranges of this scene's indices have no wavelength in common");
       return;
     }
     for (double nm : extremes(wavelength))
       if (nm < lower - 1e-9 * lower || nm > upper + 1e-9 * upper) {
-        reader.problems.add(wavelength.where, "wavelength_nm: " + show(nm) + " is outside " + limits + ", where the indices of this scene are known",
-                            "nothing is extrapolated: use another source of the material");
+        reader.problems.add(
+            wavelength.where,
+            "wavelength_nm: " + show(nm) + " is outside " + limits + ", where the indices of this scene are known",
+            "nothing is extrapolated: use another source of the material");
         return;
       }
-    if (const auto spec = reader.specs.find(wavelength.name); spec != reader.specs.end()) {  // for `set:` of a micrograph
+    // for `set:` of a micrograph
+    if (const auto spec = reader.specs.find(wavelength.name); spec != reader.specs.end()) {
       spec->second.lower = std::max(spec->second.lower, lower);
       spec->second.upper = std::min(spec->second.upper, upper);
     }
@@ -334,14 +364,16 @@ void check_material_ranges(ConfigReader& reader, const Block& root, const Scene&
       const bool reference = law->haller && t == law->haller->reference_k;
       for (double k : extremes(at)) {
         if (k > lowest_clearing - kClearingMargin_k) {
-          reader.problems.add(where, at.name + ": " + show(k) + " K is at or above the clearing point, " + show(lowest_clearing) + " K (less " +
-                                         show(kClearingMargin_k) + " K): there the material is not birefringent",
+          reader.problems.add(where,
+                              at.name + ": " + show(k) + " K is at or above the clearing point, " +
+                                  show(lowest_clearing) + " K (less " + show(kClearingMargin_k) +
+                                  " K): there the material is not birefringent",
                               at.free ? "lower the upper bound" : "");
           break;
         }
         if (law->upper_k > 0 && !reference && (k < law->lower_k || k > law->upper_k)) {
-          reader.problems.add(where, at.name + ": " + show(k) + " K is outside [" + show(law->lower_k) + ", " + show(law->upper_k) +
-                                         "] K, where this material's law holds");
+          reader.problems.add(where, at.name + ": " + show(k) + " K is outside [" + show(law->lower_k) + ", " +
+                                         show(law->upper_k) + "] K, where this material's law holds");
           break;
         }
       }
@@ -359,10 +391,12 @@ void check_material_ranges(ConfigReader& reader, const Block& root, const Scene&
   const double um = value(scene.microscope.wavelength_nm) / 1000;
   const auto plausible = [&](double n, const Where& where, const std::string& what) {
     if (!(n >= 1 && n <= 4))
-      reader.problems.add(where, what + " is " + show(n) + " at " + show(1000 * um) + " nm, outside [1, 4]", "no transparent medium has this index");
+      reader.problems.add(where, what + " is " + show(n) + " at " + show(1000 * um) + " nm, outside [1, 4]",
+                          "no transparent medium has this index");
   };
   if (scene.surround_dispersion)
-    plausible(index_at<double>(*scene.surround_dispersion, um, lookup), sample.find("surround")->where, "the index of the surround");
+    plausible(index_at<double>(*scene.surround_dispersion, um, lookup), sample.find("surround")->where,
+              "the index of the surround");
   const bool needs_temperature = law && !clearing_points(*law).empty() && !law->temperature_k;
   if (law && material && !needs_temperature) {
     const Indices<double> n = material_indices<double>(scene.material, lookup, um);

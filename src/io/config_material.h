@@ -13,8 +13,8 @@ bool is_law_material(const Block& material);
 Material read_law_material(ConfigReader& reader, const Block& material, const Sample& sample);
 /// `surround: {file: ..}`.
 std::optional<Dispersion> read_surround_file(ConfigReader& reader, const Block& surround);
-/// When the microscope has been read too: wavelength and temperatures with their bounds within what the laws cover, indices
-/// that a transparent medium can have.
+/// When the microscope has been read too: wavelength and temperatures with their bounds within what the laws cover,
+/// indices that a transparent medium can have.
 void check_material_ranges(ConfigReader& reader, const Block& root, const Scene& scene);
 
 }  // namespace birefit

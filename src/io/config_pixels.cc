@@ -17,11 +17,11 @@
 namespace birefit {
 namespace {
 
-constexpr double kOutlierSd = 8;          // one normal pixel in 1e15 lies beyond
+constexpr double kOutlierSd = 8;  // one normal pixel in 1e15 lies beyond
 constexpr double kPileUpFraction = 0.002;
 constexpr int kPileUpPixels = 20;
-/// A smooth intensity maximum (fringe crests of sin^2) puts up to three times the pixels of the next codes' average into
-/// its top code; a clipped signal far more.
+/// A smooth intensity maximum (fringe crests of sin^2) puts up to three times the pixels of the next codes' average
+/// into its top code; a clipped signal far more.
 constexpr double kPileUpRatio = 4;
 /// More than half of the pixels at the top is a bright flat image rather than a clipped one.
 constexpr double kPileUpMostly = 0.5;

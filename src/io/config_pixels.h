@@ -20,7 +20,7 @@ void linearise(Image& values, const Transfer& transfer, double top_code);
 /// The lowest code that counts as saturated; infinity for floats without `saturation_counts`.
 struct Saturation {
   double from = 0;
-  bool pile_up = false;      ///< found in the histogram below the file's top code
+  bool pile_up = false;  ///< found in the histogram below the file's top code
   int pile_up_pixels = 0;
 };
 /// Given counts stand; else the file's top code, or a lower code at which many pixels of the area pile up.
@@ -32,7 +32,8 @@ enum class Smoothness {
 };
 /// Finds dead and hot pixels among the usable ones of the area: more than 8 robust standard deviations (at their
 /// brightness) from the median of their 5 x 5 neighbourhood. Clears them in `mask`; returns how many.
-int exclude_outliers(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness, Mask& mask);
+int exclude_outliers(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness,
+                     Mask& mask);
 
 /// Median of the usable pixels of the area and 1.4826 times their median absolute deviation; NaN without any.
 struct RobustSpread {

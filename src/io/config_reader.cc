@@ -103,8 +103,9 @@ void ConfigReader::check_keys(const YamlNode& node, const std::string& path, con
     if (!near.empty()) misspelt.insert(path.empty() ? near : path + "." + near);
     const std::string shown = entry.key.size() > 60 ? entry.key.substr(0, 57) + "..." : entry.key;
     problems.add(entry.where, "unknown key " + shown + (path.empty() ? "" : " in " + path),
-                 !near.empty() ? "did you mean " + near + "?"
-                               : known.empty() ? "no keys are expected here" : "known here: " + list_words(known));
+                 !near.empty()   ? "did you mean " + near + "?"
+                 : known.empty() ? "no keys are expected here"
+                                 : "known here: " + list_words(known));
   }
 }
 
@@ -238,7 +239,8 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
     if (prior_node)
       problems.add(prior_node->where, name + " has prior_sd but no fit: a prior needs a fitted parameter",
                    "add fit: [low, high], or leave prior_sd out");
-    if (!value_node) problems.add(node.where, name + " needs a value", "write a number or {value: .., fit: [low, high]}");
+    if (!value_node)
+      problems.add(node.where, name + " needs a value", "write a number or {value: .., fit: [low, high]}");
     return ref;
   }
   parameter.free = true;
@@ -251,10 +253,10 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
     // `value` beside `auto` stands; without it the value is found in the image.
     if (!value) parameter.value = std::numeric_limits<double>::quiet_NaN();
   } else if (!fit_node->is_sequence() || fit_node->items.size() != 2) {
-    problems.add(fit_node->where, name + ": fit must be two bounds [low, high]" + (spec.automatic ? " or auto" : "") +
-                                      ", found " +
-                                      (fit_node->is_sequence() ? std::to_string(fit_node->items.size()) + " items"
-                                                               : fit_node->describe()));
+    problems.add(
+        fit_node->where,
+        name + ": fit must be two bounds [low, high]" + (spec.automatic ? " or auto" : "") + ", found " +
+            (fit_node->is_sequence() ? std::to_string(fit_node->items.size()) + " items" : fit_node->describe()));
   } else {
     if (!value_node) problems.add(node.where, name + " is fitted but has no start", "add value: .. inside the bounds");
     const std::optional<double> low = finite(fit_node->items[0], name + " fit bound");
@@ -263,21 +265,23 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
       NumberSpec closed = spec;  // a bound may touch an open end; the value may not
       closed.lower_open = closed.upper_open = false;
       if (*low >= *high) {
-        problems.add(fit_node->where, name + ": fit bounds [" + show(*low) + ", " + show(*high) + "] are " +
-                                          (*low > *high ? "reversed" : "equal"),
-                     *low > *high ? "did you mean [" + show(*high) + ", " + show(*low) + "]?"
-                                  : "a known number needs no fit");
+        problems.add(
+            fit_node->where,
+            name + ": fit bounds [" + show(*low) + ", " + show(*high) + "] are " +
+                (*low > *high ? "reversed" : "equal"),
+            *low > *high ? "did you mean [" + show(*high) + ", " + show(*low) + "]?" : "a known number needs no fit");
       } else {
         for (int i = 0; i < 2; ++i) {
           const double bound = i == 0 ? *low : *high;
           if (!closed.contains(bound))
-            problems.add(fit_node->items[i].where,
-                         name + " fit bound " + show(bound) + " is outside " + closed.range(), unit_hint(bound, closed));
+            problems.add(fit_node->items[i].where, name + " fit bound " + show(bound) + " is outside " + closed.range(),
+                         unit_hint(bound, closed));
         }
         if (value && (*value < *low || *value > *high))
-          problems.add(value_node->where, name + " = " + show(*value) + " is outside its fit bounds [" + show(*low) +
-                                              ", " + show(*high) + "]",
-                       "start inside them");
+          problems.add(
+              value_node->where,
+              name + " = " + show(*value) + " is outside its fit bounds [" + show(*low) + ", " + show(*high) + "]",
+              "start inside them");
       }
       parameter.lower = *low;
       parameter.upper = *high;
@@ -288,8 +292,7 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
     positive.lower = 0;
     positive.lower_open = true;
     const std::optional<double> sd = value_of(*prior_node, name + " prior_sd", positive);
-    if (!value_node)
-      problems.add(prior_node->where, name + " has prior_sd but no value to centre it on");
+    if (!value_node) problems.add(prior_node->where, name + " has prior_sd but no value to centre it on");
     parameter.prior_sd = sd;
   }
   return ref;
@@ -346,8 +349,9 @@ std::optional<std::vector<int>> ConfigReader::integers(const Block& block, const
   const YamlNode* node = block.find(key);
   if (!node) return std::nullopt;
   if (!node->is_sequence() || node->items.size() != count) {
-    problems.add(node->where, key + " must be " + shape + ", found " +
-                                  (node->is_sequence() ? std::to_string(node->items.size()) + " items" : node->describe()));
+    problems.add(node->where,
+                 key + " must be " + shape + ", found " +
+                     (node->is_sequence() ? std::to_string(node->items.size()) + " items" : node->describe()));
     return std::nullopt;
   }
   std::vector<int> values;

@@ -25,10 +25,10 @@ struct NumberSpec {
   double lower = -kInfinity, upper = kInfinity;
   bool lower_open = false, upper_open = false;
   double physical_lower = -kInfinity, physical_upper = kInfinity;  ///< see Parameter
-  bool automatic = false;  ///< `fit: auto` is accepted
-  bool linear = false;     ///< gain and offset
-  bool percent = false;    ///< often given as a percentage by mistake
-  bool fixed = false;      ///< cannot be fitted
+  bool automatic = false;                                          ///< `fit: auto` is accepted
+  bool linear = false;                                             ///< gain and offset
+  bool percent = false;                                            ///< often given as a percentage by mistake
+  bool fixed = false;                                              ///< cannot be fitted
 
   bool contains(double value) const;
   std::string range() const;  ///< "(0, 10000]"

@@ -38,14 +38,16 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
     const auto& columns = table.table.columns;
     const auto found = std::find(columns.begin(), columns.end(), name);
     if (found != columns.end()) return static_cast<int>(found - columns.begin());
-    reader.problems.add({path.string(), table.header_line}, "has no column " + name, "columns: m, the ring's number from the centre, and r_cm, its radius on the screen");
+    reader.problems.add({path.string(), table.header_line}, "has no column " + name,
+                        "columns: m, the ring's number from the centre, and r_cm, its radius on the screen");
     return -1;
   };
   const int m = column("m"), r = column("r_cm");
   if (m < 0 || r < 0) return std::nullopt;
   const int rows = static_cast<int>(table.table.rows.size());
   if (rows < 2) {
-    reader.problems.add({path.string(), table.header_line}, "has " + std::to_string(rows) + " rings", "at least 2 are needed");
+    reader.problems.add({path.string(), table.header_line}, "has " + std::to_string(rows) + " rings",
+                        "at least 2 are needed");
     return std::nullopt;
   }
   LoadedImage image;
@@ -53,14 +55,18 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
   image.bits = 32;
   const Plate& plate = std::get<Plate>(scene.sample);
   observable = {Quantity::ring_radius_cm, {}};
-  const double least = reader.table[plate.ring_offset].free ? reader.table[plate.ring_offset].lower : reader.table[plate.ring_offset].value;
+  const double least = reader.table[plate.ring_offset].free ? reader.table[plate.ring_offset].lower
+                                                            : reader.table[plate.ring_offset].value;
   for (int i = 0; i < rows; ++i) {
     const std::vector<double>& row = table.table.rows[static_cast<std::size_t>(i)];
     const Where place{path.string(), table.lines[static_cast<std::size_t>(i)]};
     if (!(row[static_cast<std::size_t>(m)] + least > 0))
-      reader.problems.add(place, "ring number " + show(row[static_cast<std::size_t>(m)]) + " with ring_offset " + show(least) + " is not above 0",
+      reader.problems.add(place,
+                          "ring number " + show(row[static_cast<std::size_t>(m)]) + " with ring_offset " + show(least) +
+                              " is not above 0",
                           "the dark centre is number 0 and has no radius; raise the lower bound of ring_offset");
-    if (!(row[static_cast<std::size_t>(r)] > 0)) reader.problems.add(place, "the radius " + show(row[static_cast<std::size_t>(r)]) + " cm is not above 0");
+    if (!(row[static_cast<std::size_t>(r)] > 0))
+      reader.problems.add(place, "the radius " + show(row[static_cast<std::size_t>(r)]) + " cm is not above 0");
     observable.ring_numbers.push_back(row[static_cast<std::size_t>(m)]);
     image.values(i, 0) = row[static_cast<std::size_t>(r)];
   }

@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "birefit/render.h"
-#include "io/config_disc.h"
 #include "io/config_director.h"
-#include "io/config_rings.h"
+#include "io/config_disc.h"
 #include "io/config_material.h"
+#include "io/config_rings.h"
 #include "io/config_volume.h"
 #include "io/table.h"
 #include "transport/method.h"
@@ -17,7 +17,8 @@
 namespace birefit {
 namespace {
 
-const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate", "crystal", "slab", "disc", "volume"};
+const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate",
+                                               "crystal", "slab",  "disc", "volume"};
 
 NumberSpec open_length(double upper_um) {
   NumberSpec spec;
@@ -98,9 +99,9 @@ std::optional<std::string> one_kind(ConfigReader& reader, const Block& block, co
     return first;
   } else if (block.node) {
     // A misspelt kind was reported as an unknown key, with the right one suggested.
-    const bool misspelt = std::any_of(block.node->entries.begin(), block.node->entries.end(), [&](const YamlEntry& entry) {
-      return std::find(others.begin(), others.end(), entry.key) == others.end();
-    });
+    const bool misspelt = std::any_of(
+        block.node->entries.begin(), block.node->entries.end(),
+        [&](const YamlEntry& entry) { return std::find(others.begin(), others.end(), entry.key) == others.end(); });
     if (!misspelt) reader.problems.add(block.where, block.path + " must name one of " + list_words(known));
   }
   return std::nullopt;
@@ -114,16 +115,16 @@ UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
     if (block.find("azimuth_deg") || block.find("tilt_deg"))
       reader.problems.add(axis->where, block.path + " has an axis and angles", "give one of the two");
     if (!axis->is_sequence() || axis->items.size() != 3) {
-      reader.problems.add(axis->where, "axis must be three components [x, y, z], found " +
-                                           (axis->is_sequence() ? std::to_string(axis->items.size()) + " items"
-                                                                : axis->describe()));
+      reader.problems.add(axis->where,
+                          "axis must be three components [x, y, z], found " +
+                              (axis->is_sequence() ? std::to_string(axis->items.size()) + " items" : axis->describe()));
       return director;
     }
     double square = 0;
     for (int i = 0; i < 3; ++i) {
       const char* const letters[] = {"x", "y", "z"};
-      director.axis[i] = reader.number_at(axis->items[i], block.path_of("axis") + "." + letters[i],
-                                          number_within(-1e6, 1e6));
+      director.axis[i] =
+          reader.number_at(axis->items[i], block.path_of("axis") + "." + letters[i], number_within(-1e6, 1e6));
       square += std::pow(reader.table[director.axis[i]].value, 2);
     }
     if (square == 0) reader.problems.add(axis->where, "axis = [0, 0, 0] has no direction");
@@ -141,19 +142,25 @@ UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
 /// The reduced field, or the applied one with the two numbers that reduce it.
 AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
   AxialDirector axial;
-  const Block block = reader.block(parent, "axial", {"reduced_field", "field_v_per_um", "coherence_voltage_v", "local_field_factor", "ring_radius", "branch", "field_azimuth_deg"}, true);
+  const Block block = reader.block(parent, "axial",
+                                   {"reduced_field", "field_v_per_um", "coherence_voltage_v", "local_field_factor",
+                                    "ring_radius", "branch", "field_azimuth_deg"},
+                                   true);
   const YamlNode *reduced = block.find("reduced_field"), *applied = block.find("field_v_per_um");
   if (reduced && applied)
     reader.problems.add(applied->where, block.path + " has a reduced field and an applied one", "give one of the two");
   if (!reduced && !applied)
-    reader.missing(block, "reduced_field", "radius over coherence length, 0 without a field; or field_v_per_um with coherence_voltage_v and local_field_factor");
+    reader.missing(block, "reduced_field",
+                   "radius over coherence length, 0 without a field; or field_v_per_um with coherence_voltage_v and "
+                   "local_field_factor");
   if (reduced) {
     NumberSpec e = number_within(0, 60);
     e.physical_lower = 0;
     axial.reduced_field = reader.number(block, "reduced_field", e);
     for (const char* other : {"coherence_voltage_v", "local_field_factor"})
       if (const YamlNode* node = block.find(other))
-        reader.problems.add(node->where, std::string(other) + " has no effect on a reduced field", "leave it out, or give field_v_per_um");
+        reader.problems.add(node->where, std::string(other) + " has no effect on a reduced field",
+                            "leave it out, or give field_v_per_um");
   } else if (applied) {
     NumberSpec field = number_within(0, 100);
     field.unit = "V/um";
@@ -167,12 +174,15 @@ AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
   }
   if (block.find("field_azimuth_deg")) axial.field_azimuth_deg = reader.number(block, "field_azimuth_deg", angle());
   if (block.find("ring_radius")) axial.ring_radius = reader.number(block, "ring_radius", number_within(0.2, 0.995));
-  const std::string branch = reader.choice(block, "branch", {"hedgehog", "ring", "compare"}).value_or(axial.ring_radius ? "ring" : "hedgehog");
+  const std::string branch =
+      reader.choice(block, "branch", {"hedgehog", "ring", "compare"}).value_or(axial.ring_radius ? "ring" : "hedgehog");
   axial.compare = branch == "compare";
   if (branch == "hedgehog" && axial.ring_radius)
-    reader.problems.add(block.find("ring_radius")->where, "a hedgehog has no ring_radius", "leave it out, or write branch: compare");
+    reader.problems.add(block.find("ring_radius")->where, "a hedgehog has no ring_radius",
+                        "leave it out, or write branch: compare");
   if (branch != "hedgehog" && !axial.ring_radius)
-    reader.missing(block, "ring_radius", "the ring's radius over the droplet's, for example {value: 0.9, fit: [0.6, 0.99]}");
+    reader.missing(block, "ring_radius",
+                   "the ring's radius over the droplet's, for example {value: 0.9, fit: [0.6, 0.99]}");
   return axial;
 }
 
@@ -214,7 +224,8 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
 Droplet read_shell(ConfigReader& reader, const Block& parent) {
   Droplet droplet;
   ShellDirector shell;
-  const Block block = reader.block(parent, "shell", {"diameter_um", "wall_um", "core_offset_um", "director", "core"}, true);
+  const Block block =
+      reader.block(parent, "shell", {"diameter_um", "wall_um", "core_offset_um", "director", "core"}, true);
   NumberSpec diameter = open_length(10000);
   diameter.automatic = true;
   droplet.diameter_um = reader.number(block, "diameter_um", diameter);
@@ -227,14 +238,16 @@ Droplet read_shell(ConfigReader& reader, const Block& parent) {
   if (const YamlNode* offset = block.find("core_offset_um")) {
     if (!offset->is_sequence() || offset->items.size() != 3) {
       reader.problems.add(offset->where, "core_offset_um must be three numbers [x, y, z], found " +
-                                             (offset->is_sequence() ? std::to_string(offset->items.size()) + " items" : offset->describe()));
+                                             (offset->is_sequence() ? std::to_string(offset->items.size()) + " items"
+                                                                    : offset->describe()));
     } else {
       bool zero = true;
       for (std::size_t i = 0; i < 3; ++i) {
         const char* const letters[] = {"x", "y", "z"};
         NumberSpec spec = number_within(-5000, 5000);
         spec.unit = "um";
-        shell.offset_um[i] = reader.number_at(offset->items[i], block.path_of("core_offset_um") + "." + letters[i], spec);
+        shell.offset_um[i] =
+            reader.number_at(offset->items[i], block.path_of("core_offset_um") + "." + letters[i], spec);
         const Parameter& p = reader.table[shell.offset_um[i]];
         away += std::pow(p.value, 2);
         zero = zero && p.value == 0 && !p.free;
@@ -246,9 +259,13 @@ Droplet read_shell(ConfigReader& reader, const Block& parent) {
     const Parameter& wall = reader.table[shell.wall_um];
     const double radius = 0.5 * reader.table[droplet.diameter_um].value;
     if (wall.value >= radius)
-      reader.problems.add(wall.where, "wall_um = " + show(wall.value) + " leaves no core in a radius of " + show(radius) + " um", "a droplet has no wall_um");
+      reader.problems.add(wall.where,
+                          "wall_um = " + show(wall.value) + " leaves no core in a radius of " + show(radius) + " um",
+                          "a droplet has no wall_um");
     else if (std::sqrt(away) >= wall.value)
-      reader.problems.add(block.find("core_offset_um")->where, "core_offset_um is " + show(std::sqrt(away)) + " um long: the core would leave the wall of " + show(wall.value) + " um");
+      reader.problems.add(block.find("core_offset_um")->where, "core_offset_um is " + show(std::sqrt(away)) +
+                                                                   " um long: the core would leave the wall of " +
+                                                                   show(wall.value) + " um");
   }
   droplet.director = shell;
   return droplet;
@@ -293,11 +310,14 @@ std::optional<SideCamera> read_side_camera(ConfigReader& reader, const Block& vi
   camera.tilt_x_deg = reader.number(block, "tilt_x_deg", angle_within(-80, 80), 0);
   camera.tilt_y_deg = reader.number(block, "tilt_y_deg", angle_within(-80, 80), 0);
   camera.half_field_deg = reader.number(block, "half_field_deg", half_field, 0);
-  const Parameter &x = reader.table[camera.tilt_x_deg], &y = reader.table[camera.tilt_y_deg], &field = reader.table[camera.half_field_deg];
+  const Parameter &x = reader.table[camera.tilt_x_deg], &y = reader.table[camera.tilt_y_deg],
+                  &field = reader.table[camera.half_field_deg];
   const bool square = x.value == 0 && y.value == 0;
   // The foreshortening is even in the tilt, the perspective a product of tilt and field: nothing to go by from 0.
   if (square && (field.free || (field.value == 0 && (x.free || y.free))))
-    reader.problems.add(block.where, "camera starts at tilt 0, where the picture does not change with " + std::string(field.free ? "half_field_deg" : "the tilt"),
+    reader.problems.add(block.where,
+                        "camera starts at tilt 0, where the picture does not change with " +
+                            std::string(field.free ? "half_field_deg" : "the tilt"),
                         "start on the side where the camera stood, e.g. tilt_x_deg: {value: 10, fit: [0, 60]}");
   return camera;
 }
@@ -309,14 +329,16 @@ Plate read_plate(ConfigReader& reader, const Block& parent, View& shown) {
   const Block director = reader.block(block, "director", {"uniform"}, true);
   if (one_kind(reader, director, {"uniform"})) plate.director = read_uniform(reader, director);
   if (block.find("heat")) {
-    const Block heat = reader.block(block, "heat", {"fourier_number", "time_s", "diffusivity_mm2_s", "cold_k", "hot_k", "initial_k"}, true);
+    const Block heat = reader.block(
+        block, "heat", {"fourier_number", "time_s", "diffusivity_mm2_s", "cold_k", "hot_k", "initial_k"}, true);
     NumberSpec fourier = number_within(0, 1e4);
     fourier.lower_open = true;
     fourier.physical_lower = 0;
     HeatStep step;
     const YamlNode* time = heat.find("time_s");
     if (time && heat.find("fourier_number"))
-      reader.problems.add(time->where, "time_s is given beside fourier_number", "give one of the two: fourier_number = diffusivity * time / thickness^2");
+      reader.problems.add(time->where, "time_s is given beside fourier_number",
+                          "give one of the two: fourier_number = diffusivity * time / thickness^2");
     if (time) {
       NumberSpec seconds = number_within(0, 1e9), diffusivity = number_within(0, 1e4);
       seconds.lower_open = diffusivity.lower_open = true;
@@ -327,37 +349,50 @@ Plate read_plate(ConfigReader& reader, const Block& parent, View& shown) {
     } else {
       step.fourier_number = reader.number(heat, "fourier_number", fourier);
       if (const YamlNode* node = heat.find("diffusivity_mm2_s"))
-        reader.problems.add(node->where, "diffusivity_mm2_s has no effect on a Fourier number", "give time_s in place of fourier_number");
+        reader.problems.add(node->where, "diffusivity_mm2_s has no effect on a Fourier number",
+                            "give time_s in place of fourier_number");
     }
     if (heat.find("initial_k")) step.initial_k = reader.number(heat, "initial_k", kelvin());
     step.cold_k = reader.number(heat, "cold_k", kelvin());
     step.hot_k = reader.number(heat, "hot_k", kelvin());
     plate.heat = step;
   }
-  const Block view = reader.block(block, "view", {"half_angle_deg", "camera", "screen_distance_um", "ring_offset"}, true);
+  const Block view =
+      reader.block(block, "view", {"half_angle_deg", "camera", "screen_distance_um", "ring_offset"}, true);
   if (!view.find("screen_distance_um")) {
-    if (const YamlNode* node = view.find("ring_offset")) reader.problems.add(node->where, "ring_offset belongs to a table of rings", "give screen_distance_um too, or leave it out");
+    if (const YamlNode* node = view.find("ring_offset"))
+      reader.problems.add(node->where, "ring_offset belongs to a table of rings",
+                          "give screen_distance_um too, or leave it out");
     plate.half_angle_deg = read_half_angle(reader, view);
     shown.camera = read_side_camera(reader, view);
     return plate;
   }
   if (const YamlNode* node = view.find("half_angle_deg"))
-    reader.problems.add(node->where, "view has half_angle_deg (a picture) and screen_distance_um (a table of ring radii)", "give one of the two");
-  if (const YamlNode* node = view.find("camera")) reader.problems.add(node->where, "camera belongs to a picture, not to a table of ring radii", "leave it out");
+    reader.problems.add(node->where,
+                        "view has half_angle_deg (a picture) and screen_distance_um (a table of ring radii)",
+                        "give one of the two");
+  if (const YamlNode* node = view.find("camera"))
+    reader.problems.add(node->where, "camera belongs to a picture, not to a table of ring radii", "leave it out");
   read_ring_view(reader, view, plate);
   const ParameterRef* axis = plate.director.axis.data();
-  const auto upright = [&](ParameterRef ref, double value) { return !reader.table[ref].free && reader.table[ref].value == value; };
-  if (axis[0] ? !(upright(axis[0], 0) && upright(axis[1], 0)) : plate.director.tilt_deg && !upright(plate.director.tilt_deg, 90))
-    reader.problems.add(director.where, "a table of ring radii needs a plate cut normal to its axis", "uniform: {axis: [0, 0, 1]}");
-  if (const YamlNode* node = block.find("heat")) reader.problems.add(node->where, "a table of ring radii does not go with heat", "leave it out");
+  const auto upright = [&](ParameterRef ref, double value) {
+    return !reader.table[ref].free && reader.table[ref].value == value;
+  };
+  if (axis[0] ? !(upright(axis[0], 0) && upright(axis[1], 0))
+              : plate.director.tilt_deg && !upright(plate.director.tilt_deg, 90))
+    reader.problems.add(director.where, "a table of ring radii needs a plate cut normal to its axis",
+                        "uniform: {axis: [0, 0, 1]}");
+  if (const YamlNode* node = block.find("heat"))
+    reader.problems.add(node->where, "a table of ring radii does not go with heat", "leave it out");
   return plate;
 }
 
 Crystal read_crystal(ConfigReader& reader, const Block& parent) {
   Crystal crystal;
-  const Block block = reader.block(
-      parent, "crystal",
-      {"half_wave_voltage_v", "bias_v", "built_in_bias_v", "field_along", "slow_axis_deg", "field_legendre", "electrodes_px"}, true);
+  const Block block = reader.block(parent, "crystal",
+                                   {"half_wave_voltage_v", "bias_v", "built_in_bias_v", "field_along", "slow_axis_deg",
+                                    "field_legendre", "electrodes_px"},
+                                   true);
   NumberSpec half_wave;
   half_wave.unit = "V";
   half_wave.lower = 0;
@@ -376,15 +411,16 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
   built_in.lower = -1e7;
   built_in.upper = 1e7;
   if (block.find("built_in_bias_v")) crystal.built_in_bias_v = reader.number(block, "built_in_bias_v", built_in);
-  if (!block.find("field_along")) reader.missing(block, "field_along", "x or y, the direction of the field in the image");
+  if (!block.find("field_along"))
+    reader.missing(block, "field_along", "x or y, the direction of the field in the image");
   crystal.field_along_y = reader.choice(block, "field_along", {"x", "y"}).value_or("y") == "y";
   crystal.slow_axis_deg = reader.number(block, "slow_axis_deg", angle(), crystal.field_along_y ? 135 : 45);
   if (const YamlNode* coefficients = block.find("field_legendre")) {
     if (!coefficients->is_sequence() || coefficients->items.size() > 20) {
-      reader.problems.add(coefficients->where, "field_legendre must be a list of at most 20 coefficients [c1, c2, ..], found " +
-                                                   (coefficients->is_sequence()
-                                                        ? std::to_string(coefficients->items.size()) + " items"
-                                                        : coefficients->describe()));
+      reader.problems.add(coefficients->where,
+                          "field_legendre must be a list of at most 20 coefficients [c1, c2, ..], found " +
+                              (coefficients->is_sequence() ? std::to_string(coefficients->items.size()) + " items"
+                                                           : coefficients->describe()));
     } else {
       for (std::size_t i = 0; i < coefficients->items.size(); ++i)
         crystal.field_legendre.push_back(reader.number_at(
@@ -394,10 +430,10 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
   }
   if (const YamlNode* electrodes = block.find("electrodes_px")) {
     if (!electrodes->is_sequence() || electrodes->items.size() != 2) {
-      reader.problems.add(electrodes->where, "electrodes_px must be [low, high], found " +
-                                                 (electrodes->is_sequence()
-                                                      ? std::to_string(electrodes->items.size()) + " items"
-                                                      : electrodes->describe()));
+      reader.problems.add(electrodes->where,
+                          "electrodes_px must be [low, high], found " +
+                              (electrodes->is_sequence() ? std::to_string(electrodes->items.size()) + " items"
+                                                         : electrodes->describe()));
     } else {
       const std::size_t problems_before = reader.problems.all().size();
       NumberSpec pixel = number_within(-1e6, 1e6);
@@ -474,8 +510,8 @@ Slab read_slab(ConfigReader& reader, const Block& parent, View& shown) {
     if (r == 0 && !layers && entry.depth_um != 0)
       reader.problems.add(place(0), "depth_um = " + show(entry.depth_um) + ": the first node must be at 0");
     if (r > 0 && !(entry.depth_um > above_um))
-      reader.problems.add(place(0), "depth_um = " + show(entry.depth_um) + " does not grow (the row above has " +
-                                        show(above_um) + ")");
+      reader.problems.add(
+          place(0), "depth_um = " + show(entry.depth_um) + " does not grow (the row above has " + show(above_um) + ")");
     above_um = entry.depth_um;
     const double length = std::hypot(entry.ax, entry.ay, entry.az);
     if (!(length > 0)) {
@@ -502,7 +538,8 @@ Slab read_slab(ConfigReader& reader, const Block& parent, View& shown) {
   return slab;
 }
 
-/// The parameter with its value, start and bounds within [lower, upper], else a problem. A NaN value (`fit: auto`) passes.
+/// The parameter with its value, start and bounds within [lower, upper], else a problem. A NaN value (`fit: auto`)
+/// passes.
 void check_within(ConfigReader& reader, ParameterRef ref, double lower, double upper, const std::string& why) {
   const Parameter& parameter = reader.table[ref];
   for (double value : {parameter.value, parameter.free ? parameter.lower : parameter.value,
@@ -525,7 +562,8 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
   if (block.find("name")) {
     for (const char* other : {"ordinary", "birefringence", "resonance_nm"})
       if (const YamlNode* node = block.find(other))
-        reader.problems.add(node->where, std::string(other) + " is given beside a material's name", "give one of the two");
+        reader.problems.add(node->where, std::string(other) + " is given beside a material's name",
+                            "give one of the two");
     if (!reader.choice(block, "name", {"E44-steinberg2020"})) return ConstantIndices{};
     const std::string validity = "where E44-steinberg2020 holds";
     NumberSpec temperature = kelvin();
@@ -584,7 +622,7 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   if (own_indices) {
     if (const YamlNode* node = block.find("material"))
       reader.problems.add(node->where, "unknown key material: a " + *kind + " needs none",
-                          *kind == "slab" ? "its indices are in the profile"
+                          *kind == "slab"   ? "its indices are in the profile"
                           : *kind == "disc" ? "its stress-optic coefficient says it all"
                                             : "its half-wave voltage says it all");
   } else {
@@ -623,10 +661,11 @@ ParameterRef polarizing_element(ConfigReader& reader, const Block& block, const 
 
 void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   Microscope& microscope = scene.microscope;
-  const Block block = reader.block(root, "microscope",
-                                   {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg",
-                                    "objective_na", "condenser_na", "focus_um", "imaging", "directions", "quarter_wave", "compensator"},
-                                   true);
+  const Block block =
+      reader.block(root, "microscope",
+                   {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg", "objective_na",
+                    "condenser_na", "focus_um", "imaging", "directions", "quarter_wave", "compensator"},
+                   true);
   const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
   NumberSpec wavelength;
   wavelength.unit = "nm";
@@ -641,11 +680,14 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
 
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material); constant && constant->resonance_nm) {
     const Parameter &resonance = reader.table[constant->resonance_nm], &light = reader.table[microscope.wavelength_nm];
-    // A quarter of the light's wavelength away from the band its law stops to hold; 589.3 nm is where birefringence is given.
+    // A quarter of the light's wavelength away from the band its law stops to hold; 589.3 nm is where birefringence is
+    // given.
     const double shortest = std::min(light.free ? light.lower : light.value, 589.3);
     if ((resonance.free ? resonance.upper : resonance.value) > 0.8 * shortest)
-      reader.problems.add(resonance.where, resonance.name + " must stay below 0.8 of the wavelength (and of 589.3 nm, where birefringence is given)",
-                          "liquid crystals have 200 to 300");
+      reader.problems.add(
+          resonance.where,
+          resonance.name + " must stay below 0.8 of the wavelength (and of 589.3 nm, where birefringence is given)",
+          "liquid crystals have 200 to 300");
   }
   if (block.find("compensator")) {
     const Block compensator = reader.block(block, "compensator", {"phase_deg", "azimuth_deg"}, true);
@@ -657,8 +699,10 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
 
   const Slab* slab_sample = std::get_if<Slab>(&scene.sample);
   const bool slab = slab_sample && !slab_sample->half_angle_deg;
-  microscope.polarizer_deg = polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab && reader.polarizers);
-  microscope.analyzer_deg = polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab && reader.polarizers);
+  microscope.polarizer_deg =
+      polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab && reader.polarizers);
+  microscope.analyzer_deg =
+      polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab && reader.polarizers);
   microscope.objective_na = reader.plain(block, "objective_na", aperture()).value_or(0);
   microscope.condenser_na = reader.plain(block, "condenser_na", aperture()).value_or(0);
   if (block.find("focus_um")) {
@@ -675,8 +719,10 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
     reader.problems.add(block.find("quarter_wave")->where, "quarter_wave is for discs", "leave it out");
   if (const YamlNode* directions = block.find("directions")) {
     if (!slab)
-      reader.problems.add(directions->where, slab_sample ? "a slab with a view in a cone has a direction for every pixel"
-                                                         : "directions belong to slab scenes", slab_sample ? "give one of the two" : "");
+      reader.problems.add(directions->where,
+                          slab_sample ? "a slab with a view in a cone has a direction for every pixel"
+                                      : "directions belong to slab scenes",
+                          slab_sample ? "give one of the two" : "");
     if (!directions->is_sequence() || directions->items.empty()) {
       reader.problems.add(directions->where, "directions must be a list of {theta_deg, azimuth_deg}, found " +
                                                  (directions->is_sequence() ? "an empty one" : directions->describe()));
@@ -705,25 +751,36 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
     scene.rays = which == "eikonal" ? Rays::eikonal : Rays::straight;
     reader.choose_rays = which == "auto";  // what a fit does without the key, too
     if (which == "eikonal" && !has_curved_rays(scene))
-      reader.problems.add(rays->where, "rays: eikonal is for radial droplets without twist, shells whose core is in the middle and droplets in a field along the view", "use straight or auto");
+      reader.problems.add(rays->where,
+                          "rays: eikonal is for radial droplets without twist, shells whose core is in the middle and "
+                          "droplets in a field along the view",
+                          "use straight or auto");
   }
   const YamlNode* ceiling = physics.find("ceiling");
   const Slab* slab = std::get_if<Slab>(&scene.sample);
   const bool layered = std::holds_alternative<Cell>(scene.sample) || (slab && !slab->half_angle_deg);
-  const bool sphere = std::holds_alternative<Droplet>(scene.sample), sampled = std::holds_alternative<SampledVolume>(scene.sample);
-  const std::string name = reader.choice(physics, "ceiling", {"one_way", "e_only", "reflections", "wave", "auto"}).value_or("auto");
+  const bool sphere = std::holds_alternative<Droplet>(scene.sample),
+             sampled = std::holds_alternative<SampledVolume>(scene.sample);
+  const std::string name =
+      reader.choice(physics, "ceiling", {"one_way", "e_only", "reflections", "wave", "auto"}).value_or("auto");
   if (name == "reflections" && !layered)
     reader.problems.add(ceiling->where, "ceiling: reflections is for cells and slabs",
                         "use one_way: its model error says how large reflections are here");
   if (name == "wave" && !sphere && !sampled)
-    reader.problems.add(ceiling->where, "ceiling: wave is for droplets, shells and sampled fields", "use one_way or, for cells and slabs, reflections");
+    reader.problems.add(ceiling->where, "ceiling: wave is for droplets, shells and sampled fields",
+                        "use one_way or, for cells and slabs, reflections");
   if (name == "wave" && sampled && !scene.surround_index && !scene.surround_dispersion)
-    reader.problems.add(ceiling->where, "ceiling: wave needs sample.surround", "the index of what is around the box, and in it where the file has no liquid crystal");
+    reader.problems.add(ceiling->where, "ceiling: wave needs sample.surround",
+                        "the index of what is around the box, and in it where the file has no liquid crystal");
   if (name == "wave" && (sphere || sampled) && scene.microscope.objective_na == 0)
-    reader.problems.add(ceiling->where, "ceiling: wave needs microscope.objective_na", "the number engraved on the objective; without it use one_way");
+    reader.problems.add(ceiling->where, "ceiling: wave needs microscope.objective_na",
+                        "the number engraved on the objective; without it use one_way");
   if (name == "wave" && physics.find("rays"))
     reader.problems.add(physics.find("rays")->where, "rays has no meaning under ceiling: wave", "give one of the two");
-  scene.ceiling = name == "e_only" ? Ceiling::e_only : name == "reflections" ? Ceiling::reflections : name == "wave" ? Ceiling::wave : Ceiling::one_way;
+  scene.ceiling = name == "e_only"        ? Ceiling::e_only
+                  : name == "reflections" ? Ceiling::reflections
+                  : name == "wave"        ? Ceiling::wave
+                                          : Ceiling::one_way;
   if (physics.find("max_seconds")) {
     NumberSpec seconds = number_within(0, 1e7);
     seconds.unit = "s";
@@ -737,8 +794,10 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   scene.method = reader.choice(transport, "method", methods).value_or("auto");
   const bool wave_method = scene.method == "series" || scene.method == "split_step";
   const bool defocused = is_defocused(reader, scene);
-  // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays. Only waves know defocus.
-  if (name == "auto" && sphere && scene.microscope.objective_na > 0 && !physics.find("rays") && (scene.method == "auto" || wave_method)) {
+  // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays. Only waves
+  // know defocus.
+  if (name == "auto" && sphere && scene.microscope.objective_na > 0 && !physics.find("rays") &&
+      (scene.method == "auto" || wave_method)) {
     if (defocused || wave_method)
       scene.ceiling = Ceiling::wave;
     else
@@ -755,7 +814,8 @@ bool is_defocused(const ConfigReader& reader, const Scene& scene) {
 }
 
 void add_defocus_problem(ConfigReader& reader, const Scene& scene) {
-  reader.problems.add(reader.table[scene.microscope.focus_um].where, "focus_um: rays are seen in the mid plane only; defocus needs wave optics",
+  reader.problems.add(reader.table[scene.microscope.focus_um].where,
+                      "focus_um: rays are seen in the mid plane only; defocus needs wave optics",
                       "ceiling: wave, with objective_na, for droplets, shells and sampled fields");
 }
 

@@ -56,7 +56,8 @@ std::vector<std::string> matching_files(const fs::path& folder, const std::strin
       std::error_code code;
       const fs::path file(found.gl_pathv[i]);
       if (!fs::is_regular_file(file, code)) continue;
-      files.push_back(fs::path(pattern).is_absolute() || folder.empty() ? file.string() : file.lexically_relative(folder).string());
+      files.push_back(fs::path(pattern).is_absolute() || folder.empty() ? file.string()
+                                                                        : file.lexically_relative(folder).string());
     }
   ::globfree(&found);
   std::sort(files.begin(), files.end(), natural_less);
@@ -75,8 +76,8 @@ std::string some_of(std::vector<std::string> names) {
 }
 
 /// Frames by the rows of the table; with `files` each must be one of these and all of these must have a row.
-void join_table(ConfigReader& reader, const std::string& table_name, const Where& where, const std::optional<std::vector<std::string>>& files,
-                const Where& files_where, ImageSeries& series) {
+void join_table(ConfigReader& reader, const std::string& table_name, const Where& where,
+                const std::optional<std::vector<std::string>>& files, const Where& files_where, ImageSeries& series) {
   const fs::path path = reader.resolve(table_name);
   TextTable table;
   try {
@@ -86,16 +87,19 @@ void join_table(ConfigReader& reader, const std::string& table_name, const Where
     return;
   }
   const std::string place = path.string();
-  const auto file_column = std::find_if(table.header.begin(), table.header.end(), [](const TableCell& c) { return c.text == "file"; });
+  const auto file_column =
+      std::find_if(table.header.begin(), table.header.end(), [](const TableCell& c) { return c.text == "file"; });
   if (file_column == table.header.end()) {
     std::vector<std::string> names;
     for (const TableCell& cell : table.header) names.push_back(cell.text);
-    reader.problems.add({place, table.header_line, 1}, "has no column file", "it has " + some_of(names) + "; expected file, then parameter paths, separated by commas");
+    reader.problems.add({place, table.header_line, 1}, "has no column file",
+                        "it has " + some_of(names) + "; expected file, then parameter paths, separated by commas");
     return;
   }
   const auto file_at = static_cast<std::size_t>(file_column - table.header.begin());
   for (std::size_t c = 0; c < table.header.size(); ++c)
-    if (c != file_at) series.columns.push_back({table.header[c].text, {place, table.header_line, table.header[c].column}});
+    if (c != file_at)
+      series.columns.push_back({table.header[c].text, {place, table.header_line, table.header[c].column}});
   std::map<std::string, int> line_of;  // of a file's row
   std::vector<std::string> known;
   if (files)
@@ -113,7 +117,8 @@ void join_table(ConfigReader& reader, const std::string& table_name, const Where
       });
       if (match == files->end()) {
         const std::string near = nearest_word(cell.text, known);
-        reader.problems.add(here, (cell.text.empty() ? "an empty file" : cell.text) + " is not among the files of the series",
+        reader.problems.add(here,
+                            (cell.text.empty() ? "an empty file" : cell.text) + " is not among the files of the series",
                             near.empty() ? "" : "did you mean " + near + "?");
         continue;
       }
@@ -127,7 +132,8 @@ void join_table(ConfigReader& reader, const std::string& table_name, const Where
       continue;
     }
     for (std::size_t c = 0; c < table.header.size(); ++c)
-      if (c != file_at) frame.cells.push_back({table.rows[r][c].text, {place, table.lines[r], table.rows[r][c].column}});
+      if (c != file_at)
+        frame.cells.push_back({table.rows[r][c].text, {place, table.lines[r], table.rows[r][c].column}});
     series.frames.push_back(std::move(frame));
   }
   if (!files || !reader.problems.empty()) return;
@@ -135,7 +141,9 @@ void join_table(ConfigReader& reader, const std::string& table_name, const Where
   for (const std::string& file : *files)
     if (!line_of.count(file)) without.push_back(file);
   if (!without.empty())
-    reader.problems.add(files_where, some_of(without) + (without.size() == 1 ? " has" : " have") + " no row in " + place, "add rows, or narrow files");
+    reader.problems.add(files_where,
+                        some_of(without) + (without.size() == 1 ? " has" : " have") + " no row in " + place,
+                        "add rows, or narrow files");
 }
 
 void read_names(ConfigReader& reader, const Block& block, ImageSeries& series) {
@@ -149,7 +157,8 @@ void read_names(ConfigReader& reader, const Block& block, ImageSeries& series) {
   for (const YamlNode& item : list->items) {
     if (!item.is_scalar())
       reader.problems.add(item.where, "micrographs.shared must hold parameter paths, found " + item.describe());
-    else if (std::any_of(series.shared.begin(), series.shared.end(), [&](const auto& other) { return other.first == item.text; }))
+    else if (std::any_of(series.shared.begin(), series.shared.end(),
+                         [&](const auto& other) { return other.first == item.text; }))
       reader.problems.add(item.where, item.text + " is listed twice");
     else
       series.shared.emplace_back(item.text, item.where);
@@ -187,16 +196,19 @@ ImageSeries read_series(const fs::path& path, std::string text) {
   }
   const Block block = reader.block_of(*node, "micrographs", {"files", "set_from", "shared", "along"});
   const auto place = [&](const char* key) { return block.find(key) ? block.find(key)->where : block.where; };
-  const std::optional<std::string> pattern = reader.text(block, "files"), table = reader.text(block, "set_from"), along = reader.text(block, "along");
+  const std::optional<std::string> pattern = reader.text(block, "files"), table = reader.text(block, "set_from"),
+                                   along = reader.text(block, "along");
   read_names(reader, block, series);
   std::optional<std::vector<std::string>> files;
   if (pattern) {
     files = matching_files(reader.folder, *pattern);
     if (files->empty())
-      reader.problems.add(place("files"), "no file matches " + *pattern, "* stands for any letters, ? for one; paths start at the config's folder");
+      reader.problems.add(place("files"), "no file matches " + *pattern,
+                          "* stands for any letters, ? for one; paths start at the config's folder");
   }
   reader.problems.throw_if_any();
-  if (table) join_table(reader, *table, place("set_from"), files, place("files"), series);
+  if (table)
+    join_table(reader, *table, place("set_from"), files, place("files"), series);
   else
     for (const std::string& file : *files) series.frames.push_back({{}, file, place("files"), {}});
 
@@ -208,19 +220,22 @@ ImageSeries read_series(const fs::path& path, std::string text) {
                           "frames need names of their own: rename one, or narrow files");
   }
   if (along && reader.problems.empty()) {
-    const auto column = std::find_if(series.columns.begin(), series.columns.end(), [&](const ImageSeries::Column& c) { return c.name == *along; });
+    const auto column = std::find_if(series.columns.begin(), series.columns.end(),
+                                     [&](const ImageSeries::Column& c) { return c.name == *along; });
     std::vector<std::string> names;
     for (const ImageSeries::Column& c : series.columns) names.push_back(c.name);
     const std::string near = nearest_word(*along, names);
     if (column == series.columns.end()) {
-      reader.problems.add(place("along"), "along names " + *along + ", which is no column of " + table.value_or("a table (set_from)"),
+      reader.problems.add(place("along"),
+                          "along names " + *along + ", which is no column of " + table.value_or("a table (set_from)"),
                           near.empty() ? "" : "did you mean " + near + "?");
     } else {
       series.along = static_cast<std::size_t>(column - series.columns.begin());
       for (const SeriesFrame& frame : series.frames) {
         const SeriesFrame::Cell& cell = frame.cells[*series.along];
         if (const auto value = parse_number(cell.text); !value || !std::isfinite(*value))
-          reader.problems.add(cell.where, *along + " must be a number, found " + (cell.text.empty() ? "nothing" : cell.text));
+          reader.problems.add(cell.where,
+                              *along + " must be a number, found " + (cell.text.empty() ? "nothing" : cell.text));
       }
     }
   }

@@ -15,8 +15,8 @@
 namespace birefit {
 namespace {
 
-/// Robust standard deviation of one value: from differences of second, fourth and sixth order along x, the least of them, as
-/// what they leave of the curve only adds. Differences of too high an order would amplify uneven spacing.
+/// Robust standard deviation of one value: from differences of second, fourth and sixth order along x, the least of
+/// them, as what they leave of the curve only adds. Differences of too high an order would amplify uneven spacing.
 double noise_of(std::vector<std::pair<double, double>> rows) {
   std::sort(rows.begin(), rows.end());
   std::vector<double> difference;
@@ -38,7 +38,8 @@ double noise_of(std::vector<std::pair<double, double>> rows) {
 
 SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::string& path) {
   SignalItem item;
-  const Block block = reader.block_of(node, path, {"file", "value", "quantity", "columns", "where", "set", "every", "noise"});
+  const Block block =
+      reader.block_of(node, path, {"file", "value", "quantity", "columns", "where", "set", "every", "noise"});
   item.where = item.file_where = block.where;
   if (!block.find("file")) reader.missing(block, "file");
   if (const auto file = reader.text(block, "file")) {
@@ -48,7 +49,8 @@ SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::stri
   item.value_column = reader.text(block, "value").value_or("signal");
   const std::vector<std::string> quantities{"intensity", "retardance_um", "retardance_waves", "birefringence"};
   if (const auto quantity = reader.choice(block, "quantity", quantities))
-    item.quantity = static_cast<Quantity>(std::find(quantities.begin(), quantities.end(), *quantity) - quantities.begin());
+    item.quantity =
+        static_cast<Quantity>(std::find(quantities.begin(), quantities.end(), *quantity) - quantities.begin());
   item.every = reader.integer(block, "every", 1, 1000000).value_or(1);
   NumberSpec positive;
   positive.lower = 0;
@@ -74,7 +76,9 @@ SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::stri
       column.scale = reader.plain(map, "scale", any).value_or(1);
       column.plus = reader.plain(map, "plus", any).value_or(0);
     } else if (!entry.value.is_scalar()) {
-      reader.problems.add(entry.value.where, entry.key + " must be the name of a column, or {column, scale, plus}, found " + entry.value.describe());
+      reader.problems.add(
+          entry.value.where,
+          entry.key + " must be the name of a column, or {column, scale, plus}, found " + entry.value.describe());
       return;
     }
     item.columns.push_back(column);
@@ -82,11 +86,15 @@ SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::stri
   pairs("where", "column names and what they must hold", [&](const YamlEntry& entry) {
     SignalItem::Only only{entry.key, entry.value.text, {}, entry.where};
     if (entry.value.is_sequence()) {
-      const auto number = [&](std::size_t i) { return entry.value.items[i].is_scalar() ? parse_number(entry.value.items[i].text) : std::nullopt; };
-      if (entry.value.items.size() == 2 && number(0) && number(1) && *number(0) <= *number(1)) only.range = {*number(0), *number(1)};
+      const auto number = [&](std::size_t i) {
+        return entry.value.items[i].is_scalar() ? parse_number(entry.value.items[i].text) : std::nullopt;
+      };
+      if (entry.value.items.size() == 2 && number(0) && number(1) && *number(0) <= *number(1))
+        only.range = {*number(0), *number(1)};
     }
     if (!only.range && !entry.value.is_scalar()) {
-      reader.problems.add(entry.value.where, entry.key + " must be a text or a range [low, high], found " + entry.value.describe());
+      reader.problems.add(entry.value.where,
+                          entry.key + " must be a text or a range [low, high], found " + entry.value.describe());
       return;
     }
     item.only.push_back(only);
@@ -110,23 +118,25 @@ std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
     for (std::size_t i = 0; i < node->items.size(); ++i)
       items.push_back(read_item(reader, node->items[i], "signal[" + std::to_string(i) + "]"));
   } else {
-    reader.problems.add(node->where, "signal must be a table {file, value, columns} or a list of them, found " + node->describe());
+    reader.problems.add(node->where,
+                        "signal must be a table {file, value, columns} or a list of them, found " + node->describe());
   }
   for (const char* other : {"micrographs", "calibration", "image_size_px"})
     if (const YamlNode* found = root.find(other))
       reader.problems.add(found->where, std::string(other) + " is given beside signal", "give one of the two");
   // What belongs to images would be dropped without a word.
   if (const YamlNode* micrograph = root.find("micrograph"))
-    for (const char* key : {"image", "page", "channel", "transfer", "roi_px", "mask", "saturation_counts", "noise", "calibration"})
+    for (const char* key :
+         {"image", "page", "channel", "transfer", "roi_px", "mask", "saturation_counts", "noise", "calibration"})
       if (const YamlNode* found = micrograph->find(key))
         reader.problems.add(found->where, std::string("micrograph.") + key + " is of images, this config has signal",
                             std::string(key) == "noise" ? "signal has its own noise" : "leave it out");
   return items;
 }
 
-void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base, std::size_t first,
-                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
-                   std::vector<Readings>& tables) {
+void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base,
+                   std::size_t first, const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace,
+                   Config& config, std::vector<Readings>& tables) {
   if (item.file.empty()) return;
   TextTable text;
   try {
@@ -144,7 +154,8 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
     const auto found = std::find(names.begin(), names.end(), name);
     if (found != names.end()) return static_cast<int>(found - names.begin());
     const std::string near = nearest_word(name, names);
-    reader.problems.add(where, item.file + " has no column " + name, near.empty() ? "it has " + list_words(names) : "did you mean " + near + "?");
+    reader.problems.add(where, item.file + " has no column " + name,
+                        near.empty() ? "it has " + list_words(names) : "did you mean " + near + "?");
     return -1;
   };
   const int value_column = column_of(item.value_column, item.file_where);
@@ -161,18 +172,21 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
       std::vector<std::string> known;
       for (const auto& [each, unused] : reader.specs) known.push_back(each);
       const std::string near = nearest_word(path, known);
-      reader.problems.add(item.columns[i].where, path + " is no parameter of this config", near.empty() ? "" : "did you mean " + near + "?");
+      reader.problems.add(item.columns[i].where, path + " is no parameter of this config",
+                          near.empty() ? "" : "did you mean " + near + "?");
       continue;
     }
     if (std::any_of(item.set.begin(), item.set.end(), [&](const auto& entry) { return entry.first == path; }))
       reader.problems.add(item.columns[i].where, path + " is in columns and in set", "give one of the two");
     if (path == "micrograph.gain" || path == "micrograph.offset")
-      reader.problems.add(item.columns[i].where, "a column cannot set " + path, "rows of a table share the lamp and the detector: give it in micrograph");
+      reader.problems.add(item.columns[i].where, "a column cannot set " + path,
+                          "rows of a table share the lamp and the detector: give it in micrograph");
     columns.push_back({column_of(item.columns[i].name, item.columns[i].where), reader.refs.at(path), &spec->second});
   }
   std::vector<int> only;
   for (const SignalItem::Only& each : item.only) only.push_back(column_of(each.column, each.where));
-  if (value_column < 0 || columns.size() != item.columns.size() || columns.empty() || std::any_of(columns.begin(), columns.end(), [](const Column& c) { return c.at < 0; }) ||
+  if (value_column < 0 || columns.size() != item.columns.size() || columns.empty() ||
+      std::any_of(columns.begin(), columns.end(), [](const Column& c) { return c.at < 0; }) ||
       std::any_of(only.begin(), only.end(), [](int at) { return at < 0; }))
     return;
 
@@ -191,7 +205,9 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
       const std::optional<double> x = parse_number(cell(at).text);
       if (x && std::isfinite(*x)) return *x;
       reader.problems.add({file, text.lines[r], cell(at).column},
-                          names[static_cast<std::size_t>(at)] + " = " + (cell(at).text.empty() ? "nothing" : cell(at).text.substr(0, 40)) + " is not a finite number");
+                          names[static_cast<std::size_t>(at)] + " = " +
+                              (cell(at).text.empty() ? "nothing" : cell(at).text.substr(0, 40)) +
+                              " is not a finite number");
       return 0.0;
     };
     bool wanted = true;
@@ -205,13 +221,16 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
     }
     if (!wanted) continue;
     Row row{r, number(value_column), {}};
-    for (std::size_t c = 0; c < columns.size(); ++c) row.set.push_back(item.columns[c].scale * number(columns[c].at) + item.columns[c].plus);
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      row.set.push_back(item.columns[c].scale * number(columns[c].at) + item.columns[c].plus);
     curve.emplace_back(row.set[0], row.value);
     rows.push_back(std::move(row));
   }
   if (reader.problems.all().size() > before) return;
   if (rows.size() < 3) {
-    reader.problems.add(item.file_where, item.file + (rows.size() < text.rows.size() ? " has fewer than three rows that `where` lets through" : " has fewer than three rows"));
+    reader.problems.add(item.file_where, item.file + (rows.size() < text.rows.size()
+                                                          ? " has fewer than three rows that `where` lets through"
+                                                          : " has fewer than three rows"));
     return;
   }
   double largest = 0;
@@ -221,10 +240,17 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   SignalTable table{std::filesystem::path(file).filename().string(), first, item.columns[0].path, {}, {}};
   switch (item.quantity) {
     case Quantity::intensity:
-    case Quantity::ring_radius_cm: break;
-    case Quantity::retardance_um: table.quantity = "retardance (\u00b5m)"; break;
-    case Quantity::retardance_waves: table.quantity = "retardance (waves)"; break;
-    case Quantity::birefringence: table.quantity = "birefringence"; break;
+    case Quantity::ring_radius_cm:
+      break;
+    case Quantity::retardance_um:
+      table.quantity = "retardance (\u00b5m)";
+      break;
+    case Quantity::retardance_waves:
+      table.quantity = "retardance (waves)";
+      break;
+    case Quantity::birefringence:
+      table.quantity = "birefringence";
+      break;
   }
   Readings readings;
   readings.name = table.name;
@@ -235,7 +261,8 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   // In the order of the first column: what neighbouring rows share is told from their order.
   std::vector<std::size_t> order(rows.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return curve[a].first < curve[b].first; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return curve[a].first < curve[b].first; });
   for (std::size_t k = 0; k < order.size(); k += static_cast<std::size_t>(item.every)) {
     const Row& row = rows[order[k]];
     const int line = text.lines[row.number];
@@ -244,8 +271,10 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
       const double value = row.set[c];
       if (!columns[c].spec->contains(value))
         reader.problems.add({file, line, text.rows[row.number][static_cast<std::size_t>(columns[c].at)].column},
-                            item.columns[c].name + " = " + show(value) + " is outside " + columns[c].spec->range() + ", the range of " + item.columns[c].path);
-      const std::string name = "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;
+                            item.columns[c].name + " = " + show(value) + " is outside " + columns[c].spec->range() +
+                                ", the range of " + item.columns[c].path);
+      const std::string name =
+          "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;
       replace(scene, columns[c].shared, reader.table.add_constant(name, value, columns[c].spec->unit));
     }
     table.x.push_back(row.set[0]);
@@ -279,13 +308,17 @@ std::vector<std::string> describe_rows(const Config& config) {
       std::string lines;
       for (std::size_t k = 0; k < std::min<std::size_t>(found.outliers.size(), 10); ++k)
         lines += (k ? ", " : "") + std::to_string(table.line[order[found.outliers[k]]]);
-      sentences.push_back(fmt::format("{}: {} of {} rows stand out of their neighbours by eight times the scatter and more (line {}{}): take them out if they are slips.", table.name,
-                                      found.outliers.size(), y.size(), lines, found.outliers.size() > 10 ? ", .." : ""));
+      sentences.push_back(
+          fmt::format("{}: {} of {} rows stand out of their neighbours by eight times the scatter and more (line "
+                      "{}{}): take them out if they are slips.",
+                      table.name, found.outliers.size(), y.size(), lines, found.outliers.size() > 10 ? ", .." : ""));
     }
     if (found.hysteretic())
-      sentences.push_back(fmt::format("{}: rows at the same {} that were taken at different times differ by {:.2g} in the median, {:.0f} times what neighbouring rows scatter: what is measured depends on "
-                                      "the way there (hysteresis, drift), and no single curve describes it.",
-                                      table.name, table.path, found.hysteresis, found.hysteresis / found.scatter));
+      sentences.push_back(
+          fmt::format("{}: rows at the same {} that were taken at different times differ by {:.2g} in the median, "
+                      "{:.0f} times what neighbouring rows scatter: what is measured depends on "
+                      "the way there (hysteresis, drift), and no single curve describes it.",
+                      table.name, table.path, found.hysteresis, found.hysteresis / found.scatter));
   }
   return sentences;
 }

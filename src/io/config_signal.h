@@ -39,10 +39,10 @@ struct SignalItem {
 /// `signal:` as one table or a list of them; empty without the key.
 std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root);
 
-/// A table's rows, each in `base` (the shared scene with what the table sets) but for what its columns set; `first`: sights of
-/// the tables before it. `replace` gives a scene another reference for a parameter.
-void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base, std::size_t first,
-                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
-                   std::vector<Readings>& tables);
+/// A table's rows, each in `base` (the shared scene with what the table sets) but for what its columns set; `first`:
+/// sights of the tables before it. `replace` gives a scene another reference for a parameter.
+void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base,
+                   std::size_t first, const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace,
+                   Config& config, std::vector<Readings>& tables);
 
 }  // namespace birefit

@@ -30,7 +30,8 @@ SampledVolume read_sampled_volume(ConfigReader& reader, const Block& parent) {
     std::array<double, 3> values{};
     if (!spacing->is_sequence() || spacing->items.size() != 3) {
       reader.problems.add(spacing->where, "spacing_um must be three numbers [dx, dy, dz], found " +
-                                              (spacing->is_sequence() ? std::to_string(spacing->items.size()) + " items" : spacing->describe()));
+                                              (spacing->is_sequence() ? std::to_string(spacing->items.size()) + " items"
+                                                                      : spacing->describe()));
       readable = false;
     } else {
       for (std::size_t i = 0; i < 3; ++i) {
@@ -48,7 +49,8 @@ SampledVolume read_sampled_volume(ConfigReader& reader, const Block& parent) {
   request.path = reader.resolve(*name);
   if (!request.spacing_um) request.where = block.find("file")->where;
   if (axes && request.path.extension() == ".vti")
-    reader.problems.add(block.find("axes")->where, "axes belongs to .npy files: in a .vti x runs fastest", "leave it out");
+    reader.problems.add(block.find("axes")->where, "axes belongs to .npy files: in a .vti x runs fastest",
+                        "leave it out");
   try {
     LoadedVolume loaded = load_volume(request);
     volume.grid = loaded.grid;

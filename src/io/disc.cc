@@ -13,7 +13,7 @@
 namespace birefit {
 namespace {
 
-constexpr int kWorkingSide = 512;    // larger images are box-averaged: a centre to 1/10 of a working pixel is plenty
+constexpr int kWorkingSide = 512;  // larger images are box-averaged: a centre to 1/10 of a working pixel is plenty
 
 struct Field {
   cv::Mat1d value;
@@ -129,9 +129,10 @@ Circle fit_circle(std::vector<cv::Point2d> points, Circle start) {
 }
 
 /// Correlation of the signal with itself turned by 180 degrees about (x, y), over the disc; (x, y) in half pixels lands
-/// on the grid, so nothing is interpolated. Radially symmetric droplets between crossed polarizers have that symmetry. Of every
-/// `stride` rows and columns one is looked at.
-double inversion_correlation(const cv::Mat1d& signal, const cv::Mat1b& used, int twice_x, int twice_y, double radius, int stride) {
+/// on the grid, so nothing is interpolated. Radially symmetric droplets between crossed polarizers have that symmetry.
+/// Of every `stride` rows and columns one is looked at.
+double inversion_correlation(const cv::Mat1d& signal, const cv::Mat1b& used, int twice_x, int twice_y, double radius,
+                             int stride) {
   const double cx = 0.5 * twice_x, cy = 0.5 * twice_y;
   const int y0 = std::max({0, static_cast<int>(std::ceil(cy - radius)), twice_y - (signal.rows - 1)});
   const int x0 = std::max({0, static_cast<int>(std::ceil(cx - radius)), twice_x - (signal.cols - 1)});
@@ -280,7 +281,9 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
   // Symmetry: a coarse to fine search around the outline's centre, on the half-pixel grid, then a parabola.
   int twice_x = static_cast<int>(std::lround(2 * circle.x)), twice_y = static_cast<int>(std::lround(2 * circle.y));
   const double reach = 1.05 * circle.radius;
-  const auto score = [&](int u, int v, int stride = 1) { return inversion_correlation(smooth, field.used, u, v, reach, stride); };
+  const auto score = [&](int u, int v, int stride = 1) {
+    return inversion_correlation(smooth, field.used, u, v, reach, stride);
+  };
   const int search = std::max(4, static_cast<int>(0.25 * circle.radius) * 2);
   const int coarse = std::max(1, static_cast<int>(circle.radius / 20));
   double best_score = -2;

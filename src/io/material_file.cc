@@ -33,9 +33,11 @@ class MaterialReader {
       return {};
     }
     for (const YamlNode& item : data->items) read_item(item);
-    if (problems_.empty() && !real_) problems_.add(data->where, "gives no real index", "`tabulated k` alone says nothing about retardance");
+    if (problems_.empty() && !real_)
+      problems_.add(data->where, "gives no real index", "`tabulated k` alone says nothing about retardance");
     if (const YamlNode* conditions = tree.find("CONDITIONS"))
-      if (const YamlNode* t = conditions->find("temperature"); t && t->is_scalar()) file_.temperature_k = parse_number(t->text);
+      if (const YamlNode* t = conditions->find("temperature"); t && t->is_scalar())
+        file_.temperature_k = parse_number(t->text);
     return file_;
   }
 
@@ -73,7 +75,8 @@ class MaterialReader {
         formula(item, number);
         return;
       }
-    problems_.add(type->where, "unknown type " + type->describe(), "known: formula 1 to 9, tabulated n, tabulated nk and tabulated k");
+    problems_.add(type->where, "unknown type " + type->describe(),
+                  "known: formula 1 to 9, tabulated n, tabulated nk and tabulated k");
   }
 
   void absorption(const Rows& r, std::size_t column) {
@@ -87,7 +90,8 @@ class MaterialReader {
     if (!range) range = item.find("range");  // files of older versions of the database
     const YamlNode* coefficients = item.find("coefficients");
     if (!range || !coefficients) {
-      problems_.add(item.where, std::string("formula ") + std::to_string(number) + " needs " + (range ? "coefficients" : "wavelength_range"));
+      problems_.add(item.where, std::string("formula ") + std::to_string(number) + " needs " +
+                                    (range ? "coefficients" : "wavelength_range"));
       return;
     }
     const std::vector<double> limits = numbers(*range);
@@ -103,7 +107,8 @@ class MaterialReader {
                       : number == 9 ? n == 6
                                     : n % 2 == 1;
     if (!fits) {
-      problems_.add(coefficients->where, "formula " + std::to_string(number) + " cannot have " + std::to_string(n) + " coefficients");
+      problems_.add(coefficients->where,
+                    "formula " + std::to_string(number) + " cannot have " + std::to_string(n) + " coefficients");
       return;
     }
     file_.law.form = static_cast<Dispersion::Form>(number);
@@ -152,7 +157,8 @@ class MaterialReader {
       if (!word.empty() || values.size() != columns + 1 || !(values[0] > 0)) {
         // The place of a text block is that of its mark; its lines follow.
         problems_.add({data->where.file, data->where.line > 0 ? data->where.line + number : 0},
-                      "must be a wavelength in um and " + std::to_string(columns) + (columns == 1 ? " number" : " numbers") + ", found \"" + line.substr(0, 40) + "\"");
+                      "must be a wavelength in um and " + std::to_string(columns) +
+                          (columns == 1 ? " number" : " numbers") + ", found \"" + line.substr(0, 40) + "\"");
         return {};
       }
       sorted.emplace_back(values[0], std::vector<double>(values.begin() + 1, values.end()));
@@ -182,7 +188,8 @@ MaterialFile load_material_file(const std::filesystem::path& path, const Where& 
   std::error_code code;
   if (!std::filesystem::is_regular_file(path, code))
     throw UserError(asked, "no material file at " + path.string(), "expected a file of refractiveindex.info (YAML)");
-  if (std::filesystem::file_size(path, code) > kMaxBytes) throw UserError(asked, path.string() + " is larger than 4 MB: no material file");
+  if (std::filesystem::file_size(path, code) > kMaxBytes)
+    throw UserError(asked, path.string() + " is larger than 4 MB: no material file");
   std::ifstream stream(path, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
   if (!stream) throw UserError(asked, path.string() + " cannot be read");

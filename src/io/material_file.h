@@ -16,8 +16,8 @@ struct MaterialFile {
   std::optional<double> temperature_k;     ///< of its CONDITIONS
 };
 
-/// Reads a file of refractiveindex.info: formulas 1 to 9, `tabulated n`, `nk` and `k`. Wavelengths in um. Throws UserError naming the
-/// file and line; `asked` is the place that names the file.
+/// Reads a file of refractiveindex.info: formulas 1 to 9, `tabulated n`, `nk` and `k`. Wavelengths in um. Throws
+/// UserError naming the file and line; `asked` is the place that names the file.
 MaterialFile load_material_file(const std::filesystem::path& path, const Where& asked);
 
 }  // namespace birefit

@@ -25,7 +25,8 @@ JointPrior load_prior(const std::filesystem::path& path, const std::vector<std::
                       const Where& where, std::vector<std::string>& warnings) {
   const std::string file = path.string();
   std::error_code code;
-  if (!std::filesystem::exists(path, code)) throw UserError(where, file + " does not exist", "run the earlier fit first");
+  if (!std::filesystem::exists(path, code))
+    throw UserError(where, file + " does not exist", "run the earlier fit first");
   if (!std::filesystem::is_regular_file(path, code)) throw UserError(where, file + " is not a file");
   std::ifstream stream(path, std::ios::binary);
   if (!stream) throw UserError(where, file + " cannot be read");

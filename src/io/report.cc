@@ -404,7 +404,8 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
 std::string signal_section(const SignalTable& table, const FitResult& result, int& figure) {
   std::vector<std::size_t> order;
   for (std::size_t r = 0; r < table.x.size(); ++r)
-    if (table.first + r < result.micrographs.size() && !result.micrographs[table.first + r].fitted.empty()) order.push_back(r);
+    if (table.first + r < result.micrographs.size() && !result.micrographs[table.first + r].fitted.empty())
+      order.push_back(r);
   if (order.empty()) return "";
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.x[a] < table.x[b]; });
   std::vector<double> x, measured, fitted, whitened;
@@ -442,15 +443,18 @@ std::string signal_section(const SignalTable& table, const FitResult& result, in
   residuals.series.push_back({Series::Kind::points, "", x, whitened, kMeasured, dot});
   chart.panels = {values, residuals};
   return "<h3>" + escape_html(table.name) + "</h3>\n<figure>\n" + wide_and_narrow(chart) +
-         fmt::format("<figcaption><b>Figure {}.</b> Measured and fitted {} of {} rows; residual rms {} ({} of the signal\u2019s spread). Below, the "
-                     "residual in units of its noise \u03c3.</figcaption>\n</figure>\n",
-                     figure++, escape_html(table.quantity), order.size(), plain(rms), *high > *low ? format_percent(rms / (*high - *low)) : "\u2013");
+         fmt::format(
+             "<figcaption><b>Figure {}.</b> Measured and fitted {} of {} rows; residual rms {} ({} of the "
+             "signal\u2019s spread). Below, the "
+             "residual in units of its noise \u03c3.</figcaption>\n</figure>\n",
+             figure++, escape_html(table.quantity), order.size(), plain(rms),
+             *high > *low ? format_percent(rms / (*high - *low)) : "\u2013");
 }
 
 /// The table that this micrograph is a row of, but not its first: what was said of the first holds.
 bool later_row(const Config& config, std::size_t micrograph) {
-  return !config.signals.empty() &&
-         std::none_of(config.signals.begin(), config.signals.end(), [&](const SignalTable& t) { return t.first == micrograph; });
+  return !config.signals.empty() && std::none_of(config.signals.begin(), config.signals.end(),
+                                                 [&](const SignalTable& t) { return t.first == micrograph; });
 }
 
 // ---- tables ---------------------------------------------------------------------------------------------------------
@@ -575,11 +579,17 @@ std::string correlation_table(const FitResult& result) {
 /// How the branches of the sample compare.
 std::string branch_table(const FitResult& result) {
   if (result.branches.empty()) return {};
-  std::string out = "<h2>Branches</h2>\n<div class=\"scroll\"><table>\n<tr><th>branch</th><th>chi-square</th><th>parameters</th><th>odds</th></tr>\n";
+  std::string out =
+      "<h2>Branches</h2>\n<div "
+      "class=\"scroll\"><table>\n<tr><th>branch</th><th>chi-square</th><th>parameters</th><th>odds</th></tr>\n";
   for (const BranchResult& b : result.branches)
-    out += fmt::format("<tr><td class=\"name\">{}{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(b.name), b.reported ? " (reported)" : "", plain(b.chi_square), b.parameters,
-                       b.odds < 1e-30 ? std::string("&lt; 10<sup>\u221230</sup>") : html_number(fmt::format("{:.2g}", b.odds)));
-  return out + "</table></div>\n<p>Odds of the evidence: the likelihood, by the noise of the best branch, times the share of the bounds that the answer takes up.</p>\n";
+    out += fmt::format(
+        "<tr><td class=\"name\">{}{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(b.name),
+        b.reported ? " (reported)" : "", plain(b.chi_square), b.parameters,
+        b.odds < 1e-30 ? std::string("&lt; 10<sup>\u221230</sup>") : html_number(fmt::format("{:.2g}", b.odds)));
+  return out +
+         "</table></div>\n<p>Odds of the evidence: the likelihood, by the noise of the best branch, times the share of "
+         "the bounds that the answer takes up.</p>\n";
 }
 
 /// What the fit took as exact, and what that does to the estimates.
@@ -587,23 +597,30 @@ std::string input_table(const FitResult& result) {
   constexpr std::size_t kMostInputs = 10, kMostParameters = 6;
   std::vector<std::size_t> shown;
   for (std::size_t j = 0; j < result.parameters.size() && shown.size() < kMostParameters; ++j)
-    if (!result.parameters[j].linear && result.parameters[j].unit != "px" && std::isfinite(result.parameters[j].stderr_)) shown.push_back(j);
+    if (!result.parameters[j].linear && result.parameters[j].unit != "px" &&
+        std::isfinite(result.parameters[j].stderr_))
+      shown.push_back(j);
   if (shown.empty()) return {};
   std::string out = result.inputs.empty() && result.taken_as_exact.empty() ? "" : "<h2>Taken as exact</h2>\n";
   if (!result.taken_as_exact.empty()) out += list(result.taken_as_exact);
   if (result.inputs.empty()) return out;
   out +=
-      "<p>What the estimates would change by if an input were otherwise; in brackets over the standard error. An input with a "
-      "<code>prior_sd</code> is fitted, and its uncertainty counted.</p>\n<div class=\"scroll\"><table>\n<tr><th>input</th><th>value</th><th>more by</th>";
+      "<p>What the estimates would change by if an input were otherwise; in brackets over the standard error. An input "
+      "with a "
+      "<code>prior_sd</code> is fitted, and its uncertainty counted.</p>\n<div "
+      "class=\"scroll\"><table>\n<tr><th>input</th><th>value</th><th>more by</th>";
   for (const std::size_t j : shown) out += "<th>" + escape_html(short_name(result.parameters[j].name)) + "</th>";
   out += "</tr>\n";
   for (std::size_t i = 0; i < std::min(kMostInputs, result.inputs.size()); ++i) {
     const InputEffect& input = result.inputs[i];
-    out += fmt::format("<tr><td class=\"name\">{}</td><td>{} {}</td><td>{}</td>", escape_html(input.name), html_number(fmt::format("{:.6g}", input.value)), escape_html(input.unit),
+    out += fmt::format("<tr><td class=\"name\">{}</td><td>{} {}</td><td>{}</td>", escape_html(input.name),
+                       html_number(fmt::format("{:.6g}", input.value)), escape_html(input.unit),
                        input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %");
     for (const std::size_t j : shown) {
       const ParameterEstimate& p = result.parameters[j];
-      out += fmt::format("<td>{} ({})</td>", html_number(fmt::format("{:+.2g}", input.shift[j])), html_number(fmt::format("{:+.{}f}", input.shift[j] / p.stderr_, std::abs(input.shift[j]) < 10 * p.stderr_ ? 1 : 0)));
+      out += fmt::format("<td>{} ({})</td>", html_number(fmt::format("{:+.2g}", input.shift[j])),
+                         html_number(fmt::format("{:+.{}f}", input.shift[j] / p.stderr_,
+                                                 std::abs(input.shift[j]) < 10 * p.stderr_ ? 1 : 0)));
     }
     out += "</tr>\n";
   }
@@ -614,14 +631,22 @@ std::string coverage_table(const FitResult& result) {
   if (!result.coverage) return {};
   const Coverage& c = *result.coverage;
   std::string out = fmt::format(
-      "<h2>Do the intervals hold?</h2>\n<p>{} images were simulated at this result ({}) and fitted from scratch: {} gave an answer, {} of these more than 5 standard errors off.</p>\n", c.draws,
-      c.of_residuals ? "with the fit\u2019s own residuals as noise, drawn in blocks" : "with the noise as modelled", c.answered, c.wrong);
+      "<h2>Do the intervals hold?</h2>\n<p>{} images were simulated at this result ({}) and fitted from scratch: {} "
+      "gave an answer, {} of these more than 5 standard errors off.</p>\n",
+      c.draws,
+      c.of_residuals ? "with the fit\u2019s own residuals as noise, drawn in blocks" : "with the noise as modelled",
+      c.answered, c.wrong);
   if (c.answered == 0) return out;
-  out += "<div class=\"scroll\"><table>\n<tr><th>parameter</th><th>in 68 % interval</th><th>in 95 % interval</th><th>spread / std. error</th><th>bias / std. error</th></tr>\n";
+  out +=
+      "<div class=\"scroll\"><table>\n<tr><th>parameter</th><th>in 68 % interval</th><th>in 95 % "
+      "interval</th><th>spread / std. error</th><th>bias / std. error</th></tr>\n";
   for (const Coverage::Of& p : c.parameters)
-    out += fmt::format("<tr><td class=\"name\">{}</td><td>{:.1f} %</td><td>{:.1f} %</td><td>{:.2f}</td><td>{}</td></tr>\n", escape_html(short_name(p.name)), 100 * p.inside68, 100 * p.inside95,
-                       p.spread, html_number(fmt::format("{:+.2f}", p.bias)));
-  return out + fmt::format("</table></div>\n<p>Of {} fits: a fraction of 95 % is known to \u00b1{:.1g} %.</p>\n", c.answered, 100 * std::sqrt(0.95 * 0.05 / c.answered));
+    out +=
+        fmt::format("<tr><td class=\"name\">{}</td><td>{:.1f} %</td><td>{:.1f} %</td><td>{:.2f}</td><td>{}</td></tr>\n",
+                    escape_html(short_name(p.name)), 100 * p.inside68, 100 * p.inside95, p.spread,
+                    html_number(fmt::format("{:+.2f}", p.bias)));
+  return out + fmt::format("</table></div>\n<p>Of {} fits: a fraction of 95 % is known to \u00b1{:.1g} %.</p>\n",
+                           c.answered, 100 * std::sqrt(0.95 * 0.05 / c.answered));
 }
 
 // ---- diagnostics ----------------------------------------------------------------------------------------------------
@@ -667,18 +692,23 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
     if (p == nullptr || trace.value.size() < 3) continue;
     Chart chart;
     chart.title = "profile of " + trace.name;
-    chart.x_label = short_name(trace.name) + (p->unit.empty() ? "" : " (" + std::string(p->unit == "um" ? "\u00b5m" : p->unit) + ")");
+    chart.x_label = short_name(trace.name) +
+                    (p->unit.empty() ? "" : " (" + std::string(p->unit == "um" ? "\u00b5m" : p->unit) + ")");
     Panel panel;
     panel.y_label = "rise of chi-square";
-    Series line{Series::Kind::line, "profile", {}, {}, kBlue, 1.5}, normal{Series::Kind::line, "parabola", {}, {}, "#8a919b", 1.0};
+    Series line{Series::Kind::line, "profile", {}, {}, kBlue, 1.5},
+        normal{Series::Kind::line, "parabola", {}, {}, "#8a919b", 1.0};
     const Series dots{Series::Kind::points, "", trace.value, trace.rise, kBlue, 4.5};
-    const double from = trace.value.front(), to = trace.value.back(), highest = *std::max_element(trace.rise.begin(), trace.rise.end());
+    const double from = trace.value.front(), to = trace.value.back(),
+                 highest = *std::max_element(trace.rise.begin(), trace.rise.end());
     for (int i = 0; i <= 60; ++i) {
       const double x = from + (to - from) * i / 60, y = std::pow((x - p->value) / p->stderr_, 2);
       if (y <= 1.3 * highest) normal.x.push_back(x), normal.y.push_back(y);
     }
     // Between the places that were fitted its root is next to straight.
-    const auto root = [&](std::size_t i) { return std::copysign(std::sqrt(std::max(0.0, trace.rise[i])), trace.value[i] - p->value); };
+    const auto root = [&](std::size_t i) {
+      return std::copysign(std::sqrt(std::max(0.0, trace.rise[i])), trace.value[i] - p->value);
+    };
     for (std::size_t i = 0; i + 1 < trace.value.size(); ++i)
       for (int k = 0; k <= 12; ++k) {
         const double share = k / 12.0;
@@ -686,12 +716,15 @@ std::string diagnostics(const FitResult& result, const std::vector<Frame>& frame
         line.y.push_back(std::pow(root(i) + share * (root(i + 1) - root(i)), 2));
       }
     panel.series = {normal, line, dots};
-    panel.markers = {{p->interval95_low, "95 %", kFitted, true}, {p->value, "optimum", kFitted, false}, {p->interval95_high, "", kFitted, true}};
+    panel.markers = {{p->interval95_low, "95 %", kFitted, true},
+                     {p->value, "optimum", kFitted, false},
+                     {p->interval95_high, "", kFitted, true}};
     chart.panels = {panel};
-    cells.push_back(fmt::format(
-        "<figure>{}<figcaption><b>Figure {}.</b> Profile likelihood of {}, all others at their best for each of its values. It is no parabola (grey: the standard error\u2019s): "
-        "the interval is where the profile has risen by t\u00b2.</figcaption></figure>\n",
-        svg(chart), figure++, escape_html(short_name(trace.name))));
+    cells.push_back(
+        fmt::format("<figure>{}<figcaption><b>Figure {}.</b> Profile likelihood of {}, all others at their best for "
+                    "each of its values. It is no parabola (grey: the standard error\u2019s): "
+                    "the interval is where the profile has risen by t\u00b2.</figcaption></figure>\n",
+                    svg(chart), figure++, escape_html(short_name(trace.name))));
   }
   if (result.iterations.size() > 1) {
     Chart chart;
@@ -791,7 +824,8 @@ std::string identifiability(const Config& config, const FitResult& result) {
              "</th>";
     out += "</tr>\n";
     for (const RivalMinimum& rival : result.rivals) {
-      out += "<tr><td>" + html_number(fmt::format("{:.2g}", rival.odds)) + "</td><td>" + html_number(fmt::format("{:.2g}", rival.likelihood_ratio)) + "</td><td>" +
+      out += "<tr><td>" + html_number(fmt::format("{:.2g}", rival.odds)) + "</td><td>" +
+             html_number(fmt::format("{:.2g}", rival.likelihood_ratio)) + "</td><td>" +
              html_number(fmt::format("{:.6g}", rival.chi_square)) + "</td>";
       for (const ParameterEstimate* p : shown) {
         const ParameterRef ref = config.job.parameters.find(p->name);
@@ -838,7 +872,8 @@ std::string data_section(const Config& config, const FitResult& result) {
   std::string out =
       "<h2>Data</h2>\n<p>Pixels used and left out, by reason; noise model in counts.</p>\n<div class=\"scroll\"><table "
       "class=\"full\">\n<tr><th>micrograph</th><th>used</th><th>masked</th>"
-      "<th>outside<br>ROI</th><th>satu-<br>rated</th><th>dead</th><th>not<br>finite</th><th>out-<br>liers</th><th>chi-square<br>per "
+      "<th>outside<br>ROI</th><th>satu-<br>rated</th><th>dead</th><th>not<br>finite</th><th>out-<br>liers</"
+      "th><th>chi-square<br>per "
       "pixel</th>"
       "<th>read<br>noise</th><th>counts per<br>photon</th></tr>\n";
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {

@@ -45,7 +45,8 @@ inline std::string format_percent(double fraction) {
                          : fmt::format("{:.2g} %", percent);
 }
 
-/// "sample.droplet.diameter_um" is "diameter_um"; "micrographs[1].gain" keeps its frame, and that of signal[1] its table: "gain [1]".
+/// "sample.droplet.diameter_um" is "diameter_um"; "micrographs[1].gain" keeps its frame, and that of signal[1] its
+/// table: "gain [1]".
 inline std::string short_name(const std::string& name) {
   std::size_t dot = name.rfind('.');
   // A lone "x" says nothing: "center_px.x".
@@ -53,7 +54,8 @@ inline std::string short_name(const std::string& name) {
   std::string text = name.substr(dot == std::string::npos ? 0 : dot + 1);
   for (const std::string& list : {std::string("micrographs"), std::string("signal")}) {
     const std::size_t end = name.find(']');
-    if (name.rfind(list + "[", 0) == 0 && end != std::string::npos) text += " " + name.substr(list.size(), end + 1 - list.size());
+    if (name.rfind(list + "[", 0) == 0 && end != std::string::npos)
+      text += " " + name.substr(list.size(), end + 1 - list.size());
   }
   return text;
 }

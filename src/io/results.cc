@@ -44,7 +44,9 @@ Json parameter_json(const ParameterEstimate& p) {
                {"at_bound", p.at_bound},
                {"limit", nullptr},
                {"interval_95", {number(p.interval95_low), number(p.interval95_high)}},
-               {"interval_kind", p.profiled ? "profile likelihood" : !p.limit.empty() ? "one-sided" : "normal"},
+               {"interval_kind", p.profiled         ? "profile likelihood"
+                                 : !p.limit.empty() ? "one-sided"
+                                                    : "normal"},
                {"prior", nullptr},
                {"linear", p.linear}};
   if (!p.limit.empty()) json["limit"] = {{"side", p.limit}, {"value", number(p.limit_value)}};
@@ -68,7 +70,8 @@ struct PixelCounts {
 
 PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t i) {
   PixelCounts counts;
-  if (i < result.micrographs.size()) counts.used = result.micrographs[i].used, counts.outliers = result.micrographs[i].outliers;
+  if (i < result.micrographs.size())
+    counts.used = result.micrographs[i].used, counts.outliers = result.micrographs[i].outliers;
   if (const Picture* picture = picture_at(config.job.measurements, i)) {
     const Picture& m = *picture;
     counts.masked = m.masked_by_user;
@@ -81,8 +84,9 @@ PixelCounts pixels_of(const Config& config, const FitResult& result, std::size_t
 }
 
 Json pixels_json(const PixelCounts& c) {
-  return {{"used", c.used}, {"masked", c.masked},         {"saturated", c.saturated},
-          {"dead", c.dead}, {"non_finite", c.non_finite}, {"outside_roi", c.outside_roi}, {"outliers", c.outliers}};
+  return {{"used", c.used},        {"masked", c.masked},         {"saturated", c.saturated},
+          {"dead", c.dead},        {"non_finite", c.non_finite}, {"outside_roi", c.outside_roi},
+          {"outliers", c.outliers}};
 }
 
 Json strips_json(const FitResult& result) {
@@ -135,15 +139,21 @@ std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
 }
 
 std::string coverage_text(const Coverage& c) {
-  std::string text = fmt::format("  {} images simulated at this result ({}) and fitted from scratch: {} with an answer, {} of them more than 5 standard errors off\n", c.draws,
-                                 c.of_residuals ? "noise: the fit's own residuals, drawn in blocks" : "noise as modelled", c.answered, c.wrong);
+  std::string text = fmt::format(
+      "  {} images simulated at this result ({}) and fitted from scratch: {} with an answer, {} of them more than 5 "
+      "standard errors off\n",
+      c.draws, c.of_residuals ? "noise: the fit's own residuals, drawn in blocks" : "noise as modelled", c.answered,
+      c.wrong);
   if (c.answered == 0) return text;
   std::size_t width = 0;
   for (const Coverage::Of& p : c.parameters) width = std::max(width, p.name.size());
   for (const Coverage::Of& p : c.parameters)
-    text += fmt::format("    {:<{}}  68 % interval holds {:.1f} %, 95 % interval {:.1f} %; spread {:.2f}, bias {:+.2f} standard errors\n", p.name, width, 100 * p.inside68,
-                        100 * p.inside95, p.spread, p.bias);
-  return text + fmt::format("    (of {} fits; a fraction of 95 % is known to {:.1g} %)\n", c.answered, 100 * std::sqrt(0.95 * 0.05 / c.answered));
+    text += fmt::format(
+        "    {:<{}}  68 % interval holds {:.1f} %, 95 % interval {:.1f} %; spread {:.2f}, bias {:+.2f} standard "
+        "errors\n",
+        p.name, width, 100 * p.inside68, 100 * p.inside95, p.spread, p.bias);
+  return text + fmt::format("    (of {} fits; a fraction of 95 % is known to {:.1g} %)\n", c.answered,
+                            100 * std::sqrt(0.95 * 0.05 / c.answered));
 }
 
 std::string log_text(const Config& config, const FitResult& result) {
@@ -151,7 +161,8 @@ std::string log_text(const Config& config, const FitResult& result) {
       fmt::format("birefit {}\nconfig: {}\n\n{}\n", BIREFIT_VERSION, config.path.string(), summary(result));
   for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
     const MicrographResult& m = result.micrographs[i];
-    const bool row = std::none_of(config.signals.begin(), config.signals.end(), [&](const SignalTable& t) { return t.first == i; });
+    const bool row =
+        std::none_of(config.signals.begin(), config.signals.end(), [&](const SignalTable& t) { return t.first == i; });
     if (!config.signals.empty() && row) continue;  // the first row of a table speaks for the others
     text += fmt::format("\nmicrograph {}\n  {} pixels used, chi-square {:.6g}, residual rms {:.4g}\n", m.name, m.used,
                         m.chi_square, m.residual_rms);
@@ -198,13 +209,19 @@ std::string fit_json(const Config& config, const FitResult& result) {
     for (const ParameterEstimate& p : result.parameters)
       if (const ParameterRef ref = config.job.parameters.find(p.name); ref && ref.index < std::ssize(rival.theta))
         values[p.name] = number(rival.theta[ref.index]);
-    json["rivals"].push_back(
-        {{"odds", number(rival.odds)}, {"likelihood_ratio", number(rival.likelihood_ratio)}, {"counts", rival.counts}, {"chi_square", number(rival.chi_square)}, {"parameters", values}});
+    json["rivals"].push_back({{"odds", number(rival.odds)},
+                              {"likelihood_ratio", number(rival.likelihood_ratio)},
+                              {"counts", rival.counts},
+                              {"chi_square", number(rival.chi_square)},
+                              {"parameters", values}});
   }
   json["branches"] = Json::array();
   for (const BranchResult& branch : result.branches)
-    json["branches"].push_back({{"name", branch.name}, {"chi_square", number(branch.chi_square)}, {"parameters", branch.parameters},
-                                {"odds", number(branch.odds)}, {"reported", branch.reported}});
+    json["branches"].push_back({{"name", branch.name},
+                                {"chi_square", number(branch.chi_square)},
+                                {"parameters", branch.parameters},
+                                {"odds", number(branch.odds)},
+                                {"reported", branch.reported}});
   json["identifiable"] = result.identifiable;
   json["directions"] = Json::array();
   for (const FisherDirection& direction : result.directions) {
@@ -218,8 +235,13 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["inputs"] = Json::array();
   for (const InputEffect& input : result.inputs) {
     Json shift = Json::object();
-    for (std::size_t j = 0; j < input.shift.size() && j < result.parameters.size(); ++j) shift[result.parameters[j].name] = number(input.shift[j]);
-    json["inputs"].push_back({{"name", input.name}, {"unit", input.unit}, {"value", number(input.value)}, {"step", number(input.step)}, {"shift", shift}});
+    for (std::size_t j = 0; j < input.shift.size() && j < result.parameters.size(); ++j)
+      shift[result.parameters[j].name] = number(input.shift[j]);
+    json["inputs"].push_back({{"name", input.name},
+                              {"unit", input.unit},
+                              {"value", number(input.value)},
+                              {"step", number(input.step)},
+                              {"shift", shift}});
   }
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
@@ -227,8 +249,15 @@ std::string fit_json(const Config& config, const FitResult& result) {
   if (const auto& c = result.coverage) {
     Json of = Json::object();
     for (const Coverage::Of& p : c->parameters)
-      of[p.name] = {{"inside68", number(p.inside68)}, {"inside95", number(p.inside95)}, {"spread_over_stderr", number(p.spread)}, {"bias_over_stderr", number(p.bias)}};
-    json["coverage"] = {{"draws", c->draws}, {"noise", c->of_residuals ? "residuals" : "model"}, {"answered", c->answered}, {"confidently_wrong", c->wrong}, {"parameters", of}};
+      of[p.name] = {{"inside68", number(p.inside68)},
+                    {"inside95", number(p.inside95)},
+                    {"spread_over_stderr", number(p.spread)},
+                    {"bias_over_stderr", number(p.bias)}};
+    json["coverage"] = {{"draws", c->draws},
+                        {"noise", c->of_residuals ? "residuals" : "model"},
+                        {"answered", c->answered},
+                        {"confidently_wrong", c->wrong},
+                        {"parameters", of}};
   }
   json["correlation"] = matrix(result.names, result.correlation);
   json["covariance"] = matrix(result.names, result.covariance);
@@ -253,7 +282,8 @@ std::string fit_json(const Config& config, const FitResult& result) {
     const MicrographResult& m = result.micrographs[i];
     const PixelCounts counts = pixels_of(config, result, i);
     total.used += counts.used, total.masked += counts.masked, total.saturated += counts.saturated;
-    total.dead += counts.dead, total.non_finite += counts.non_finite, total.outside_roi += counts.outside_roi, total.outliers += counts.outliers;
+    total.dead += counts.dead, total.non_finite += counts.non_finite, total.outside_roi += counts.outside_roi,
+        total.outliers += counts.outliers;
     if (i == 0) model = m.plan;
     model.numerical_error = std::max(model.numerical_error, m.plan.numerical_error);
     model.model_error = std::max(model.model_error, m.plan.model_error);
@@ -338,8 +368,8 @@ void write_results(const std::filesystem::path& folder, const Config& config, co
     for (std::size_t r = 0; r < table.x.size() && table.first + r < result.micrographs.size(); ++r) {
       const MicrographResult& m = result.micrographs[table.first + r];
       if (m.fitted.empty()) continue;
-      text += fmt::format("{:.10g},{:.10g},{:.10g},{:.10g},{:.4g}\n", table.x[r], m.fitted(0, 0) + m.residual(0, 0), m.fitted(0, 0),
-                          m.residual(0, 0), m.sigma(0, 0));
+      text += fmt::format("{:.10g},{:.10g},{:.10g},{:.10g},{:.4g}\n", table.x[r], m.fitted(0, 0) + m.residual(0, 0),
+                          m.fitted(0, 0), m.residual(0, 0), m.sigma(0, 0));
     }
     files.push_back({folder / ("fitted" + (config.signals.size() > 1 ? "_" + std::to_string(k) : "") + ".csv"), text});
   }

@@ -37,7 +37,8 @@ class Digest {
     std::uint64_t size = 0;
     std::array<char, 65536> buffer;
     while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
-      for (std::streamsize i = 0; i < stream.gcount(); ++i) add_byte(static_cast<unsigned char>(buffer[static_cast<std::size_t>(i)]));
+      for (std::streamsize i = 0; i < stream.gcount(); ++i)
+        add_byte(static_cast<unsigned char>(buffer[static_cast<std::size_t>(i)]));
       size += static_cast<std::uint64_t>(stream.gcount());
     }
     add_number(size);
@@ -56,7 +57,8 @@ class Digest {
 double number(const json& value) { return value.is_null() ? kNotKnown : value.get<double>(); }
 
 Posterior posterior_of(const FitResult& fit) {
-  Posterior all{fit.names, Eigen::VectorXd::Constant(std::ssize(fit.names), kNotKnown), fit.covariance, fit.interval_degrees_of_freedom};
+  Posterior all{fit.names, Eigen::VectorXd::Constant(std::ssize(fit.names), kNotKnown), fit.covariance,
+                fit.interval_degrees_of_freedom};
   for (const ParameterEstimate& p : fit.parameters)
     for (std::size_t i = 0; i < fit.names.size(); ++i)
       if (fit.names[i] == p.name) all.mean[static_cast<Eigen::Index>(i)] = p.value;
@@ -82,7 +84,8 @@ std::optional<Posterior> shared_prior(const Config& frame, const std::vector<std
   if (all == 0) return std::nullopt;
   prior.mean.resize(all);
   prior.covariance = Eigen::MatrixXd::Zero(all, all);
-  for (Eigen::Index i = 0; i < single; ++i) prior.mean[i] = mean[static_cast<std::size_t>(i)], prior.covariance(i, i) = variance[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = 0; i < single; ++i)
+    prior.mean[i] = mean[static_cast<std::size_t>(i)], prior.covariance(i, i) = variance[static_cast<std::size_t>(i)];
   if (correlated) {
     prior.names.insert(prior.names.end(), joint->names.begin(), joint->names.end());
     prior.mean.tail(joint->mean.size()) = joint->mean;
@@ -113,10 +116,13 @@ void check_shared(const ImageSeries& series, const Config& frame) {
       return std::any_of(series.shared.begin(), series.shared.end(), [&](const auto& s) { return s.first == name; });
     };
     const auto& names = frame.job.prior->names;
-    const auto shared = std::find_if(names.begin(), names.end(), is_shared), own = std::find_if_not(names.begin(), names.end(), is_shared);
+    const auto shared = std::find_if(names.begin(), names.end(), is_shared),
+               own = std::find_if_not(names.begin(), names.end(), is_shared);
     if (shared != names.end() && own != names.end())
-      problems.add({series.path.string()}, "prior connects " + *shared + ", which is shared, with " + *own + ", which each frame has for itself",
-                   "share both or neither");
+      problems.add(
+          {series.path.string()},
+          "prior connects " + *shared + ", which is shared, with " + *own + ", which each frame has for itself",
+          "share both or neither");
   }
   problems.throw_if_any();
 }
@@ -135,8 +141,13 @@ std::string field(const std::string& text) {
 std::string cells(const ParameterEstimate& p) {
   const bool limited = !p.limit.empty();
   return cell(p.value) + "," + (limited ? "" : cell(p.stderr_)) + "," +
-         (!limited ? cell(p.interval95_low) : p.limit == "lower" ? cell(p.limit_value) : "") + "," +
-         (!limited ? cell(p.interval95_high) : p.limit == "upper" ? cell(p.limit_value) : "");
+         (!limited             ? cell(p.interval95_low)
+          : p.limit == "lower" ? cell(p.limit_value)
+                               : "") +
+         "," +
+         (!limited             ? cell(p.interval95_high)
+          : p.limit == "upper" ? cell(p.limit_value)
+                               : "");
 }
 
 }  // namespace
@@ -164,7 +175,8 @@ void start_from(Config& frame, const FitResult& neighbour) {
     if (!ref || p.at_bound || !p.limit.empty() || !std::isfinite(p.value)) continue;
     Parameter& parameter = frame.job.parameters[ref];
     const auto& joint = frame.job.prior;
-    const bool prior = parameter.prior_sd || (joint && std::find(joint->names.begin(), joint->names.end(), p.name) != joint->names.end());
+    const bool prior = parameter.prior_sd ||
+                       (joint && std::find(joint->names.begin(), joint->names.end(), p.name) != joint->names.end());
     if (!parameter.free || parameter.linear || parameter.automatic || prior) continue;
     parameter.value = std::clamp(p.value, parameter.lower, parameter.upper);
   }
@@ -177,7 +189,8 @@ std::string fingerprint_of(const Config& frame) {
   const ParameterTable& table = frame.job.parameters;  // the row's numbers and the starts are in it
   for (int i = 0; i < table.size(); ++i) {
     digest.add(table[i].name);
-    for (const double number : {table[i].value, table[i].lower, table[i].upper, table[i].free ? 1.0 : 0.0}) digest.add(number);
+    for (const double number : {table[i].value, table[i].lower, table[i].upper, table[i].free ? 1.0 : 0.0})
+      digest.add(number);
   }
   for (const std::filesystem::path& file : frame.inputs) {
     digest.add(file.string());
@@ -201,8 +214,9 @@ std::optional<RecordedFit> load_recorded_fit(const std::filesystem::path& fit_js
     fit.pinned = root.at("pinned");
     fit.described = root.at("described");
     fit.verdict = root.at("verdict");
-    fit.interval_degrees_of_freedom = root.at("interval_degrees_of_freedom").is_null() ? std::numeric_limits<double>::infinity()
-                                                                                       : root.at("interval_degrees_of_freedom").get<double>();
+    fit.interval_degrees_of_freedom = root.at("interval_degrees_of_freedom").is_null()
+                                          ? std::numeric_limits<double>::infinity()
+                                          : root.at("interval_degrees_of_freedom").get<double>();
     fit.chi_square = number(root.at("chi_square"));
     fit.reduced_chi_square = number(root.at("reduced_chi_square"));
     fit.degrees_of_freedom = root.at("degrees_of_freedom");
@@ -274,14 +288,17 @@ SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<
     }
   }
   if (posteriors.size() < done)
-    result.warnings.push_back(fmt::format("{} of {} frames say nothing of the shared parameters: they have no answer, or only a limit.",
-                                          done - posteriors.size(), done));
+    result.warnings.push_back(
+        fmt::format("{} of {} frames say nothing of the shared parameters: they have no answer, or only a limit.",
+                    done - posteriors.size(), done));
   if (posteriors.empty()) return result;
   const SharedEstimate shared = combine(posteriors, shared_prior(load_frame(series, 0), names));
   if (!shared.consistent)
-    result.warnings.push_back(fmt::format("The frames disagree on what they share: chi-square {:.4g} for {} degrees of freedom. Its error is enlarged by the root of their "
-                                          "ratio; a parameter of each frame's own, or a model error that differs between frames, may be the cause.",
-                                          shared.chi_square, shared.chi_square_degrees));
+    result.warnings.push_back(fmt::format(
+        "The frames disagree on what they share: chi-square {:.4g} for {} degrees of freedom. Its error is enlarged by "
+        "the root of their "
+        "ratio; a parameter of each frame's own, or a model error that differs between frames, may be the cause.",
+        shared.chi_square, shared.chi_square_degrees));
   for (std::size_t i = 0; i < heard.size(); ++i) {
     if (!heard[i]) continue;
     FitResult& fit = *result.frames[i];
@@ -336,8 +353,9 @@ std::string shared_csv(const SeriesResult& result) {
   for (std::size_t i = 0; i < shared.posterior.names.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     const double value = shared.posterior.mean[at], error = std::sqrt(shared.posterior.covariance(at, at));
-    text += fmt::format("{},{},{},{},{},{},{},{},{}\n", shared.posterior.names[i], cell(value), cell(error), cell(value - t * error), cell(value + t * error),
-                        shared.fits, cell(shared.chi_square), shared.chi_square_degrees, shared.consistent ? "yes" : "no");
+    text += fmt::format("{},{},{},{},{},{},{},{},{}\n", shared.posterior.names[i], cell(value), cell(error),
+                        cell(value - t * error), cell(value + t * error), shared.fits, cell(shared.chi_square),
+                        shared.chi_square_degrees, shared.consistent ? "yes" : "no");
   }
   return text;
 }

@@ -79,7 +79,8 @@ TextTable load_text_table(const std::filesystem::path& path, const Where& where,
       for (TableCell& cell : cells) {
         for (const TableCell& earlier : table.header)
           if (earlier.text == cell.text) header.add({file, number, cell.column}, "duplicate column " + cell.text);
-        if (cell.text.empty() && !(numbered && table.header.empty())) header.add({file, number, cell.column}, "a column has no name");
+        if (cell.text.empty() && !(numbered && table.header.empty()))
+          header.add({file, number, cell.column}, "a column has no name");
         if (parse_number(cell.text))
           header.add({file, number, cell.column}, "the first line must name the columns, found " + cell.text);
         table.header.push_back(std::move(cell));
@@ -97,7 +98,8 @@ TextTable load_text_table(const std::filesystem::path& path, const Where& where,
     if (problems.all().size() >= kMostProblems) break;
   }
   if (table.header_line == 0) throw UserError({file}, "is empty", "expected a line of column names, then numbers");
-  if (table.rows.empty() && problems.empty()) throw UserError({file, table.header_line}, "has column names but no rows");
+  if (table.rows.empty() && problems.empty())
+    throw UserError({file, table.header_line}, "has column names but no rows");
   return table;
 }
 
@@ -120,7 +122,8 @@ PlacedTable load_placed_table(const std::filesystem::path& path, const Where& wh
       const std::optional<double> value = parse_number(cell.text);
       if (!value || !std::isfinite(*value))
         problems.add({file, placed.lines[r], cell.column},
-                     placed.table.columns[i] + " = " + (cell.text.empty() ? "nothing" : cell.text.substr(0, 40)) + " is not a finite number");
+                     placed.table.columns[i] + " = " + (cell.text.empty() ? "nothing" : cell.text.substr(0, 40)) +
+                         " is not a finite number");
       row.push_back(value.value_or(0));
       columns.push_back(cell.column);
     }

@@ -26,13 +26,14 @@ struct TextTable {
   std::vector<std::vector<TableCell>> rows;  ///< each as long as the header
   std::vector<int> lines;                    ///< of each row
 };
-/// Rows of another length are added to `problems` and left out. `numbered`: the first column may lack a name (row numbers, as
-/// programs write them).
-TextTable load_text_table(const std::filesystem::path& path, const Where& where, Problems& problems, bool numbered = false);
+/// Rows of another length are added to `problems` and left out. `numbered`: the first column may lack a name (row
+/// numbers, as programs write them).
+TextTable load_text_table(const std::filesystem::path& path, const Where& where, Problems& problems,
+                          bool numbered = false);
 
 struct PlacedTable {
   Table table;
-  std::vector<int> header_columns;             ///< character column of each header field, from 1
+  std::vector<int> header_columns;  ///< character column of each header field, from 1
   int header_line = 0;
   std::vector<int> lines;                      ///< line of each row
   std::vector<std::vector<int>> cell_columns;  ///< character column of each cell

@@ -1,5 +1,6 @@
 #pragma once
-// Director fields from files: NumPy arrays (.npy) and VTK image data (.vti). Formats: docs/configuration.md, "Sampled fields".
+// Director fields from files: NumPy arrays (.npy) and VTK image data (.vti). Formats: docs/configuration.md, "Sampled
+// fields".
 
 #include <array>
 #include <filesystem>
@@ -15,10 +16,11 @@ namespace birefit {
 
 struct VolumeRequest {
   std::filesystem::path path;
-  Where where;                                       ///< of the config entry, for what is wrong with the request
-  bool x_first = false;                              ///< .npy: array[x, y, z] instead of array[z, y, x]
-  std::optional<std::array<double, 3>> spacing_um;   ///< .npy: needed; .vti: not allowed, the file says it
-  double bulk_order = 0;                             ///< order of the bulk, in the units of the file's S or Q; 0 = the largest in the file
+  Where where;                                      ///< of the config entry, for what is wrong with the request
+  bool x_first = false;                             ///< .npy: array[x, y, z] instead of array[z, y, x]
+  std::optional<std::array<double, 3>> spacing_um;  ///< .npy: needed; .vti: not allowed, the file says it
+  /// order of the bulk, in the units of the file's S or Q; 0 = the largest in the file
+  double bulk_order = 0;
 };
 
 struct LoadedVolume {

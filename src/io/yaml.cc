@@ -18,10 +18,14 @@ void check_text(const std::string& text, const std::string& file) {
   for (std::size_t i = 0; i < text.size();) {
     const unsigned char first = byte(i);
     int length = 0;
-    if (first < 0x80) length = 1;
-    else if (first >= 0xC2 && first < 0xE0) length = 2;
-    else if (first >= 0xE0 && first < 0xF0) length = 3;
-    else if (first >= 0xF0 && first < 0xF5) length = 4;
+    if (first < 0x80)
+      length = 1;
+    else if (first >= 0xC2 && first < 0xE0)
+      length = 2;
+    else if (first >= 0xE0 && first < 0xF0)
+      length = 3;
+    else if (first >= 0xF0 && first < 0xF5)
+      length = 4;
     bool good = length > 0 && i + length <= text.size();
     for (int k = 1; good && k < length; ++k) good = (byte(i + k) & 0xC0) == 0x80;
     if (good && length == 3) good = !(first == 0xE0 && byte(i + 1) < 0xA0) && !(first == 0xED && byte(i + 1) >= 0xA0);
@@ -62,7 +66,8 @@ void check_depth(const std::string& text, const std::string& file) {
         while (!indents.empty() && indents.back() >= column) indents.pop_back();
         indents.push_back(column);
         if (static_cast<int>(indents.size()) > kMaxYamlDepth) throw_too_deep({file, line, column + 1});
-        const bool indicator = (text[i] == '-' || text[i] == '?' || text[i] == ':') && i + 1 < line_end && text[i + 1] == ' ';
+        const bool indicator =
+            (text[i] == '-' || text[i] == '?' || text[i] == ':') && i + 1 < line_end && text[i + 1] == ' ';
         if (!indicator) break;
         ++i;
       }
@@ -71,8 +76,10 @@ void check_depth(const std::string& text, const std::string& file) {
     for (; i < line_end; ++i) {
       const char c = text[i];
       if (quote) {
-        if (quote == '"' && c == '\\') ++i;
-        else if (c == quote) quote = 0;
+        if (quote == '"' && c == '\\')
+          ++i;
+        else if (c == quote)
+          quote = 0;
         previous = c;
         continue;
       }
@@ -117,7 +124,8 @@ class TreeBuilder : public YAML::EventHandler {
     check_tag(mark, tag);
     leaf(mark, YamlNode::Kind::scalar, value, tag == "!");
   }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
     check_tag(mark, tag);
     open(mark, YamlNode::Kind::sequence);
   }
@@ -215,10 +223,14 @@ const YamlNode* YamlNode::find(const std::string& key) const {
 
 std::string YamlNode::describe() const {
   switch (kind) {
-    case Kind::null: return "nothing";
-    case Kind::sequence: return "a list";
-    case Kind::map: return "a map";
-    case Kind::scalar: break;
+    case Kind::null:
+      return "nothing";
+    case Kind::sequence:
+      return "a list";
+    case Kind::map:
+      return "a map";
+    case Kind::scalar:
+      break;
   }
   const std::string shown = text.size() > 40 ? text.substr(0, 37) + "..." : text;
   return quoted ? "the text \"" + shown + "\"" : shown;
@@ -255,7 +267,8 @@ int edit_distance(const std::string& a, const std::string& b) {
   for (int i = 1; i <= n; ++i) {
     for (int j = 1; j <= m; ++j) {
       d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
     }
   }
   return d[n][m];

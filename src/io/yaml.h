@@ -18,8 +18,8 @@ struct YamlNode {
   enum class Kind { null, scalar, sequence, map };
   Kind kind = Kind::null;
   Where where;
-  std::string text;     ///< scalars
-  bool quoted = false;  ///< a quoted scalar is text even if it looks like a number
+  std::string text;                ///< scalars
+  bool quoted = false;             ///< a quoted scalar is text even if it looks like a number
   std::vector<YamlNode> items;     ///< sequences
   std::vector<YamlEntry> entries;  ///< maps, in the order of the file, each key once
 
@@ -38,8 +38,8 @@ struct YamlEntry {
   YamlNode value;
 };
 
-/// Parses one document. `file` is the name used in messages. Duplicate keys are added to `problems` and the first one is
-/// kept; what leaves no tree to work on (syntax, aliases, tags, nesting, several documents, no text) is thrown.
+/// Parses one document. `file` is the name used in messages. Duplicate keys are added to `problems` and the first one
+/// is kept; what leaves no tree to work on (syntax, aliases, tags, nesting, several documents, no text) is thrown.
 YamlNode parse_yaml(const std::string& text, const std::string& file, Problems& problems);
 
 /// The smallest number of insertions, deletions, replacements and swaps of neighbours from a to b.

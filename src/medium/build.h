@@ -40,7 +40,7 @@ template <class S, class V>
 NematicLaw<S> nematic_law(const LawIndices& law, const V& value, const S& wavelength_um) {
   if (const auto* four = std::get_if<FourParameterIndices>(&law.indices)) {
     // The number of each set, straight lines in 1/wavelength^2 between the sets.
-    const auto at = [&](ParameterRef FourParameterIndices::Set::* number) {
+    const auto at = [&](ParameterRef FourParameterIndices::Set::*number) {
       const auto& sets = four->sets;
       if (sets.size() == 1) return S(value(sets[0].*number));
       std::size_t i = 0;
@@ -51,12 +51,20 @@ NematicLaw<S> nematic_law(const LawIndices& law, const V& value, const S& wavele
       return S(a + part * (b - a));
     };
     using Set = FourParameterIndices::Set;
-    return {at(&Set::mean_index), value.get(law.birefringence_factor, 1.0) * at(&Set::birefringence_0k), S(0.0),
-            1.0 / at(&Set::clearing_k), at(&Set::exponent), at(&Set::mean_slope_per_k)};
+    return {at(&Set::mean_index),
+            value.get(law.birefringence_factor, 1.0) * at(&Set::birefringence_0k),
+            S(0.0),
+            1.0 / at(&Set::clearing_k),
+            at(&Set::exponent),
+            at(&Set::mean_slope_per_k)};
   }
   const Indices<S> n = indices_at_reference<S>(law, value, wavelength_um);
-  return {(n.extraordinary + 2.0 * n.ordinary) * (1.0 / 3), n.extraordinary - n.ordinary, value(law.haller->reference_k),
-          1.0 / value(law.haller->clearing_k), value(law.haller->exponent), value.get(law.haller->mean_slope_per_k, 0.0)};
+  return {(n.extraordinary + 2.0 * n.ordinary) * (1.0 / 3),
+          n.extraordinary - n.ordinary,
+          value(law.haller->reference_k),
+          1.0 / value(law.haller->clearing_k),
+          value(law.haller->exponent),
+          value.get(law.haller->mean_slope_per_k, 0.0)};
 }
 
 /// `value(ref)` gives a parameter as S, `value.radians(ref)` an angle, `value.get(ref, fallback)` an optional one.
@@ -123,12 +131,14 @@ std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Materi
       return make(UniformLaw<S>{rotated(uniform_axis<S>(*uniform, value), rotation_rad), eo, ee, thickness}, true);
     if (const auto* field = std::get_if<FreederickszDirector>(&cell->director)) {
       const CellForces<S> forces = cell_forces(*field, thickness, value);
-      return make(FreederickszLaw<S>{make_director_profile(forces), value.radians(field->azimuth_deg) + rotation_rad, eo, ee, thickness},
+      return make(FreederickszLaw<S>{make_director_profile(forces), value.radians(field->azimuth_deg) + rotation_rad,
+                                     eo, ee, thickness},
                   !forces.twisted);
     }
     if (const auto* helix = std::get_if<HelixDirector>(&cell->director)) {
       const S azimuth = value.radians(helix->azimuth_deg) + rotation_rad, pitch = value(helix->pitch_um);
-      if (helix->modulus) return make(UnwoundHelixLaw<S>(pitch, azimuth, value(helix->modulus), eo, ee, thickness), false);
+      if (helix->modulus)
+        return make(UnwoundHelixLaw<S>(pitch, azimuth, value(helix->modulus), eo, ee, thickness), false);
       return make(TwistedLaw<S>{azimuth, (2 * std::numbers::pi) * thickness / pitch, S(0.0), eo, ee, thickness}, false);
     }
     const auto& twisted = std::get<TwistedDirector>(cell->director);
@@ -147,7 +157,8 @@ std::unique_ptr<Column<S>> make_planar_column(const Sample& sample, const Materi
     profile.hot_k = value(heat->hot_k);
     profile.initial_k = profile.from_cold ? profile.cold_k : value(heat->initial_k);
     profile.fourier_number = heat->fourier_number ? value(heat->fourier_number)
-                                                  : value(heat->diffusivity_mm2_s) * value(heat->time_s) * inverse(thickness * thickness) * 1e6;
+                                                  : value(heat->diffusivity_mm2_s) * value(heat->time_s) *
+                                                        inverse(thickness * thickness) * 1e6;
   }
   if (const auto* law = std::get_if<LawIndices>(&material); heat && law)
     return make(HeatedNematicLaw<S>{axis, profile, thickness, nematic_law<S>(*law, value, wavelength_um)}, true);

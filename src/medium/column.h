@@ -20,10 +20,10 @@ namespace birefit {
 /// The medium at one point of a column, in the column's frame: z along the column (for a stratified slab its normal).
 template <class S>
 struct OpticalPoint {
-  Vec3<S> axis;              ///< unit optic axis; axis and -axis are the same state
-  S ordinary, extraordinary; ///< permittivities n_o^2, n_e^2, real parts
+  Vec3<S> axis;                     ///< unit optic axis; axis and -axis are the same state
+  S ordinary, extraordinary;        ///< permittivities n_o^2, n_e^2, real parts
   S ordinary_im, extraordinary_im;  ///< imaginary parts, >= 0 absorbs; only read when Column::absorbing
-  S depth_slope_um;          ///< d depth / d u
+  S depth_slope_um;                 ///< d depth / d u
 };
 
 template <class S>
@@ -46,8 +46,8 @@ class Column {
   virtual void sample(std::span<const double> u, OpticalPoint<S>* out) const = 0;
   /// The same with d/du of every field in .d[0].
   virtual void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const = 0;
-  /// The Taylor series of every field about u, in powers of u up to `order` <= kTaylorOrder + 1. Only columns made of a law
-  /// know it, and only for scalars with kHasSeries; others throw std::logic_error.
+  /// The Taylor series of every field about u, in powers of u up to `order` <= kTaylorOrder + 1. Only columns made of a
+  /// law know it, and only for scalars with kHasSeries; others throw std::logic_error.
   virtual void sample_taylor(double, int, OpticalPoint<Series<S>>*) const {
     throw std::logic_error("this column has no Taylor series");
   }
@@ -60,14 +60,16 @@ class Column {
   bool jumps = false;
 };
 
-/// Makes a Column of a law with a member template `OpticalPoint<T> at(const T& u) const` for T = S, T = Slope<S> and, where
-/// kHasSeries<S>, T = Series<S>.
+/// Makes a Column of a law with a member template `OpticalPoint<T> at(const T& u) const` for T = S, T = Slope<S> and,
+/// where kHasSeries<S>, T = Series<S>.
 template <class S, class Law>
 class LawColumn final : public Column<S> {
  public:
   explicit LawColumn(Law law) : law_(std::move(law)) {}
   void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
-    for (std::size_t i = 0; i < u.size(); ++i) ::new (static_cast<void*>(out + i)) OpticalPoint<S>(law_.template at<S>(S(u[i])));  // in place: 1 kB each
+    // in place: 1 kB each
+    for (std::size_t i = 0; i < u.size(); ++i)
+      ::new (static_cast<void*>(out + i)) OpticalPoint<S>(law_.template at<S>(S(u[i])));
   }
   void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
     for (std::size_t i = 0; i < u.size(); ++i) {
@@ -79,8 +81,8 @@ class LawColumn final : public Column<S> {
   void sample_taylor(double u, int order, OpticalPoint<Series<S>>* out) const override {
     if constexpr (kHasSeries<S>) {
       *out = law_.template at<Series<S>>(Series<S>::variable(S(u), order));
-      for (Series<S>* x : {&out->axis.x, &out->axis.y, &out->axis.z, &out->ordinary, &out->extraordinary, &out->ordinary_im,
-                           &out->extraordinary_im, &out->depth_slope_um})
+      for (Series<S>* x : {&out->axis.x, &out->axis.y, &out->axis.z, &out->ordinary, &out->extraordinary,
+                           &out->ordinary_im, &out->extraordinary_im, &out->depth_slope_um})
         x->order = order;  // constants too: they may be integrated
     } else {
       Column<S>::sample_taylor(u, order, out);
@@ -110,7 +112,9 @@ class CachedColumn final : public Column<S> {
   void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
     serve(u, out, slopes_, [&](auto* p) { column_->sample_with_slope(u, p); });
   }
-  void sample_taylor(double u, int order, OpticalPoint<Series<S>>* out) const override { column_->sample_taylor(u, order, out); }
+  void sample_taylor(double u, int order, OpticalPoint<Series<S>>* out) const override {
+    column_->sample_taylor(u, order, out);
+  }
 
  private:
   template <class P>

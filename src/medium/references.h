@@ -5,7 +5,8 @@
 
 namespace birefit {
 
-/// Calls f(ParameterRef&), of a const scene f(const ParameterRef&), for every reference of the scene, the empty ones included.
+/// Calls f(ParameterRef&), of a const scene f(const ParameterRef&), for every reference of the scene, the empty ones
+/// included.
 template <class SceneOrConst, class F>
 void for_each_ref(SceneOrConst& scene, F&& f) {
   const auto uniform = [&](auto& director) {
@@ -17,7 +18,8 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
     f(droplet->diameter_um);
     if (auto* radial = std::get_if<RadialDirector>(&droplet->director)) f(radial->twist_deg);
     if (auto* axial = std::get_if<AxialDirector>(&droplet->director)) {
-      for (auto* ref : {&axial->reduced_field, &axial->field_v_per_um, &axial->coherence_voltage_v, &axial->local_field_factor, &axial->ring_radius})
+      for (auto* ref : {&axial->reduced_field, &axial->field_v_per_um, &axial->coherence_voltage_v,
+                        &axial->local_field_factor, &axial->ring_radius})
         f(*ref);
       f(axial->field_azimuth_deg);
     }
@@ -37,9 +39,9 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
       f(director->pretilt_deg);
     }
     if (auto* d = std::get_if<FreederickszDirector>(&cell->director))
-      for (auto* ref : {&d->reduced_voltage, &d->voltage_v, &d->threshold_v, &d->k33_over_k11, &d->k22_over_k11, &d->eps_ratio,
-                                &d->k11_pn, &d->k22_pn, &d->k33_pn, &d->eps_parallel, &d->eps_perpendicular, &d->pretilt_deg,
-                                &d->azimuth_deg, &d->twist_deg, &d->pitch_um})
+      for (auto* ref : {&d->reduced_voltage, &d->voltage_v, &d->threshold_v, &d->k33_over_k11, &d->k22_over_k11,
+                        &d->eps_ratio, &d->k11_pn, &d->k22_pn, &d->k33_pn, &d->eps_parallel, &d->eps_perpendicular,
+                        &d->pretilt_deg, &d->azimuth_deg, &d->twist_deg, &d->pitch_um})
         f(*ref);
     if (auto* d = std::get_if<HelixDirector>(&cell->director))
       for (auto* ref : {&d->pitch_um, &d->azimuth_deg, &d->modulus}) f(*ref);
@@ -48,7 +50,8 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
     uniform(plate->director);
     if (auto* heat = std::get_if<HeatStep>(&plate->heat)) {
       f(heat->fourier_number);
-      for (auto* ref : {&heat->time_s, &heat->diffusivity_mm2_s, &heat->cold_k, &heat->hot_k, &heat->initial_k}) f(*ref);
+      for (auto* ref : {&heat->time_s, &heat->diffusivity_mm2_s, &heat->cold_k, &heat->hot_k, &heat->initial_k})
+        f(*ref);
     }
     f(plate->half_angle_deg);
     f(plate->screen_distance_um);
@@ -64,7 +67,8 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
   } else if (auto* slab = std::get_if<Slab>(&scene.sample)) {
     f(slab->half_angle_deg);
   } else if (auto* disc = std::get_if<StressedDisc>(&scene.sample)) {
-    for (auto* ref : {&disc->diameter_um, &disc->thickness_um, &disc->load_n, &disc->stress_optic_brewster, &disc->load_azimuth_deg})
+    for (auto* ref : {&disc->diameter_um, &disc->thickness_um, &disc->load_n, &disc->stress_optic_brewster,
+                      &disc->load_azimuth_deg})
       f(*ref);
     for (auto& coefficient : disc->residual_normal_mpa) f(coefficient);
     for (auto& coefficient : disc->residual_shear_mpa) f(coefficient);
@@ -90,10 +94,13 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
       dispersion(dispersive->extraordinary);
     } else {
       for (auto& set : std::get<FourParameterIndices>(law->indices).sets)
-        for (auto* ref : {&set.mean_index, &set.mean_slope_per_k, &set.birefringence_0k, &set.exponent, &set.clearing_k}) f(*ref);
+        for (auto* ref :
+             {&set.mean_index, &set.mean_slope_per_k, &set.birefringence_0k, &set.exponent, &set.clearing_k})
+          f(*ref);
     }
     if (law->haller)
-      for (auto* ref : {&law->haller->reference_k, &law->haller->clearing_k, &law->haller->exponent, &law->haller->mean_slope_per_k})
+      for (auto* ref : {&law->haller->reference_k, &law->haller->clearing_k, &law->haller->exponent,
+                        &law->haller->mean_slope_per_k})
         f(*ref);
     f(law->temperature_k);
     f(law->birefringence_factor);
@@ -110,7 +117,9 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
   f(scene.view.center_y_px);
   f(scene.view.rotation_deg);
   if (scene.view.camera)
-    for (auto* ref : {&scene.view.camera->tilt_x_deg, &scene.view.camera->tilt_y_deg, &scene.view.camera->half_field_deg}) f(*ref);
+    for (auto* ref :
+         {&scene.view.camera->tilt_x_deg, &scene.view.camera->tilt_y_deg, &scene.view.camera->half_field_deg})
+      f(*ref);
 }
 
 }  // namespace birefit

@@ -53,9 +53,11 @@ void check_validity(const Scene& scene, const Theta& theta) {
   if (const auto range = wavelengths_um(scene.material, scene.surround_dispersion)) {
     const double nm = value(scene.microscope.wavelength_nm), slack = 1e-9 * nm;
     if (nm < 1000 * range->lower - slack || nm > 1000 * range->upper + slack)
-      throw UserError(Where{}, fmt::format("wavelength_nm = {:g} is outside [{:g}, {:g}], where the indices of this scene are known", nm,
-                                           1000 * range->lower, 1000 * range->upper),
-                      "nothing is extrapolated: use another source of the material");
+      throw UserError(
+          Where{},
+          fmt::format("wavelength_nm = {:g} is outside [{:g}, {:g}], where the indices of this scene are known", nm,
+                      1000 * range->lower, 1000 * range->upper),
+          "nothing is extrapolated: use another source of the material");
   }
   const auto* law = std::get_if<LawIndices>(&scene.material);
   if (!law) return;
@@ -65,12 +67,17 @@ void check_validity(const Scene& scene, const Theta& theta) {
   for (ParameterRef t : temperatures(scene.sample, *law)) {
     for (ParameterRef tc : clearing_points(*law))
       if (value(t) > value(tc) - kClearingMargin_k)
-        throw UserError(Where{}, fmt::format("a temperature of {:g} K is at or above the clearing point, {:g} K (less {:g} K): there the material "
-                                             "is not birefringent", value(t), value(tc), kClearingMargin_k));
+        throw UserError(
+            Where{},
+            fmt::format(
+                "a temperature of {:g} K is at or above the clearing point, {:g} K (less {:g} K): there the material "
+                "is not birefringent",
+                value(t), value(tc), kClearingMargin_k));
     const bool reference = law->haller && t == law->haller->reference_k;
     if (law->upper_k > 0 && !reference && (value(t) < law->lower_k || value(t) > law->upper_k))
-      throw UserError(Where{}, fmt::format("a temperature of {:g} K is outside [{:g}, {:g}] K, where this material's law holds", value(t),
-                                           law->lower_k, law->upper_k));
+      throw UserError(Where{},
+                      fmt::format("a temperature of {:g} K is outside [{:g}, {:g}] K, where this material's law holds",
+                                  value(t), law->lower_k, law->upper_k));
   }
 }
 

@@ -29,13 +29,17 @@ BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value) {
   const S rotation = value.radians(scene.view.rotation_deg);
   const S inverse_radius = inverse(o.sphere.radius_um);
   if (const auto* bipolar = std::get_if<BipolarDirector>(&droplet.director)) {
-    o.field = BipolarField<S>{axis_from_angles<S>(value.radians(bipolar->tilt_deg), value.radians(bipolar->azimuth_deg) + rotation), value.get(bipolar->pole_distance, 1.0)};
+    o.field = BipolarField<S>{
+        axis_from_angles<S>(value.radians(bipolar->tilt_deg), value.radians(bipolar->azimuth_deg) + rotation),
+        value.get(bipolar->pole_distance, 1.0)};
     o.normal_anchoring = false;
   } else if (const auto* axial = std::get_if<AxialDirector>(&droplet.director)) {
-    o.field = TiltedAxialField<S>{axis_from_angles<S>(S(0.0), value.radians(axial->field_azimuth_deg) + rotation), o.sphere.axial};
+    o.field = TiltedAxialField<S>{axis_from_angles<S>(S(0.0), value.radians(axial->field_azimuth_deg) + rotation),
+                                  o.sphere.axial};
   } else {
     const ShellDirector& shell = std::get<ShellDirector>(droplet.director);
-    const Vec3<S> offset{value.get(shell.offset_um[0], 0.0) * inverse_radius, value.get(shell.offset_um[1], 0.0) * inverse_radius,
+    const Vec3<S> offset{value.get(shell.offset_um[0], 0.0) * inverse_radius,
+                         value.get(shell.offset_um[1], 0.0) * inverse_radius,
                          value.get(shell.offset_um[2], 0.0) * inverse_radius};
     o.field = NestedField<S>{rotated(offset, rotation), 1.0 - value(shell.wall_um) * inverse_radius};
   }
@@ -50,11 +54,13 @@ S amplitude_through(const S& y1, const S& y2) {
   return 2.0 * root(y1 * y2) * inverse(y1 + y2);
 }
 
-/// How derivatives by what a ray knows make derivatives by parameters: R's derivative j is the sum over i of by[j][i] times S's derivative i.
+/// How derivatives by what a ray knows make derivatives by parameters: R's derivative j is the sum over i of by[j][i]
+/// times S's derivative i.
 template <class S, class R>
 struct Directions {
   using P = PlainOf<R>;
-  static constexpr std::size_t kFrom = static_cast<std::size_t>(ScalarTraits<S>::derivatives), kTo = static_cast<std::size_t>(ScalarTraits<R>::derivatives);
+  static constexpr std::size_t kFrom = static_cast<std::size_t>(ScalarTraits<S>::derivatives),
+                               kTo = static_cast<std::size_t>(ScalarTraits<R>::derivatives);
   std::array<std::array<P, kFrom>, kTo> by;
   Directions() {
     for (auto& row : by)
@@ -69,18 +75,21 @@ struct Directions {
   }
 };
 
-/// What a picture's parameters change beside the way of a ray and the director: all a ray needs to know of them is said by UniformMedium.
+/// What a picture's parameters change beside the way of a ray and the director: all a ray needs to know of them is said
+/// by UniformMedium.
 template <class R>
 struct BallMedium {
   UniformMedium<R> inside;
   R n_o, n_e, n_host;
   /// `unit_um`: the unit of length of the rays' columns.
-  BallMedium(const DropletOptics<R>& o, const R& unit_um) : inside{o.k0 * unit_um, o.n_o * o.n_o, o.n_e * o.n_e}, n_o(o.n_o), n_e(o.n_e), n_host(o.n_host) {}
+  BallMedium(const DropletOptics<R>& o, const R& unit_um)
+      : inside{o.k0 * unit_um, o.n_o * o.n_o, o.n_e * o.n_e}, n_o(o.n_o), n_e(o.n_e), n_host(o.n_host) {}
 };
 
 /// The retarder in R of a ray in S.
 template <class S, class R>
-Su2<R> retarder_of(const Column<S>& column, Continuity continuity, const BallMedium<R>& medium, const Directions<S, R>& up, const TransportMethod<S>& method, const Mesh& mesh) {
+Su2<R> retarder_of(const Column<S>& column, Continuity continuity, const BallMedium<R>& medium,
+                   const Directions<S, R>& up, const TransportMethod<S>& method, const Mesh& mesh) {
   const bool magnus = method.info().magnus;
   if constexpr (ScalarTraits<R>::derivatives == 0) {
     return magnus ? magnus_retarder<S>(method.info().order, column, continuity, medium.inside, mesh)
@@ -90,9 +99,12 @@ Su2<R> retarder_of(const Column<S>& column, Continuity continuity, const BallMed
     using V = WithMedium<S>;
     if constexpr (std::is_same_v<S, R>)
       if (!magnus) return method.retarder(column, Ray<S>{medium.inside.k0, S(0.0), S(0.0), continuity}, mesh);
-    const Su2<V> u = magnus_retarder<V>(method.info().order, column, continuity, {plain(medium.inside.k0), plain(medium.inside.ordinary), plain(medium.inside.extraordinary)}, mesh);
+    const Su2<V> u = magnus_retarder<V>(
+        method.info().order, column, continuity,
+        {plain(medium.inside.k0), plain(medium.inside.ordinary), plain(medium.inside.extraordinary)}, mesh);
     Directions<V, R> all;
-    const P twice = 2.0 * inverse(plain(medium.inside.k0)), ordinary = twice * plain(medium.inside.ordinary), extraordinary = twice * plain(medium.inside.extraordinary);
+    const P twice = 2.0 * inverse(plain(medium.inside.k0)), ordinary = twice * plain(medium.inside.ordinary),
+            extraordinary = twice * plain(medium.inside.extraordinary);
     constexpr std::size_t n = Directions<S, R>::kFrom;
     for (std::size_t j = 0; j < all.by.size(); ++j) {
       for (std::size_t i = 0; i < n; ++i) all.by[j][i] = up.by[j][i];
@@ -103,28 +115,33 @@ Su2<R> retarder_of(const Column<S>& column, Continuity continuity, const BallMed
   }
 }
 
-/// ball_jones() of a ray in S, the derivatives of R in the medium. `p_scale`: of the field in the plane of incidence behind the sphere.
+/// ball_jones() of a ray in S, the derivatives of R in the medium. `p_scale`: of the field in the plane of incidence
+/// behind the sphere.
 template <class S, class R>
-Mat2<R> jones_of(const BallOptics<S>& o, const BallMedium<R>& medium, const Directions<S, R>& up, const DropletRay<S>& r, const S& ca, const S& sa, const TransportMethod<S>& method,
-                 const Mesh& mesh, const S& p_scale) {
+Mat2<R> jones_of(const BallOptics<S>& o, const BallMedium<R>& medium, const Directions<S, R>& up,
+                 const DropletRay<S>& r, const S& ca, const S& sa, const TransportMethod<S>& method, const Mesh& mesh,
+                 const S& p_scale) {
   R t_p[2] = {R(1.0), R(1.0)}, t_s[2] = {R(1.0), R(1.0)};
   const Continuity continuity = o.sphere.continuity;
   const Su2<R> retarder = with_ball_column(o, r, ca, sa, [&](const auto& column) {
     if (continuity == Continuity::e_and_h) {
-      const R cos_out = up(r.cos_out), cos_in = up(r.cos_in), p_host = medium.n_host * inverse(cos_out), s_host = medium.n_host * cos_out;
+      const R cos_out = up(r.cos_out), cos_in = up(r.cos_in), p_host = medium.n_host * inverse(cos_out),
+              s_host = medium.n_host * cos_out;
       if (o.normal_anchoring) {  // as in droplet_jones
-        const R kappa = medium.n_host * up(r.sin_out), inside = max_of(medium.n_e * medium.n_e - kappa * kappa, R(1e-14));
+        const R kappa = medium.n_host * up(r.sin_out),
+                inside = max_of(medium.n_e * medium.n_e - kappa * kappa, R(1e-14));
         t_p[0] = t_p[1] = amplitude_through<R>(p_host, medium.n_o * medium.n_e * inverse_root(inside));
         t_s[0] = t_s[1] = amplitude_through<R>(s_host, medium.n_o * cos_in);
       } else {
-        // The index each polarization has along the ray; what the surface couples between them is left out: of second order
-        // in birefringence and in the angle of incidence.
+        // The index each polarization has along the ray; what the surface couples between them is left out: of second
+        // order in birefringence and in the angle of incidence.
         const double ends[2] = {0.0, 1.0};
         OpticalPoint<S> face[2];
         column.sample(ends, face);
         const R eo = medium.inside.ordinary, de = medium.inside.extraordinary - eo;
         for (int i = 0; i < 2; ++i) {
-          const R x2 = up(S(face[i].axis.x * face[i].axis.x)), y2 = up(S(face[i].axis.y * face[i].axis.y)), z2 = up(S(face[i].axis.z * face[i].axis.z));
+          const R x2 = up(S(face[i].axis.x * face[i].axis.x)), y2 = up(S(face[i].axis.y * face[i].axis.y)),
+                  z2 = up(S(face[i].axis.z * face[i].axis.z));
           const R slant = de * z2, over = inverse(eo + slant), across = de * (1.0 - slant * over);
           t_p[i] = amplitude_through<R>(p_host, root(eo + across * x2) * inverse(cos_in));
           t_s[i] = amplitude_through<R>(s_host, root(eo + across * y2) * cos_in);
@@ -135,7 +152,8 @@ Mat2<R> jones_of(const BallOptics<S>& o, const BallMedium<R>& medium, const Dire
   });
   const R p_behind = up(p_scale), c = up(ca), s = up(sa);
   Mat2<R> j = matrix(retarder);
-  j = {(p_behind * t_p[1] * t_p[0]) * j.a, (p_behind * t_p[1] * t_s[0]) * j.b, (t_s[1] * t_p[0]) * j.c, (t_s[1] * t_s[0]) * j.d};
+  j = {(p_behind * t_p[1] * t_p[0]) * j.a, (p_behind * t_p[1] * t_s[0]) * j.b, (t_s[1] * t_p[0]) * j.c,
+       (t_s[1] * t_s[0]) * j.d};
   // From (p, s) = (radial, azimuthal) to x, y.
   const Mat2<R> right{c * j.a - s * j.b, s * j.a + c * j.b, c * j.c - s * j.d, s * j.c + c * j.d};
   return {c * right.a - s * right.c, c * right.b - s * right.d, s * right.a + c * right.c, s * right.b + c * right.d};
@@ -151,7 +169,8 @@ Directions<S, S> identity() {
 }  // namespace
 
 template <class S>
-Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, const S& sa, const TransportMethod<S>& method, const Mesh& mesh) {
+Mat2<S> ball_jones(const BallOptics<S>& o, const DropletRay<S>& r, const S& ca, const S& sa,
+                   const TransportMethod<S>& method, const Mesh& mesh) {
   return jones_of(o, BallMedium<S>(o.sphere, S(1.0)), identity<S>(), r, ca, sa, method, mesh, S(1.0));
 }
 
@@ -163,7 +182,8 @@ class BallRays {
  public:
   using P = PlainOf<R>;
   virtual ~BallRays() = default;
-  /// Light through the sphere as it is seen at a fraction 1 - v^2 of the way to the disc's edge; `beside`: continued where a core is in its way.
+  /// Light through the sphere as it is seen at a fraction 1 - v^2 of the way to the disc's edge; `beside`: continued
+  /// where a core is in its way.
   virtual R at_fraction(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh&, bool beside) const = 0;
   /// Light through the core, past its middle at 1 - v^2 of its radius; derivatives are those at this place in the core.
   virtual R in_core(const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh&) const = 0;
@@ -171,17 +191,19 @@ class BallRays {
   virtual R at_place(const R& rho, const P& cos_azimuth, const P& sin_azimuth, const R& angle, const Mesh&) const = 0;
 };
 
-/// S: derivatives by what moves a ray or turns the director, fewer than R asks for: `up` joins the two. With `places`, its last two are by
-/// the place a ray is seen at. S = R: everything by parameters.
+/// S: derivatives by what moves a ray or turns the director, fewer than R asks for: `up` joins the two. With `places`,
+/// its last two are by the place a ray is seen at. S = R: everything by parameters.
 template <class S, class R>
 class BallRaysIn final : public BallRays<R> {
  public:
   using P = PlainOf<R>;
-  BallRaysIn(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const Values<R>& all, const Directions<S, R>& up, bool places)
+  BallRaysIn(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const Values<R>& all,
+             const Directions<S, R>& up, bool places)
       : optics_(ball_optics(scene, value)),
         medium_(in_radii(droplet_optics(scene, all))),
         light_(polarizers(scene, all)),
-        rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0), scene.microscope.objective_na),
+        rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0),
+             scene.microscope.objective_na),
         method_(transport_method<S>(plan.method)),
         aplanatic_(scene.microscope.aplanatic),
         edge_(rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
@@ -195,7 +217,8 @@ class BallRaysIn final : public BallRays<R> {
   }
   R in_core(const P& v, const P& c, const P& s, const Mesh& mesh) const override {
     const P fraction = P(1.0) - v * v;
-    const SeenAt<S> seen = seen_of_core(*shell_in(optics_), optics_.sphere.ratio, rim_, S(fraction * c), S(fraction * s));
+    const SeenAt<S> seen =
+        seen_of_core(*shell_in(optics_), optics_.sphere.ratio, rim_, S(fraction * c), S(fraction * s));
     return light(optics_, seen.rho, seen.cos_azimuth, seen.sin_azimuth, mesh, up_);
   }
   R at_place(const R& rho, const P& c, const P& s, const R& angle, const Mesh& mesh) const override {
@@ -217,12 +240,14 @@ class BallRaysIn final : public BallRays<R> {
   }
 
  private:
-  R light(const BallOptics<S>& optics, const S& rho, const S& c, const S& s, const Mesh& mesh, const Directions<S, R>& up) const {
+  R light(const BallOptics<S>& optics, const S& rho, const S& c, const S& s, const Mesh& mesh,
+          const Directions<S, R>& up) const {
     const DropletRay<S> ray = trace(optics.sphere, rim_, rho);
     S tube = ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
     if (!aplanatic_) tube = tube * inverse(ray.cos_twice);
     const Mat2<R> j = jones_of(optics, medium_, up, ray, c, s, method_, mesh, aplanatic_ ? S(1.0) : ray.cos_twice);
-    const Complex<R> out = light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
+    const Complex<R> out =
+        light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
     return up(tube) * norm(out);
   }
   BallOptics<S> optics_, beside_;
@@ -246,17 +271,21 @@ std::vector<R> ways(const BallOptics<R>& o, const RimTable& rim) {
         if constexpr (requires { field.axis; }) list.insert(list.end(), {field.axis.x, field.axis.y, field.axis.z});
         if constexpr (requires { field.pole_distance; }) list.push_back(field.pole_distance);
         if constexpr (requires { field.field->e(); }) list.insert(list.end(), {field.field->e(), field.field->ring()});
-        if constexpr (requires { field.core; }) list.insert(list.end(), {field.offset.x, field.offset.y, field.offset.z, field.core});
+        if constexpr (requires { field.core; })
+          list.insert(list.end(), {field.offset.x, field.offset.y, field.offset.z, field.core});
       },
       o.field);
   return list;
 }
 
-/// Rays with no more derivatives than they need: parameters that move none (the wavelength, the size) have no direction, those that move
-/// all alike (both indices through their ratio) share one. With `places`, rays that know how the disc moves.
+/// Rays with no more derivatives than they need: parameters that move none (the wavelength, the size) have no
+/// direction, those that move all alike (both indices through their ratio) share one. With `places`, rays that know how
+/// the disc moves.
 template <class R>
-std::unique_ptr<BallRays<R>> ball_rays(const Scene& scene, const RenderPlan& plan, const Values<R>& value, const BallOptics<R>& optics, const RimTable& rim, [[maybe_unused]] bool places) {
-  const auto in = [&]<class S>(const std::vector<int>& active, const Directions<S, R>& up) -> std::unique_ptr<BallRays<R>> {
+std::unique_ptr<BallRays<R>> ball_rays(const Scene& scene, const RenderPlan& plan, const Values<R>& value,
+                                       const BallOptics<R>& optics, const RimTable& rim, [[maybe_unused]] bool places) {
+  const auto in = [&]<class S>(const std::vector<int>& active,
+                               const Directions<S, R>& up) -> std::unique_ptr<BallRays<R>> {
     return std::make_unique<BallRaysIn<S, R>>(scene, plan, Values<S>(value.theta(), active), value, up, places);
   };
   constexpr std::size_t n = static_cast<std::size_t>(ScalarTraits<R>::derivatives);
@@ -312,7 +341,8 @@ class BallImage final : public PixelModel<S> {
       : scene_(scene),
         plan_(plan),
         optics_(ball_optics(scene, value)),
-        rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0), scene.microscope.objective_na),
+        rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0),
+             scene.microscope.objective_na),
         light_(polarizers(scene, value)),
         view_(scene, value),
         edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
@@ -343,10 +373,13 @@ class BallImage final : public PixelModel<S> {
     for (const DiscSquare& q : plan.disc) steps.push_back(q.steps);
     std::sort(steps.begin(), steps.end());
     steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
-    for (const DiscSquare& q : plan.disc) mesh_of_.push_back(static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
+    for (const DiscSquare& q : plan.disc)
+      mesh_of_.push_back(
+          static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
     for (const int n : steps) meshes_.push_back(ball_mesh(optics_, n));
     if (meshes_.empty()) meshes_.push_back(ball_mesh(optics_, plan.steps));
-    passing_ = PassingLight<S>(scene.view.pixel_size_um, optics_.sphere.radius_um, light_.px * light_.ax + light_.py * light_.ay);
+    passing_ = PassingLight<S>(scene.view.pixel_size_um, optics_.sphere.radius_um,
+                               light_.px * light_.ax + light_.py * light_.ay);
     const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
     bool moves = false;
     if constexpr (ScalarTraits<S>::derivatives > 0)
@@ -385,23 +418,30 @@ class BallImage final : public PixelModel<S> {
     const P fraction = place.rho_um * plain(inverse_edge_);
     if (edge == 0) return P(1.0) - fraction * fraction;
     P core_x, core_y;
-    seen_at_core(root(max_of(P(1.0) - place.rho_um * plain(inverse_edge_), P(0.0))), P(place.x * place.inverse_rho), P(place.y * place.inverse_rho), core_x, core_y);
-    const double half_core_px = 0.5 * lane(plain(shell_in(plain_)->core), 0) * lane(plain(optics_.sphere.radius_um), 0) / view_.pixel_um();
-    return P(half_core_px) * select(place.rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));  // beyond the sphere's rim there is none
+    seen_at_core(root(max_of(P(1.0) - place.rho_um * plain(inverse_edge_), P(0.0))), P(place.x * place.inverse_rho),
+                 P(place.y * place.inverse_rho), core_x, core_y);
+    const double half_core_px =
+        0.5 * lane(plain(shell_in(plain_)->core), 0) * lane(plain(optics_.sphere.radius_um), 0) / view_.pixel_um();
+    // beyond the sphere's rim there is none
+    return P(half_core_px) *
+           select(place.rho_um < plain(edge_um_), P(1.0) - core_x * core_x - core_y * core_y, P(-1.0));
   }
   std::optional<EdgeCircle> circle(int edge) const override {
     if (edge > 0) return {};
     return view_.circle(edge_um_);
   }
   const std::vector<std::array<double, 2>>& defects() const override { return defects_; }
-  S rim(const P& column, const P& row) const override { return view_.within(column, row, inverse_edge_, by_inverse_edge_); }
+  S rim(const P& column, const P& row) const override {
+    return view_.within(column, row, inverse_edge_, by_inverse_edge_);
+  }
   bool has_passing_light() const override { return !passing_.dark(); }
   S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
   /// Light at a place of a PolarTable.
   S light_at(const DiscSquare& square, const P& v, const P& cos_azimuth, const P& sin_azimuth, const Mesh& mesh) const {
-    return square.of_core ? rays_of_table_->in_core(v, cos_azimuth, sin_azimuth, mesh) : rays_of_table_->at_fraction(v, cos_azimuth, sin_azimuth, mesh, core_apart_);
+    return square.of_core ? rays_of_table_->in_core(v, cos_azimuth, sin_azimuth, mesh)
+                          : rays_of_table_->at_fraction(v, cos_azimuth, sin_azimuth, mesh, core_apart_);
   }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture) return;
@@ -416,17 +456,21 @@ class BallImage final : public PixelModel<S> {
   }
 
  private:
-  /// Where boojums are seen: at polar angles psi where rays of that angle of incidence come in, at psi - 2 (psi - psi') from the axis where they leave.
+  /// Where boojums are seen: at polar angles psi where rays of that angle of incidence come in, at psi - 2 (psi - psi')
+  /// from the axis where they leave.
   void find_poles() {
     const auto* bipolar = std::get_if<BipolarField<S>>(&optics_.field);
     if (!bipolar) return;
     const auto number = [](const S& x) { return lane(plain(x), 0); };
-    const double across = std::hypot(number(bipolar->axis.x), number(bipolar->axis.y)), polar = std::atan2(across, std::abs(number(bipolar->axis.z))), m = number(optics_.sphere.ratio);
+    const double across = std::hypot(number(bipolar->axis.x), number(bipolar->axis.y)),
+                 polar = std::atan2(across, std::abs(number(bipolar->axis.z))), m = number(optics_.sphere.ratio);
     if (across < 1e-9) return;  // in the middle, which has points of its own
     const double towards = number(bipolar->axis.z) < 0 ? -1 : 1;
     const EdgeCircle circle = view_.circle(optics_.sphere.radius_um);
     for (const bool leaves : {true, false}) {
-      const auto beside = [&](double psi) { return std::abs((leaves ? 2 * std::asin(std::min(1.0, m * std::sin(psi))) - psi : psi) - polar); };
+      const auto beside = [&](double psi) {
+        return std::abs((leaves ? 2 * std::asin(std::min(1.0, m * std::sin(psi))) - psi : psi) - polar);
+      };
       // The nearest of a few angles, then of those between its neighbours.
       constexpr int kAngles = 200, kHalvings = 60;
       const double step = rim_.psi_max() / kAngles;
@@ -436,7 +480,8 @@ class BallImage final : public PixelModel<S> {
       double low = std::max(0.0, nearest - step), high = std::min(rim_.psi_max(), nearest + step);
       for (int i = 0; i < kHalvings; ++i) {
         const double third = (high - low) / 3;
-        (beside(low + third) < beside(high - third) ? high : low) += beside(low + third) < beside(high - third) ? -third : third;
+        (beside(low + third) < beside(high - third) ? high : low) +=
+            beside(low + third) < beside(high - third) ? -third : third;
       }
       const double radius = circle.radius * rim_.rho_over_radius(0.5 * (low + high));
       const double sign = (leaves ? 1 : -1) * towards * radius / across;
@@ -454,7 +499,8 @@ class BallImage final : public PixelModel<S> {
       const P basis[3] = {P(1.0), c, s}, turned[3] = {P(0.0), -s, c};
       typename RadialTable<S>::Slopes slopes;
       S reach = reach_and_slopes_.template sum<3>(plain(v), basis, turned, &slopes);
-      for (std::size_t j = 0; j < reach.d.size(); ++j) reach.d[j] = reach.d[j] + slopes.by_v * v.d[j] + slopes.turned * angle.d[j];
+      for (std::size_t j = 0; j < reach.d.size(); ++j)
+        reach.d[j] = reach.d[j] + slopes.by_v * v.d[j] + slopes.turned * angle.d[j];
       place_at_core(*shell_in(optics_), reach, angle.chain(c, -s), angle.chain(s, c), x, y);
     }
   }
@@ -466,7 +512,8 @@ class BallImage final : public PixelModel<S> {
     v = T(to_rim);
     if constexpr (ScalarTraits<T>::derivatives > 0) {
       v = fraction.chain(to_rim, P(-0.5) * inverse(to_rim));
-      for (std::size_t j = 0; j < turn.d.size(); ++j) turn.d[j] = (x.value * y.d[j] - y.value * x.d[j]) * (inverse_major * inverse_major);
+      for (std::size_t j = 0; j < turn.d.size(); ++j)
+        turn.d[j] = (x.value * y.d[j] - y.value * x.d[j]) * (inverse_major * inverse_major);
     }
   }
   /// Distance from the centre and azimuth as the centre moves; the angle's value is not asked for.
@@ -481,14 +528,16 @@ class BallImage final : public PixelModel<S> {
   }
   template <class Mask>
   S through(const typename CentredView<S>::Place& place, const Mask& inside) const {
-    const P c = place.x * place.inverse_rho, s = place.y * place.inverse_rho, rho_um = select(inside, place.rho_um, P(0.5) * plain(edge_um_));
+    const P c = place.x * place.inverse_rho, s = place.y * place.inverse_rho,
+            rho_um = select(inside, place.rho_um, P(0.5) * plain(edge_um_));
     const auto by_ray = [&](const Mesh& mesh) {
       // The middle itself has no azimuth: a place beside it that no picture tells from it.
       constexpr double kBesideUm = 1e-5;
       const auto middle = place.rho_um < P(kBesideUm);
       const auto seen = CentredView<S>::around(select(middle, P(kBesideUm), place.x), place.y);
       const Moving m = moving(seen, select(middle, seen.rho_um, rho_um));
-      return rays_->at_place(m.rho_um * inverse_radius_, seen.x * seen.inverse_rho, seen.y * seen.inverse_rho, m.angle, mesh);
+      return rays_->at_place(m.rho_um * inverse_radius_, seen.x * seen.inverse_rho, seen.y * seen.inverse_rho, m.angle,
+                             mesh);
     };
     if (plan_.disc.empty()) return by_ray(meshes_[0]);
     P v_around, turn_around;
@@ -508,7 +557,8 @@ class BallImage final : public PixelModel<S> {
         }
         at_x = select(in_core, at_x, S(0.5)), at_y = select(in_core, at_y, S(0.0));
         place_on_disc<S>(at_x, at_y, root(S(at_x * at_x + at_y * at_y + 1e-18)), v_core, turn_core);
-        v = select(in_core, plain(v_core), v), turn = select(in_core, plain(turn_core), turn), square = select(in_core, core_map_.find(plain(v_core), plain(turn_core)), square);
+        v = select(in_core, plain(v_core), v), turn = select(in_core, plain(turn_core), turn),
+        square = select(in_core, core_map_.find(plain(v_core), plain(turn_core)), square);
       }
     }
     S result(0.0);
@@ -519,7 +569,8 @@ class BallImage final : public PixelModel<S> {
       if constexpr (ScalarTraits<S>::derivatives > 0) {
         if (!birefit::none(in_core)) {
           const P by_v = select(in_core, by.by_v, P(0.0)), by_turn = select(in_core, by.by_turn, P(0.0));
-          for (std::size_t j = 0; j < result.d.size(); ++j) result.d[j] = result.d[j] + by_v * v_core.d[j] + by_turn * turn_core.d[j];
+          for (std::size_t j = 0; j < result.d.size(); ++j)
+            result.d[j] = result.d[j] + by_v * v_core.d[j] + by_turn * turn_core.d[j];
           by.by_v = by.by_v - by_v, by.by_turn = by.by_turn - by_turn;
         }
         const P by_fraction = P(-0.5) * by.by_v * inverse(v_around), longer = max_of(max_of(c * c, s * s), P(1e-30));
@@ -533,22 +584,27 @@ class BallImage final : public PixelModel<S> {
       mesh = static_cast<double>(mesh_of_[static_cast<std::size_t>(square)]);
     } else {
       double which[kLanes];
-      for (int k = 0; k < kLanes; ++k) which[k] = static_cast<double>(mesh_of_[static_cast<std::size_t>(lane(square, k))]);
+      for (int k = 0; k < kLanes; ++k)
+        which[k] = static_cast<double>(mesh_of_[static_cast<std::size_t>(lane(square, k))]);
       mesh = Pack::load_unaligned(which);
     }
-    for_each_value(mesh, left, [&](double m, const auto& here) { result = select(here, by_ray(meshes_[static_cast<std::size_t>(m)]), result); });
+    for_each_value(mesh, left, [&](double m, const auto& here) {
+      result = select(here, by_ray(meshes_[static_cast<std::size_t>(m)]), result);
+    });
     return result;
   }
 
   const Scene& scene_;
   const RenderPlan& plan_;
   BallOptics<S> optics_;
-  BallOptics<P> plain_;   ///< of a shell, and reach_at_core() by v, which is one function, one times the cosine and one times the sine of the azimuth
+  /// of a shell, and reach_at_core() by v, which is one function, one times the cosine and one times the sine of the
+  /// azimuth
+  BallOptics<P> plain_;
   RadialTable<P> reach_;
   RadialTable<S> reach_and_slopes_;
   RimTable rim_;
-  std::vector<Mesh> meshes_;         ///< from the fewest steps on
-  std::vector<std::size_t> mesh_of_; ///< which of them, by square of the disc; none: the first
+  std::vector<Mesh> meshes_;          ///< from the fewest steps on
+  std::vector<std::size_t> mesh_of_;  ///< which of them, by square of the disc; none: the first
   Symmetry symmetry_ = Symmetry::none;
   Polarizers<S> light_;
   CentredView<S> view_;
@@ -567,7 +623,8 @@ class BallImage final : public PixelModel<S> {
 
 namespace {
 
-/// How many mesh steps the rays of one square take: a defect, a wall that is seen from the side, takes many and little of the picture.
+/// How many mesh steps the rays of one square take: a defect, a wall that is seen from the side, takes many and little
+/// of the picture.
 class StepsOfSquare {
  public:
   StepsOfSquare(const Scene& scene, const RenderPlan& plan, const Values<double>& value)
@@ -579,20 +636,22 @@ class StepsOfSquare {
     std::visit(
         [&](const auto& field) {
           if (ball_breaks(field).size() == 1) return;
-          // A ring of defects, seen from the side across the field's axis: rays that all but touch it. Those that touch it where it
-          // turns away are harder still, and only by chance among the pilots.
+          // A ring of defects, seen from the side across the field's axis: rays that all but touch it. Those that touch
+          // it where it turns away are harder still, and only by chance among the pilots.
           target_ *= 0.1;
           if constexpr (requires { field.axis; })
             for (const double sign : {-1.0, 1.0})
               for (const double aside : {-1e-4, 1e-4}) {  // either may lie in another square
-                const double x = lane(field.axis.x, 0), y = lane(field.axis.y, 0), c = sign * (-y + aside * x), s = sign * (x + aside * y);
+                const double x = lane(field.axis.x, 0), y = lane(field.axis.y, 0), c = sign * (-y + aside * x),
+                             s = sign * (x + aside * y);
                 double inverse_major;
                 grazing_.push_back({disc::turn_of(c, s, inverse_major), c, s});
               }
         },
         optics_.field);
   }
-  /// Until two more refinements change no pilot ray by more than a quarter of the accuracy: one alone may agree by chance. `change`: by how much they do.
+  /// Until two more refinements change no pilot ray by more than a quarter of the accuracy: one alone may agree by
+  /// chance. `change`: by how much they do.
   int operator()(const DiscSquare& square, bool beside, double& change) const {
     // Between breaks all have the same number: others would be the same mesh again.
     const int unit = static_cast<int>(ball_mesh(optics_, 1).size()) - 1;
@@ -626,11 +685,17 @@ class StepsOfSquare {
         vs[k] = std::clamp(disc::v_in(square, part(0.7548776662466927)), 1e-6, 1 - 1e-6);
         disc::direction_of(disc::turn_in(square, part(0.5698402909980532)), cs[k], ss[k]);
         for (const Grazing& g : grazing_)
-          if ((i + k) % 2 == 0 && g.turn > disc::turn_in(square, 0) && g.turn < disc::turn_in(square, 1)) cs[k] = g.cos, ss[k] = g.sin;
+          if ((i + k) % 2 == 0 && g.turn > disc::turn_in(square, 0) && g.turn < disc::turn_in(square, 1))
+            cs[k] = g.cos, ss[k] = g.sin;
       }
-      const Pack v = Pack::load_aligned(vs), fraction = Pack(1.0) - v * v, c = Pack::load_aligned(cs), s = Pack::load_aligned(ss);
-      const SeenAt<Pack> seen = square.of_core ? seen_of_core(*shell_in(optics), optics.sphere.ratio, rim_, Pack(fraction * c), Pack(fraction * s)) : SeenAt<Pack>{rim_.rho_max() * fraction, c, s};
-      const Mat2<Pack> j = ball_jones<Pack>(optics, trace<Pack>(optics.sphere, rim_, optics.sphere.radius_um * seen.rho), seen.cos_azimuth, seen.sin_azimuth, method_, mesh);
+      const Pack v = Pack::load_aligned(vs), fraction = Pack(1.0) - v * v, c = Pack::load_aligned(cs),
+                 s = Pack::load_aligned(ss);
+      const SeenAt<Pack> seen = square.of_core ? seen_of_core(*shell_in(optics), optics.sphere.ratio, rim_,
+                                                              Pack(fraction * c), Pack(fraction * s))
+                                               : SeenAt<Pack>{rim_.rho_max() * fraction, c, s};
+      const Mat2<Pack> j =
+          ball_jones<Pack>(optics, trace<Pack>(optics.sphere, rim_, optics.sphere.radius_um * seen.rho),
+                           seen.cos_azimuth, seen.sin_azimuth, method_, mesh);
       for (int k = 0; k < kLanes; ++k) {
         const auto z = [&](const Complex<Pack>& x) { return Complex<double>(lane(x.re, k), lane(x.im, k)); };
         result.push_back({z(j.a), z(j.b), z(j.c), z(j.d)});
@@ -687,10 +752,14 @@ double error_in(const BallImage<Pack>& image, const PolarTable<Pack>& table, con
 class PointsOfSquares {
  public:
   PointsOfSquares(const Scene& scene, const RenderPlan& plan, const Values<double>& value, const RimTable& rim)
-      : plan_(plan), optics_(ball_optics(scene, value)), rim_(rim), within_(points_within(plan.samples, plan.sampling_bin_px)) {
+      : plan_(plan),
+        optics_(ball_optics(scene, value)),
+        rim_(rim),
+        within_(points_within(plan.samples, plan.sampling_bin_px)) {
     radius_px_ = optics_.sphere.radius_um / scene.view.pixel_size_um;
     edge_px_ = radius_px_ * rim.rho_max();
-    share_ = std::min(1.0, static_cast<double>(scene.view.width) * scene.view.height / (std::numbers::pi * square(edge_px_)));
+    share_ = std::min(
+        1.0, static_cast<double>(scene.view.width) * scene.view.height / (std::numbers::pi * square(edge_px_)));
     core_apart_ = core_has_disc(optics_, rim);
   }
   bool core_apart() const { return core_apart_; }
@@ -704,7 +773,8 @@ class PointsOfSquares {
       const auto at = [&](double across, double around) { return seen(q, across, around); };
       const std::array<double, 2> a = at(0, 0.5), b = at(1, 0.5), c = at(0.5, 0), d = at(0.5, 1), middle = at(0.5, 0.5);
       const double area = std::abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0]));
-      const std::size_t bin = std::min(plan_.samples.size() - 1, static_cast<std::size_t>(std::hypot(middle[0], middle[1]) / plan_.sampling_bin_px));
+      const std::size_t bin = std::min(
+          plan_.samples.size() - 1, static_cast<std::size_t>(std::hypot(middle[0], middle[1]) / plan_.sampling_bin_px));
       points = share_ * area * square(static_cast<double>(plan_.samples[bin]));
     } else {
       points = (inside(disc::v_in(q, 0)) - inside(disc::v_in(q, 1))) / disc::sectors(q.level);
@@ -732,13 +802,15 @@ class PointsOfSquares {
         const double v = disc::v_in(q, i / (kPlaces - 1.0));
         double c, s, x, y;
         disc::direction_of(disc::turn_in(q, k / (kPlaces - 1.0)), c, s);
-        place_at_core(*shell_in(optics_), trace(optics_.sphere, rim_, optics_.sphere.radius_um * rim_.rho_max() * (1 - v * v)), c, s, x, y);
+        place_at_core(*shell_in(optics_),
+                      trace(optics_.sphere, rim_, optics_.sphere.radius_um * rim_.rho_max() * (1 - v * v)), c, s, x, y);
         outside += std::hypot(x, y) > 1 - kMargin;
       }
     return outside / static_cast<double>(kPlaces * kPlaces);
   }
   double inside(double v) const {
-    const double bin = std::clamp(edge_px_ * (1 - v * v) / plan_.sampling_bin_px, 0.0, static_cast<double>(within_.size() - 1));
+    const double bin =
+        std::clamp(edge_px_ * (1 - v * v) / plan_.sampling_bin_px, 0.0, static_cast<double>(within_.size() - 1));
     const std::size_t i = std::min(static_cast<std::size_t>(bin), within_.size() - 2);
     return share_ * (within_[i] + (bin - static_cast<double>(i)) * (within_[i + 1] - within_[i]));
   }
@@ -786,10 +858,11 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
       }
       q.smooth = q.points > kWorth * kRays;  // to be tried
     });
-    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0, [&](int b, const Pack& v, const Pack& c, const Pack& s) {
-      const DiscSquare& q = open[static_cast<std::size_t>(b)];
-      return image.light_at(q, v, c, s, image.mesh(q.steps));
-    });
+    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0,
+                                 [&](int b, const Pack& v, const Pack& c, const Pack& s) {
+                                   const DiscSquare& q = open[static_cast<std::size_t>(b)];
+                                   return image.light_at(q, v, c, s, image.mesh(q.steps));
+                                 });
     parallel_for(count, 0, [&](int b) {
       const std::size_t i = static_cast<std::size_t>(b);
       if (!open[i].smooth) return;
@@ -801,7 +874,11 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
       const DiscSquare& q = open[i];
       if (!q.smooth && q.level + 1 < disc::kLevels && q.points > kWorth * 4 * kRays) {
         for (const int down : {0, 1})
-          for (const int right : {0, 1}) next.push_back({.of_core = q.of_core, .level = q.level + 1, .panel = 2 * q.panel + right, .sector = 2 * q.sector + down});
+          for (const int right : {0, 1})
+            next.push_back({.of_core = q.of_core,
+                            .level = q.level + 1,
+                            .panel = 2 * q.panel + right,
+                            .sector = 2 * q.sector + down});
         continue;
       }
       plan.disc.push_back(q);
@@ -814,12 +891,16 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
     open = std::move(next);
   }
   plan.numerical_error = std::max(plan.numerical_error, error) + smooth_error;
-  const auto [fewest, most] = std::minmax_element(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& a, const DiscSquare& b) { return a.steps < b.steps; });
+  const auto [fewest, most] = std::minmax_element(
+      plan.disc.begin(), plan.disc.end(), [](const DiscSquare& a, const DiscSquare& b) { return a.steps < b.steps; });
   const auto smooth = std::count_if(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.smooth; });
-  plan.reasons.push_back(fmt::format("steps by place on the disc, as its rays need: {} to {}, {:.0f} a ray in the mean", fewest->steps, most->steps, work / std::max(rays, 1.0)));
+  plan.reasons.push_back(fmt::format("steps by place on the disc, as its rays need: {} to {}, {:.0f} a ray in the mean",
+                                     fewest->steps, most->steps, work / std::max(rays, 1.0)));
   plan.reasons.push_back(fmt::format(
-      "the droplet does not look the same from all sides of the viewing axis: {} of {} parts of the disc are smooth enough to be interpolated from {} rays each{}, elsewhere one ray a point; {:.0f} rays instead of {:.0f}",
-      smooth, plan.disc.size(), kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays, points_of.all()));
+      "the droplet does not look the same from all sides of the viewing axis: {} of {} parts of the disc are smooth "
+      "enough to be interpolated from {} rays each{}, elsewhere one ray a point; {:.0f} rays instead of {:.0f}",
+      smooth, plan.disc.size(), kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays,
+      points_of.all()));
 }
 
 int StepsByPlace::at(double fraction, double x, double y) const {
@@ -847,16 +928,17 @@ bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSqu
 template <class S>
 std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   // A fit may have moved the core since.
-  const bool core_apart = std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; }) && [&] {
-    const BallOptics<double> o = ball_optics(scene, value.template as<double>());
-    return core_has_disc(o, RimTable(o.sphere.ratio, o.sphere.n_host, scene.microscope.objective_na));
-  }();
+  const bool core_apart =
+      std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; }) && [&] {
+        const BallOptics<double> o = ball_optics(scene, value.template as<double>());
+        return core_has_disc(o, RimTable(o.sphere.ratio, o.sphere.n_host, scene.microscope.objective_na));
+      }();
   return std::make_unique<BallImage<S>>(scene, plan, value, core_apart);
 }
-#define BIREFIT_INSTANTIATE(S)                                                                                        \
-  template BallOptics<S> ball_optics<S>(const Scene&, const Values<S>&);                                              \
-  template Mat2<S> ball_jones<S>(const BallOptics<S>&, const DropletRay<S>&, const S&, const S&, const TransportMethod<S>&, \
-                                 const Mesh&);                                                                        \
+#define BIREFIT_INSTANTIATE(S)                                                                   \
+  template BallOptics<S> ball_optics<S>(const Scene&, const Values<S>&);                         \
+  template Mat2<S> ball_jones<S>(const BallOptics<S>&, const DropletRay<S>&, const S&, const S&, \
+                                 const TransportMethod<S>&, const Mesh&);                        \
   template std::unique_ptr<PixelModel<S>> make_ball_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 

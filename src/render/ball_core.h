@@ -36,14 +36,16 @@ template <class S>
 SeenAt<S> seen_of_core(const NestedField<S>& shell, const S& ratio, const RimTable& rim, const S& x, const S& y) {
   using P = PlainOf<S>;
   // reach (cos, sin) = core (x, y) + offset gives the azimuth, and the angle of incidence by Newton's method.
-  const S px = shell.core * x + shell.offset.x, py = shell.core * y + shell.offset.y, square = px * px + py * py + 1e-18, over = inverse_root(square);
+  const S px = shell.core * x + shell.offset.x, py = shell.core * y + shell.offset.y,
+          square = px * px + py * py + 1e-18, over = inverse_root(square);
   SeenAt<S> r;
   r.cos_azimuth = px * over, r.sin_azimuth = py * over;
   const S wanted = square * over;
   const P m = plain(ratio), limit(rim.psi_max()), ca = plain(r.cos_azimuth), sa = plain(r.sin_azimuth);
   const NestedField<P> still{{plain(shell.offset.x), plain(shell.offset.y), plain(shell.offset.z)}, plain(shell.core)};
   const P along = still.offset.x * ca + still.offset.y * sa;
-  P psi = min_of(max_of(rim.psi_at(min_of(P(plain(wanted) * inverse(m)), P(rim.rho_max()))), P(0.0)), limit), slope(1.0);
+  P psi = min_of(max_of(rim.psi_at(min_of(P(plain(wanted) * inverse(m)), P(rim.rho_max()))), P(0.0)), limit),
+    slope(1.0);
   constexpr int kSteps = 8;  // from a few hundredths away, quadratically
   for (int i = 0; i < kSteps; ++i) {
     const DropletRay<P> ray = ray_at(psi, m, P(1.0));
@@ -55,15 +57,18 @@ SeenAt<S> seen_of_core(const NestedField<S>& shell, const S& ratio, const RimTab
   S exact(psi);
   if constexpr (ScalarTraits<S>::derivatives > 0) {
     const DropletRay<S> ray = ray_at(exact, ratio, S(1.0));
-    const S off = reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, r.cos_azimuth, r.sin_azimuth) - wanted;
-    for (std::size_t j = 0; j < off.d.size(); ++j) exact.d[j] = -off.d[j] * inverse(slope);  // theorem of implicit functions
+    const S off =
+        reach_at_core(shell, ray.sin_in, ray.sin_deflection, ray.cos_deflection, r.cos_azimuth, r.sin_azimuth) - wanted;
+    // theorem of implicit functions
+    for (std::size_t j = 0; j < off.d.size(); ++j) exact.d[j] = -off.d[j] * inverse(slope);
   }
   r.rho = ray_at(exact, ratio, S(1.0)).rho_um;
   return r;
 }
 
-/// Whether the core is seen as a disc of its own: the sphere's rim passes beside it on all sides, and no place in it is seen twice. With a core
-/// towards the light rays near the rim may turn back into it: reach then falls with the angle of incidence.
+/// Whether the core is seen as a disc of its own: the sphere's rim passes beside it on all sides, and no place in it is
+/// seen twice. With a core towards the light rays near the rim may turn back into it: reach then falls with the angle
+/// of incidence.
 inline bool core_has_disc(const BallOptics<double>& o, const RimTable& rim) {
   const NestedField<double>* shell = shell_in(o);
   if (!shell) return false;

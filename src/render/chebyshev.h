@@ -19,7 +19,8 @@ template <int kPoints>
 const ChebyshevRule<kPoints>& chebyshev_rule() {
   static const ChebyshevRule<kPoints> rule = [] {
     ChebyshevRule<kPoints> r;
-    for (int k = 0; k < kPoints; ++k) r.x[static_cast<std::size_t>(k)] = std::cos(std::numbers::pi * (k + 0.5) / kPoints);
+    for (int k = 0; k < kPoints; ++k)
+      r.x[static_cast<std::size_t>(k)] = std::cos(std::numbers::pi * (k + 0.5) / kPoints);
     // Column k: the Lagrange polynomial of point k, multiplied out.
     for (std::size_t k = 0; k < kPoints; ++k) {
       std::array<double, kPoints + 1> p{1.0};
@@ -38,18 +39,21 @@ const ChebyshevRule<kPoints>& chebyshev_rule() {
   }();
   return rule;
 }
-/// Squares are planned to interpolate to a hundredth of the accuracy asked for (plan.cc); with a tail of more than this share they are left to
-/// rays.
+/// Squares are planned to interpolate to a hundredth of the accuracy asked for (plan.cc); with a tail of more than this
+/// share they are left to rays.
 constexpr double kGivenUp = 0.1;
-/// Size of the two highest Chebyshev coefficients, along either coordinate and at most, of values at kPoints x kPoints points: how far the
-/// polynomials are from what they follow.
+/// Size of the two highest Chebyshev coefficients, along either coordinate and at most, of values at kPoints x kPoints
+/// points: how far the polynomials are from what they follow.
 template <int kPoints>
 double tail(const double* values) {
   constexpr std::size_t n = static_cast<std::size_t>(kPoints);
   static const std::array<std::array<double, n>, 2> weight = [] {
     std::array<std::array<double, n>, 2> w;
     for (std::size_t m = 0; m < 2; ++m)
-      for (std::size_t k = 0; k < n; ++k) w[m][k] = 2.0 / kPoints * std::cos((kPoints - 1.0 - static_cast<double>(m)) * std::numbers::pi * (static_cast<double>(k) + 0.5) / kPoints);
+      for (std::size_t k = 0; k < n; ++k)
+        w[m][k] = 2.0 / kPoints *
+                  std::cos((kPoints - 1.0 - static_cast<double>(m)) * std::numbers::pi *
+                           (static_cast<double>(k) + 0.5) / kPoints);
     return w;
   }();
   double worst = 0;
@@ -93,7 +97,8 @@ double largest_derivative(const double* values, int order) {
       }
   return largest;
 }
-/// Values at kPoints x kPoints Chebyshev points, [second coordinate][first], to the coefficients of their powers, in the same order.
+/// Values at kPoints x kPoints Chebyshev points, [second coordinate][first], to the coefficients of their powers, in
+/// the same order.
 template <int kPoints>
 void to_powers(const double* values, double* powers) {
   const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();

@@ -1,12 +1,15 @@
 #pragma once
-// From pixels to directions in a converging cone: a picture of a screen that stands across the sample's axis, seen from in front or, through
-// View::camera, from the side.
+// From pixels to directions in a converging cone: a picture of a screen that stands across the sample's axis, seen from
+// in front or, through View::camera, from the side.
 //
-// Looked at from the direction of (t, 1), t = (tan tilt_x, tan tilt_y), by a pinhole whose axis points at the middle of the cone and that is not
-// rolled (the screen turned by the shortest way), a place of the screen at R from the middle lies in the picture at
-//   A^-1 R / (1 - k.A^-1 R),   A = 1 + t t^T / (1 + sec),  sec = sqrt(1 + t^2),  k = t x tangent of the camera's half field:
-// A stretches by sec along t what the slant foreshortens, k is what the nearer half gains. Backwards, R = A r / (1 + k.r). Lengths in units
-// of half the picture's smaller side at the middle; the formula is smooth at t = 0, where it is R = r to the last bit.
+// Looked at from the direction of (t, 1), t = (tan tilt_x, tan tilt_y), by a pinhole whose axis points at the middle of
+// the cone and that is not rolled (the screen turned by the shortest way), a place of the screen at R from the middle
+// lies in the picture at
+//   A^-1 R / (1 - k.A^-1 R),   A = 1 + t t^T / (1 + sec),  sec = sqrt(1 + t^2),  k = t x tangent of the camera's half
+//   field:
+// A stretches by sec along t what the slant foreshortens, k is what the nearer half gains. Backwards, R = A r / (1 +
+// k.r). Lengths in units of half the picture's smaller side at the middle; the formula is smooth at t = 0, where it is
+// R = r to the last bit.
 
 #include <algorithm>
 #include <optional>
@@ -44,12 +47,15 @@ class ConeView {
     slant_ = s;
   }
 
-  Tangents at(const P& column, const P& row) const { return from_side((S(column) - center_x) * tan_per_px, (center_y - S(row)) * tan_per_px); }
+  Tangents at(const P& column, const P& row) const {
+    return from_side((S(column) - center_x) * tan_per_px, (center_y - S(row)) * tan_per_px);
+  }
 
   /// What stands at (x, y) in the picture, both in tangents at the middle.
   Tangents from_side(const S& x, const S& y) const {
     if (!slant_) return {x, y};
-    const S along = slant_->x * x + slant_->y * y, stretch = slant_->stretch * along, near = 1.0 / (slant_->nearness * along + 1.0);
+    const S along = slant_->x * x + slant_->y * y, stretch = slant_->stretch * along,
+            near = 1.0 / (slant_->nearness * along + 1.0);
     return {(x + slant_->x * stretch) * near, (y + slant_->y * stretch) * near};
   }
 
@@ -57,7 +63,8 @@ class ConeView {
   std::pair<S, S> pixel_of(const Tangents& t) const {
     S x = t.x, y = t.y;
     if (slant_) {
-      const S squash = slant_->stretch / (1.0 / slant_->stretch - 1.0) * (slant_->x * t.x + slant_->y * t.y);  // (1 - cos)/t^2 = 1/(sec (1 + sec))
+      // (1 - cos)/t^2 = 1/(sec (1 + sec))
+      const S squash = slant_->stretch / (1.0 / slant_->stretch - 1.0) * (slant_->x * t.x + slant_->y * t.y);
       x = t.x - squash * slant_->x;
       y = t.y - squash * slant_->y;
       const S near = 1.0 / (1.0 - slant_->nearness * (slant_->x * x + slant_->y * y));
@@ -67,10 +74,12 @@ class ConeView {
     return {center_x + x / tan_per_px, center_y - y / tan_per_px};
   }
 
-  /// How near the screen is to the camera at a pixel, 1 in the middle; 0 and less: the pixel looks past the screen's horizon.
+  /// How near the screen is to the camera at a pixel, 1 in the middle; 0 and less: the pixel looks past the screen's
+  /// horizon.
   double nearness(double column, double row) const {
     if (!slant_) return 1;
-    const double x = (column - lane(plain(center_x), 0)) * lane(plain(tan_per_px), 0), y = (lane(plain(center_y), 0) - row) * lane(plain(tan_per_px), 0);
+    const double x = (column - lane(plain(center_x), 0)) * lane(plain(tan_per_px), 0),
+                 y = (lane(plain(center_y), 0) - row) * lane(plain(tan_per_px), 0);
     return 1 + lane(plain(slant_->nearness), 0) * (lane(plain(slant_->x), 0) * x + lane(plain(slant_->y), 0) * y);
   }
 

@@ -27,7 +27,8 @@ DiscOptics<S>::DiscOptics(const Scene& scene, const Values<S>& value) {
 }
 
 DiscMargins disc_margins(const StressedDisc& disc, double radius_um) {
-  return {disc.contact_radius_um > 0 ? disc.contact_radius_um / radius_um : 0.1, disc.rim_um > 0 ? disc.rim_um / radius_um : 0.02};
+  return {disc.contact_radius_um > 0 ? disc.contact_radius_um / radius_um : 0.1,
+          disc.rim_um > 0 ? disc.rim_um / radius_um : 0.02};
 }
 
 DiscZone::DiscZone(const Scene& scene, const Theta& theta) {
@@ -54,7 +55,10 @@ namespace {
 /// (1 - e^-u)/u for u >= 0, with contrast = e^-u; by its Taylor series where the quotient cancels (next term 3e-14).
 template <class S>
 S lost_share(const S& u, const S& contrast) {
-  const S series = 1.0 - u * (1.0 / 2 - u * (1.0 / 6 - u * (1.0 / 24 - u * (1.0 / 120 - u * (1.0 / 720 - u * (1.0 / 5040 - u * (1.0 / 40320)))))));
+  const S series =
+      1.0 -
+      u * (1.0 / 2 -
+           u * (1.0 / 6 - u * (1.0 / 24 - u * (1.0 / 120 - u * (1.0 / 720 - u * (1.0 / 5040 - u * (1.0 / 40320)))))));
   const auto small = plain(u) < PlainOf<S>(0.1);
   const S safe = select(small, S(1.0), u);
   return select(small, series, S((1.0 - contrast) * (1.0 / safe)));
@@ -63,12 +67,16 @@ S lost_share(const S& u, const S& contrast) {
 template <class S>
 class DiscModel final : public PixelModel<S> {
  public:
-  DiscModel(const Scene& scene, const Values<S>& value) : optics_(scene, value), circular_(scene.microscope.quarter_wave),
+  DiscModel(const Scene& scene, const Values<S>& value)
+      : optics_(scene, value),
+        circular_(scene.microscope.quarter_wave),
         coloured_(scene.microscope.bandwidth_nm > 0),
         spread_(scene.microscope.bandwidth_nm / 2.3548200450309493 / value(scene.microscope.wavelength_nm)) {
     const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
-    const S load = value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg) - 0.5 * std::numbers::pi;
-    const S p = value.radians(scene.microscope.polarizer_deg) - load, a = value.radians(scene.microscope.analyzer_deg) - load;
+    const S load =
+        value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg) - 0.5 * std::numbers::pi;
+    const S p = value.radians(scene.microscope.polarizer_deg) - load,
+            a = value.radians(scene.microscope.analyzer_deg) - load;
     sin_cos(S(a - p), sin_between_, cos_between_);
     // Linear: the pair seen along p + a. Circular: along 2 p.
     sin_cos(S(circular_ ? 2.0 * p : p + a), sin_sum_, cos_sum_);
@@ -80,8 +88,9 @@ class DiscModel final : public PixelModel<S> {
     const auto outside = plain(S(x * x + y * y)) > PlainOf<S>(1.0);
     pair.normal = select(outside, S(0.0), pair.normal);
     pair.shear = select(outside, S(0.0), pair.shear);
-    // The retarder is cos(d/2) + i sin(d/2)/d [[normal, shear], [shear, -normal]], d^2 = normal^2 + shear^2. Over a line of
-    // Gaussian shape, d goes as 1/wavelength, cos d and sin d lose contrast: means of cos^2, of sin^2/d^2, of cos sin/d.
+    // The retarder is cos(d/2) + i sin(d/2)/d [[normal, shear], [shear, -normal]], d^2 = normal^2 + shear^2. Over a
+    // line of Gaussian shape, d goes as 1/wavelength, cos d and sin d lose contrast: means of cos^2, of sin^2/d^2, of
+    // cos sin/d.
     const S d_sq = pair.normal * pair.normal + pair.shear * pair.shear;
     const CosSinc<S> f = cos_sinc_sq(S(0.25 * d_sq));
     const S half = 0.5 * f.sinc_sq;
@@ -97,10 +106,12 @@ class DiscModel final : public PixelModel<S> {
     if (!circular_) {
       light = cos_between_ * cos_between_ * cos_cos + along * along * sinc_sinc;
     } else {
-      light = cos_between_ * cos_between_ * cos_cos + 2.0 * cos_between_ * sin_between_ * along * cos_sinc + sin_between_ * sin_between_ * d_sq * sinc_sinc;
+      light = cos_between_ * cos_between_ * cos_cos + 2.0 * cos_between_ * sin_between_ * along * cos_sinc +
+              sin_between_ * sin_between_ * d_sq * sinc_sinc;
     }
     if (optics_.illumination.empty()) return light;
-    const S east = (column - optics_.center_x_px) * optics_.px_per_radius_inverse, north = (optics_.center_y_px - row) * optics_.px_per_radius_inverse;
+    const S east = (column - optics_.center_x_px) * optics_.px_per_radius_inverse,
+            north = (optics_.center_y_px - row) * optics_.px_per_radius_inverse;
     return light * plane_polynomial<S>(optics_.illumination, east, north);
   }
 
@@ -117,8 +128,8 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_disc_model(const Scene& scene, const RenderPlan&, const Values<S>& value) {
   return std::make_unique<DiscModel<S>>(scene, value);
 }
-#define BIREFIT_INSTANTIATE(S)     \
-  template struct DiscOptics<S>;   \
+#define BIREFIT_INSTANTIATE(S)   \
+  template struct DiscOptics<S>; \
   template std::unique_ptr<PixelModel<S>> make_disc_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 

@@ -18,7 +18,8 @@ namespace birefit {
 // The geometry depends only on m = n_host / n_o: with psi the angle of incidence on the sphere, sin psi' = m sin psi,
 // delta = psi - psi', the ray leaves turned by 2 delta towards the axis and its backward extension meets the mid plane
 // at rho = R sin psi / cos 2 delta.
-RimTable::RimTable(double index_ratio, double host_index, double objective_na) : ratio_(index_ratio), objective_na_(objective_na) {
+RimTable::RimTable(double index_ratio, double host_index, double objective_na)
+    : ratio_(index_ratio), objective_na_(objective_na) {
   const auto accepted = [&](double psi) {
     const double sin_in = ratio_ * std::sin(psi);
     if (sin_in >= 1) return false;
@@ -54,7 +55,8 @@ RimTable::RimTable(double index_ratio, double host_index, double objective_na) :
     const double target = table_.rho_max * (1 - t * t);
     psi = std::max(psi - (i == 1 ? psi_max_ * 0.5 / kNodes : table[static_cast<std::size_t>(i - 2)] - psi), 0.5 * psi);
     for (int k = 0; k < 6; ++k) {
-      const double s1 = std::sin(psi), c1 = std::cos(psi), s2 = ratio_ * s1, c2 = std::sqrt(std::max(1e-14, 1 - s2 * s2));
+      const double s1 = std::sin(psi), c1 = std::cos(psi), s2 = ratio_ * s1,
+                   c2 = std::sqrt(std::max(1e-14, 1 - s2 * s2));
       const double sd = s1 * c2 - c1 * s2, cd = c1 * c2 + s1 * s2, c = 1 - 2 * sd * sd;
       const double slope = c1 / c + 4 * s1 * sd * cd * (1 - ratio_ * c1 / c2) / (c * c);
       const double change = (s1 / c - target) / slope;
@@ -113,8 +115,7 @@ DropletRay<S> trace(const DropletOptics<S>& o, const RimTable& rim, const S& rho
     // d psi = (d rho_wanted - d rho(psi; parameters)) / slope: implicit function theorem.
     const DropletRay<S> first = ray_at(S(start), o.ratio, o.radius_um);
     const P inverse_slope = inverse(plain(first.slope_um));
-    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j)
-      psi.d[j] = (rho_um.d[j] - first.rho_um.d[j]) * inverse_slope;
+    for (int j = 0; j < ScalarTraits<S>::derivatives; ++j) psi.d[j] = (rho_um.d[j] - first.rho_um.d[j]) * inverse_slope;
   }
   return ray_at(psi, o.ratio, o.radius_um);
 }
@@ -141,21 +142,25 @@ DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
     const AxialDirector& axial = std::get<AxialDirector>(droplet.director);
     o.director = Director::axial;
     const S e = axial.reduced_field ? value(axial.reduced_field)
-                                    : o.radius_um * value(axial.local_field_factor) * value(axial.field_v_per_um) / value(axial.coherence_voltage_v);
-    o.axial = std::make_shared<const AxialField<S>>(e, value.get(axial.ring_radius, 0.0), static_cast<bool>(axial.ring_radius));
+                                    : o.radius_um * value(axial.local_field_factor) * value(axial.field_v_per_um) /
+                                          value(axial.coherence_voltage_v);
+    o.axial = std::make_shared<const AxialField<S>>(e, value.get(axial.ring_radius, 0.0),
+                                                    static_cast<bool>(axial.ring_radius));
   }
   o.continuity = scene.ceiling == Ceiling::e_only ? Continuity::e_only : Continuity::e_and_h;
   return o;
 }
 
 template <class S>
-Su2<S> droplet_retarder(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method, const Mesh& mesh) {
+Su2<S> droplet_retarder(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method,
+                        const Mesh& mesh) {
   const Ray<S> light{o.k0, S(0.0), S(0.0), o.continuity};
   return with_droplet_column(o, r, [&](const auto& column) { return method.retarder(column, light, mesh); });
 }
 
 template <class S>
-Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method, const Mesh& mesh) {
+Mat2<S> droplet_jones(const DropletOptics<S>& o, const DropletRay<S>& r, const TransportMethod<S>& method,
+                      const Mesh& mesh) {
   Mat2<S> jones = matrix(droplet_retarder(o, r, method, mesh));
   if (o.continuity == Continuity::e_and_h) {
     // Flux transmissions 4 Y1 Y2 / (Y1 + Y2)^2 of the sphere's surface, the same at both ends; the director is normal
@@ -183,7 +188,8 @@ constexpr double kCentre = 1.0 / 64;
 /// polarizer at beta and q, s = cos, sin (2 azimuth - alpha - beta), the field behind the analyser is D + j1 q - j2 s,
 /// D = j0 cos(alpha - beta) - j3 sin(alpha - beta), and
 ///   I = sum of tube |field|^2 terms = f . (q^2, q, 1, s, q s),
-/// the last two only where the transport is not diagonal; between crossed polarizers a diagonal one leaves the first alone.
+/// the last two only where the transport is not diagonal; between crossed polarizers a diagonal one leaves the first
+/// alone.
 template <class S>
 void intensity_terms(const Mat2<S>& j, const S& tube, const S& cos_between, const S& sin_between, bool diagonal, S* f) {
   const auto cross = [](const Complex<S>& a, const Complex<S>& b) { return a.re * b.re + a.im * b.im; };
@@ -221,7 +227,8 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       core_um_(0.0),
       centre_panels_(plan.centre_panels),
       rest_panels_(plan.radial_panels) {
-  sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_, cos_between_);
+  sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_,
+          cos_between_);
   symmetry_ = round_symmetry(scene, value, optics_.coupled());
   shell_ = optics_.director == DropletOptics<S>::Director::shell;
   if (shell_) {
@@ -251,7 +258,8 @@ void DropletImage<S>::tabulate(PixelModel<S>::Wanted, int threads) {
 
 // Functions of the radius end at the rim as functions of root = sqrt(1 - rho/edge). At the centre a twist leaves
 // rho^2 log rho and the mesh along the chord changes its shape at rho ~ 0.003 edge: there w = 1 - root is stretched.
-// The way through a shell's wall ends like a root at the core's edge, seen from inside; there is no defect in its centre.
+// The way through a shell's wall ends like a root at the core's edge, seen from inside; there is no defect in its
+// centre.
 template <class S>
 void DropletImage<S>::terms(Part part, const S& v, S* out) const {
   if (shell_) {
@@ -324,7 +332,8 @@ S DropletImage<S>::read(const P& rho_um, const typename RoundView<S>::Place& pla
       Slopes slopes;
       total = tabulated_sum(Part::rest, to_rim * scale, basis.data(), turned.data(), &slopes);
       const P by_fraction = slopes.by_v * scale * rim_slope();
-      by_angle = slopes.turned, by_rho = by_fraction * edge_inverse, by_edge = by_fraction * rho_um, by_core_root = slopes.by_v * to_rim;
+      by_angle = slopes.turned, by_rho = by_fraction * edge_inverse, by_edge = by_fraction * rho_um,
+      by_core_root = slopes.by_v * to_rim;
     } else {
       total = tabulated_sum(Part::rest, to_rim * scale, basis.data());
     }
@@ -384,14 +393,14 @@ std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const Rend
   if (scene.rays == Rays::eikonal) return std::make_unique<EikonalImage<S>>(scene, plan, value);
   return std::make_unique<DropletImage<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S)                                                                                       \
-  template class DropletImage<S>;                                                                                    \
-  template std::unique_ptr<PixelModel<S>> make_droplet_model<S>(const Scene&, const RenderPlan&, const Values<S>&);  \
-  template DropletOptics<S> droplet_optics<S>(const Scene&, const Values<S>&);                                       \
-  template DropletRay<S> trace<S>(const DropletOptics<S>&, const RimTable&, const S&);                               \
-  template Su2<S> droplet_retarder<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,      \
-                                      const Mesh&);                                                            \
-  template Mat2<S> droplet_jones<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,        \
+#define BIREFIT_INSTANTIATE(S)                                                                                      \
+  template class DropletImage<S>;                                                                                   \
+  template std::unique_ptr<PixelModel<S>> make_droplet_model<S>(const Scene&, const RenderPlan&, const Values<S>&); \
+  template DropletOptics<S> droplet_optics<S>(const Scene&, const Values<S>&);                                      \
+  template DropletRay<S> trace<S>(const DropletOptics<S>&, const RimTable&, const S&);                              \
+  template Su2<S> droplet_retarder<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,     \
+                                      const Mesh&);                                                                 \
+  template Mat2<S> droplet_jones<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,       \
                                     const Mesh&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 

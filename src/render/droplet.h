@@ -13,13 +13,14 @@
 
 namespace birefit {
 
-/// Angle of incidence against image radius, over t = sqrt(1 - rho / rho_max): smooth through the turning point in which rho(psi) may end.
+/// Angle of incidence against image radius, over t = sqrt(1 - rho / rho_max): smooth through the turning point in which
+/// rho(psi) may end.
 struct IncidenceTable {
   static constexpr int kNodes = 512;
-  double rho_max = 0;                     ///< in radii, at psi[0]
-  std::array<double, kNodes + 1> psi{};   ///< at t = i / kNodes; the last is 0
+  double rho_max = 0;                    ///< in radii, at psi[0]
+  std::array<double, kNodes + 1> psi{};  ///< at t = i / kNodes; the last is 0
   template <class P>
-  P at(const P& rho_over_radius) const;   ///< P = double or Pack; within 5e-5 rad
+  P at(const P& rho_over_radius) const;  ///< P = double or Pack; within 5e-5 rad
 };
 
 /// Of straight rays, for one ratio m = n_host / n_o (values only; a start for Newton).
@@ -32,10 +33,12 @@ class RimTable {
   End end() const { return end_; }
   double objective_na() const { return objective_na_; }
   double psi_max() const { return psi_max_; }
-  double rho_max() const { return table_.rho_max; }     ///< largest image radius / R that light reaches
+  double rho_max() const { return table_.rho_max; }  ///< largest image radius / R that light reaches
   double rho_over_radius(double psi) const;
   template <class P>
-  P psi_at(const P& rho_over_radius) const { return table_.at(rho_over_radius); }
+  P psi_at(const P& rho_over_radius) const {
+    return table_.at(rho_over_radius);
+  }
 
  private:
   double ratio_, objective_na_, psi_max_ = 0;
@@ -47,7 +50,7 @@ template <class S>
 struct DropletOptics {
   S radius_um, n_o, n_e, n_host, ratio, k0;
   enum class Director { radial, twisted, axial, shell } director = Director::radial;
-  S twist_rad = S(0.0);  // not {0.0}: a pack would take that for a list of lanes
+  S twist_rad = S(0.0);                     // not {0.0}: a pack would take that for a list of lanes
   S core_um = S(0.0), core_index = S(1.0);  ///< of a shell's core: radius and index
   std::shared_ptr<const AxialField<S>> axial;
   Continuity continuity = Continuity::e_and_h;
@@ -73,7 +76,8 @@ DropletRay<S> ray_at(const S& psi, const S& ratio, const S& radius_um) {
   r.cos_twice = 1.0 - 2.0 * r.sin_deflection * r.sin_deflection;
   const S sin_twice = 2.0 * r.sin_deflection * r.cos_deflection, secant = inverse(r.cos_twice);
   r.rho_um = radius_um * r.sin_out * secant;
-  r.slope_um = radius_um * secant * (r.cos_out + 2.0 * r.sin_out * sin_twice * secant * (1.0 - ratio * r.cos_out * inverse(r.cos_in)));
+  r.slope_um = radius_um * secant *
+               (r.cos_out + 2.0 * r.sin_out * sin_twice * secant * (1.0 - ratio * r.cos_out * inverse(r.cos_in)));
   return r;
 }
 
@@ -107,7 +111,8 @@ S core_edge(const DropletOptics<S>& o, const RimTable& rim) {
   // sin psi = (core / R) / m.
   const S sin_in = o.core_um * inverse(o.radius_um), sin_out = sin_in * inverse(o.ratio);
   if (!(lane(plain(sin_out), 0) < std::sin(rim.psi_max()) * (1 - 1e-6))) return S(0.0);
-  const S cos_in = root(1.0 - sin_in * sin_in), cos_out = root(1.0 - sin_out * sin_out), turn = sin_out * cos_in - cos_out * sin_in;
+  const S cos_in = root(1.0 - sin_in * sin_in), cos_out = root(1.0 - sin_out * sin_out),
+          turn = sin_out * cos_in - cos_out * sin_in;
   return o.radius_um * sin_out * inverse(1.0 - 2.0 * turn * turn);
 }
 
@@ -135,7 +140,8 @@ auto with_droplet_column(const DropletOptics<S>& o, const DropletRay<S>& r, cons
   if (o.director == Director::twisted)
     return f(LawColumn<S, TwistedRadialLaw<S>>({chord, r.sin_deflection, r.cos_deflection, o.twist_rad, eo, ee}));
   if (o.director == Director::shell) {
-    // Beside the core the piece begins in the middle of the chord; the small number keeps the derivative finite at the edge.
+    // Beside the core the piece begins in the middle of the chord; the small number keeps the derivative finite at the
+    // edge.
     const S from = root(max_of(o.core_um * o.core_um - impact * impact, 1e-14 * (o.radius_um * o.radius_um)));
     LawColumn<S, ShellLaw<S>> shell({impact, from, half - from, eo, ee});
     shell.planar = true;
@@ -162,12 +168,14 @@ class DropletImage final : public PixelModel<S> {
   }
   bool round() const override { return true; }
   std::optional<EdgeCircle> circle(int edge) const override { return view_.circle(edge == 0 ? edge_um_ : core_um_); }
-  S rim(const P& column, const P& row) const override { return view_.within(column, row, inverse_edge_, by_inverse_edge_); }
+  S rim(const P& column, const P& row) const override {
+    return view_.within(column, row, inverse_edge_, by_inverse_edge_);
+  }
   bool has_passing_light() const override { return !passing_.dark(); }
   S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
   /// The image is sum_k basis_k(azimuth) f_k(radius). Tables hold the f_k in two parts, each over v in [0, 1]: the
-  /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim; of a shell what is seen
-  /// through the core, up to the kink at its edge, and what is seen beside it.
+  /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim; of a shell what is
+  /// seen through the core, up to the kink at its edge, and what is seen beside it.
   enum class Part { centre, rest };
   static constexpr int kMostTerms = RoundView<S>::kMostTerms;
   int number_of_terms() const { return optics_.coupled() ? 5 : 3; }
@@ -178,9 +186,11 @@ class DropletImage final : public PixelModel<S> {
   /// f_k at v of the part; out has number_of_terms() places.
   void terms(Part part, const S& v, S* out) const;
   /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with plan.radial_panels > 0.
-  S tabulated_sum(Part part, const P& v, const P* basis, const P* turned = nullptr, typename RadialTable<S>::Slopes* slopes = nullptr) const {
+  S tabulated_sum(Part part, const P& v, const P* basis, const P* turned = nullptr,
+                  typename RadialTable<S>::Slopes* slopes = nullptr) const {
     const RadialTable<S>& table = part == Part::centre ? centre_ : rest_;
-    return optics_.coupled() ? table.template sum<5>(v, basis, turned, slopes) : table.template sum<3>(v, basis, turned, slopes);
+    return optics_.coupled() ? table.template sum<5>(v, basis, turned, slopes)
+                             : table.template sum<3>(v, basis, turned, slopes);
   }
 
  private:

@@ -51,7 +51,8 @@ MeridionalRay<T> radial_ray(const MeridionalDroplet<T>& d, bool extraordinary, c
   T s1, c1;
   sin_cos(psi, s1, c1);
   const T momentum = d.host * s1, nearest = momentum / index;
-  // Wave admittances: of p waves n/cos outside and n_o/cos inside, where the cosine is that of nearest = sin; of s waves n cos.
+  // Wave admittances: of p waves n/cos outside and n_o/cos inside, where the cosine is that of nearest = sin; of s
+  // waves n cos.
   const auto admittance = [&](const T& n, const T& cosine) { return extraordinary ? n / cosine : n * cosine; };
   if (!(plain(nearest) < 1)) return ray.arrives = false, ray;
   const T c2 = cosine_of(nearest);
@@ -150,7 +151,8 @@ MeridionalRay<T> ray_in_field(const MeridionalDroplet<T>& d, const T& psi, T* eq
   using State = typename Flight<T>::State;
   T s1, c1;
   sin_cos(psi, s1, c1);
-  // The director is normal to the sphere: the wavevector inside has normal component sqrt(1 - (k/n_e)^2), k its tangential one.
+  // The director is normal to the sphere: the wavevector inside has normal component sqrt(1 - (k/n_e)^2), k its
+  // tangential one.
   const T in = d.host * s1 / d.extraordinary;
   if (!(plain(in) < 1)) return ray;
   const T c2 = cosine_of(in), along = d.host * s1;
@@ -201,7 +203,8 @@ MeridionalRay<T> ray_in_field(const MeridionalDroplet<T>& d, const T& psi, T* eq
   flight(y, rate, t);
   T x = Flight<T>::get(y, 0), z = Flight<T>::get(y, 1), wx = Flight<T>::get(y, 2), wz = Flight<T>::get(y, 3), time(t);
   // Derivatives, too, on the sphere.
-  const T vx = Flight<T>::get(rate, 0), vz = Flight<T>::get(rate, 1), rest = (0.5 * (1.0 - x * x - z * z)) / (x * vx + z * vz);
+  const T vx = Flight<T>::get(rate, 0), vz = Flight<T>::get(rate, 1),
+          rest = (0.5 * (1.0 - x * x - z * z)) / (x * vx + z * vz);
   wx = wx + rest * Flight<T>::get(rate, 2), wz = wz + rest * Flight<T>::get(rate, 3);
   x = x + rest * vx, z = z + rest * vz, time = time + rest;
   const T leaves = wx * z - wz * x, into2 = d.host * d.host - leaves * leaves;  // along (z, -x)
@@ -224,7 +227,8 @@ MeridionalRay<T> meridional_ray(const MeridionalDroplet<T>& droplet, bool extrao
   return extraordinary && droplet.field ? ray_in_field(droplet, psi) : radial_ray(droplet, extraordinary, psi);
 }
 template MeridionalRay<double> meridional_ray<double>(const MeridionalDroplet<double>&, bool, const double&);
-template MeridionalRay<Dual<double, 4>> meridional_ray<Dual<double, 4>>(const MeridionalDroplet<Dual<double, 4>>&, bool, const Dual<double, 4>&);
+template MeridionalRay<Dual<double, 4>> meridional_ray<Dual<double, 4>>(const MeridionalDroplet<Dual<double, 4>>&, bool,
+                                                                        const Dual<double, 4>&);
 
 namespace {
 
@@ -258,13 +262,19 @@ T moving_root(double at, const T& f, double slope) {
 
 template <class S>
 EikonalFan<S>::EikonalFan(const DropletOptics<S>& o, bool extraordinary, double objective_na)
-    : extraordinary_(extraordinary), objective_na_(objective_na), host_(lane_of(o.n_host, 0)), radius_um_(o.radius_um), path_phase_(o.k0 * o.radius_um * o.n_o) {
+    : extraordinary_(extraordinary),
+      objective_na_(objective_na),
+      host_(lane_of(o.n_host, 0)),
+      radius_um_(o.radius_um),
+      path_phase_(o.k0 * o.radius_um * o.n_o) {
   using Director = typename DropletOptics<S>::Director;
   const One over = inverse(lane_of(o.n_o, 0));
   shape_[0] = lane_of(o.n_host, 0) * over;
   shape_[1] = lane_of(o.n_e, 0) * over;
   const bool shell = o.director == Director::shell, field = o.director == Director::axial;
-  shape_[2] = shell ? lane_of(o.core_um, 0) * inverse(lane_of(o.radius_um, 0)) : field ? lane_of(o.axial->e(), 0) : One(0.0);
+  shape_[2] = shell   ? lane_of(o.core_um, 0) * inverse(lane_of(o.radius_um, 0))
+              : field ? lane_of(o.axial->e(), 0)
+                      : One(0.0);
   shape_[3] = shell ? lane_of(o.core_index, 0) * over : field ? lane_of(o.axial->ring(), 0) : One(0.0);
   T shape[kShape];
   for (std::size_t k = 0; k < kShape; ++k) {
@@ -285,7 +295,9 @@ EikonalFan<S>::EikonalFan(const DropletOptics<S>& o, bool extraordinary, double 
   if (!droplet_.field) {
     constexpr Accuracy kExact{1e-11, 8};  // a ray costs less than a microsecond
     const T core = droplet_.core, into_core = plain(droplet_.core_index) < plain(index) ? droplet_.core_index : index;
-    const bool has_core = plain(core) > 0, beside = !has_core || plain(core) * plain(index) < plain(droplet_.host) * std::sin(plain(rim)) * (1 - 1e-9);
+    const bool has_core = plain(core) > 0,
+               beside =
+                   !has_core || plain(core) * plain(index) < plain(droplet_.host) * std::sin(plain(rim)) * (1 - 1e-9);
     if (beside) add({has_core ? incidence(core * index) : T(0.0), rim}, 0, 1, kExact);
     if (has_core) {
       const T last = incidence(core * into_core);
@@ -325,7 +337,8 @@ void EikonalFan<S>::add_rays_in_field(const T& rim, const T& ring) {
     add({T(kAxis), meets - kBeside}, 0, 1, kIntegrated);
     return;
   }
-  // The defect in the middle turns rays off the axis that come in on it, and the field bends them on: where they are seen is past the axis.
+  // The defect in the middle turns rays off the axis that come in on it, and the field bends them on: where they are
+  // seen is past the axis.
   const auto image = [&](double psi) {
     const MeridionalRay<T> ray = traced(T(psi));
     return ray.arrives ? T(ray.impact / cos(ray.turn_rad)) : T(0.0);
@@ -354,7 +367,7 @@ MeridionalRay<typename EikonalFan<S>::T> EikonalFan<S>::traced(const T& psi) {
   return meridional_ray(droplet_, extraordinary_, psi);
 }
 
-// ---- the table -----------------------------------------------------------------------------------------------------------
+// ---- the table -----------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -383,7 +396,8 @@ auto EikonalFan<S>::Piece::by_u(double u) const -> T {
 }
 template <class S>
 double EikonalFan<S>::Piece::bend(double u) const {
-  return map == Map::axis ? plain(psi(u)) * square(std::log(plain(low) / plain(high))) : -2 * (plain(high) - plain(low));
+  return map == Map::axis ? plain(psi(u)) * square(std::log(plain(low) / plain(high)))
+                          : -2 * (plain(high) - plain(low));
 }
 
 template <class S>
@@ -400,7 +414,8 @@ void EikonalFan<S>::add(const Piece& piece, double from, double to, const Accura
     // Where one panel goes on from another, their polynomials leave no gap between them.
     if (!panels_.empty() && !(piece.jumps && from == 0)) {
       const Panel& before = panels_.back();
-      if (std::abs(plain(before.piece.psi(before.middle + before.half)) - plain(piece.psi(from))) < 1e-12) panel->outer = before.inner;
+      if (std::abs(plain(before.piece.psi(before.middle + before.half)) - plain(piece.psi(from))) < 1e-12)
+        panel->outer = before.inner;
     }
     panels_.push_back(*std::move(panel));
   } else if (accuracy.splits > 0) {
@@ -412,7 +427,8 @@ void EikonalFan<S>::add(const Piece& piece, double from, double to, const Accura
 }
 
 template <class S>
-auto EikonalFan<S>::panel_of(const Piece& piece, double from, double to, const Accuracy& accuracy) -> std::optional<Panel> {
+auto EikonalFan<S>::panel_of(const Piece& piece, double from, double to, const Accuracy& accuracy)
+    -> std::optional<Panel> {
   const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();
   Panel panel{piece, 0.5 * (from + to), 0.5 * (to - from), 0, 0, std::vector<double>(kPlanes * kFunctions * kPoints)};
   std::array<std::array<double, kPoints>, kPlanes * kFunctions> values;
@@ -425,7 +441,8 @@ auto EikonalFan<S>::panel_of(const Piece& piece, double from, double to, const A
     sin_cos(psi, s1, c1);
     sin_cos(ray.turn_rad, s, c);
     // In the host from the wave front through the centre to the sphere, and from there back to the mid plane.
-    const T out[kFunctions] = {ray.impact / (c * s1), ray.path - droplet_.host * (c1 + ray.exit_z / c), ray.turn_rad, ray.flux};
+    const T out[kFunctions] = {ray.impact / (c * s1), ray.path - droplet_.host * (c1 + ray.exit_z / c), ray.turn_rad,
+                               ray.flux};
     for (std::size_t f = 0; f < kFunctions; ++f) {
       values[f][k] = plain(out[f]);
       if constexpr (kPlanes > 1)
@@ -438,7 +455,9 @@ auto EikonalFan<S>::panel_of(const Piece& piece, double from, double to, const A
     double tail[2] = {0, 0}, size = 1;
     for (std::size_t k = 0; k < kPoints; ++k) {
       for (std::size_t m = 0; m < 2; ++m)
-        tail[m] += 2.0 / kPoints * std::cos(static_cast<double>(kPoints - 1 - m) * kPi * (static_cast<double>(k) + 0.5) / kPoints) * values[f][k];
+        tail[m] += 2.0 / kPoints *
+                   std::cos(static_cast<double>(kPoints - 1 - m) * kPi * (static_cast<double>(k) + 0.5) / kPoints) *
+                   values[f][k];
       size = std::max(size, std::abs(values[f][k]));
     }
     // By values alone: the picture is the same with derivatives and without.
@@ -480,7 +499,8 @@ auto EikonalFan<S>::lifted(const T& x) const -> One {
 template <class S>
 auto EikonalFan<S>::function_at(const Panel& panel, Function k, double x) const -> Slope {
   double values[kPlanes], slopes[kPlanes];
-  for (std::size_t p = 0; p < kPlanes; ++p) std::tie(values[p], slopes[p]) = horner<kPoints>(panel.coefficients.data() + (p * kFunctions + k) * kPoints, x);
+  for (std::size_t p = 0; p < kPlanes; ++p)
+    std::tie(values[p], slopes[p]) = horner<kPoints>(panel.coefficients.data() + (p * kFunctions + k) * kPoints, x);
   return {lifted(values[0], values + 1, 1), lifted(slopes[0], slopes + 1, 1)};
 }
 
@@ -489,16 +509,20 @@ void EikonalFan<S>::find_ends() {
   const auto add_end = [&](const Panel& panel, double x, const One& move) {
     const double u = panel.middle + panel.half * x;
     const One sine = sin(lifted(panel.piece.psi(u)));
-    ends_um_.push_back(radius_um_ * in_all_lanes<S>(One(sine * function_at(panel, kRatio, x).value + move * panel.place(x).by_x)));
+    ends_um_.push_back(radius_um_ *
+                       in_all_lanes<S>(One(sine * function_at(panel, kRatio, x).value + move * panel.place(x).by_x)));
   };
   for (std::size_t i = 0; i < panels_.size(); ++i) {
     const Panel& panel = panels_[i];
     if (i == 0 || panels_[i - 1].inner != panel.outer) add_end(panel, -1, One(0.0));
-    if ((i + 1 == panels_.size() || panels_[i + 1].outer != panel.inner) && panel.inner > 0) add_end(panel, 1, One(0.0));
+    if ((i + 1 == panels_.size() || panels_[i + 1].outer != panel.inner) && panel.inner > 0)
+      add_end(panel, 1, One(0.0));
     if (objective_na_ <= 0) continue;
     // Where rays begin or cease to be turned too far for the aperture.
     const double* turn = panel.coefficients.data() + kTurn * kPoints;
-    const auto beyond = [&](double x) { return std::abs(std::sin(horner<kPoints>(turn, x).first)) * plain(host_) > objective_na_; };
+    const auto beyond = [&](double x) {
+      return std::abs(std::sin(horner<kPoints>(turn, x).first)) * plain(host_) > objective_na_;
+    };
     constexpr int kSteps = 24;
     for (int k = 0; k < kSteps; ++k) {
       double low = 2.0 * k / kSteps - 1, high = 2.0 * (k + 1) / kSteps - 1;
@@ -510,7 +534,9 @@ void EikonalFan<S>::find_ends() {
       }
       const auto [angle, slope] = function_at(panel, kTurn, low);
       const double side = plain(angle) < 0 ? -1 : 1;
-      add_end(panel, low, One((side * objective_na_ - host_ * sin(angle)) / (plain(host_) * std::cos(plain(angle)) * plain(slope))));
+      add_end(
+          panel, low,
+          One((side * objective_na_ - host_ * sin(angle)) / (plain(host_) * std::cos(plain(angle)) * plain(slope))));
     }
   }
 }
@@ -519,7 +545,8 @@ template <class S>
 auto EikonalFan<S>::read(const One& rho) const -> EikonalRay<One> {
   const EikonalRay<One> none{One(0.0), One(0.0), One(0.0), One(1.0)};
   const double wanted = plain(rho);
-  const auto found = std::find_if(panels_.begin(), panels_.end(), [&](const Panel& p) { return wanted <= p.outer && wanted >= p.inner; });
+  const auto found = std::find_if(panels_.begin(), panels_.end(),
+                                  [&](const Panel& p) { return wanted <= p.outer && wanted >= p.inner; });
   if (found == panels_.end()) return none;
   const Panel& panel = *found;
   // Newton within what is known to hold the root.
@@ -535,7 +562,8 @@ auto EikonalFan<S>::read(const One& rho) const -> EikonalRay<One> {
     if (change < 1e-14 || (i > 2 && change < 1e-9)) break;
   }
   // Functions at x and their slopes by x, both with derivatives by the shape; x itself follows from the place.
-  const std::array<Slope, kFunctions> f{function_at(panel, kRatio, x), function_at(panel, kPath, x), function_at(panel, kTurn, x), function_at(panel, kFlux, x)};
+  const std::array<Slope, kFunctions> f{function_at(panel, kRatio, x), function_at(panel, kPath, x),
+                                        function_at(panel, kTurn, x), function_at(panel, kFlux, x)};
   const double u = panel.middle + panel.half * x;
   One psi = lifted(panel.piece.psi(u)), psi_slope = lifted(panel.piece.by_u(u)) * panel.half, s1, c1;
   sin_cos(psi, s1, c1);
@@ -548,8 +576,9 @@ auto EikonalFan<S>::read(const One& rho) const -> EikonalRay<One> {
     return second;
   }();
   const double bend = panel.piece.bend(u) * panel.half * panel.half;
-  slope = slope + move * (plain(s1) * curvature + 2 * plain(c1) * plain(psi_slope) * plain(f[kRatio].slope) +
-                          (plain(c1) * bend - plain(s1) * plain(psi_slope) * plain(psi_slope)) * plain(f[kRatio].value));
+  slope =
+      slope + move * (plain(s1) * curvature + 2 * plain(c1) * plain(psi_slope) * plain(f[kRatio].slope) +
+                      (plain(c1) * bend - plain(s1) * plain(psi_slope) * plain(psi_slope)) * plain(f[kRatio].value));
   psi = psi + move * plain(psi_slope);
   psi_slope = psi_slope + move * bend;
   sin_cos(psi, s1, c1);
@@ -589,7 +618,8 @@ EikonalRay<S> EikonalFan<S>::at(const S& rho_um) const {
       }
       return x;
     };
-    ray = {gathered(&EikonalRay<One>::amplitude), gathered(&EikonalRay<One>::phase_rad), gathered(&EikonalRay<One>::sin_turn), gathered(&EikonalRay<One>::cos_turn)};
+    ray = {gathered(&EikonalRay<One>::amplitude), gathered(&EikonalRay<One>::phase_rad),
+           gathered(&EikonalRay<One>::sin_turn), gathered(&EikonalRay<One>::cos_turn)};
   }
   ray.phase_rad = ray.phase_rad * path_phase_;
   return ray;

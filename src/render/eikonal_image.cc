@@ -36,7 +36,9 @@ EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const 
   }
   for (std::size_t k = 1; k < parts_.size(); k += 2) {
     double blur = std::min(0.25 * view_.pixel_um(), 2 * std::abs(place(parts_[k].end_um) - parts_[k].middle_um));
-    if (k + 1 < parts_.size()) parts_[k + 1].blur_um = blur = std::min(blur, 2 * std::abs(place(parts_[k + 1].end_um) - parts_[k + 1].middle_um));
+    if (k + 1 < parts_.size())
+      parts_[k + 1].blur_um = blur =
+          std::min(blur, 2 * std::abs(place(parts_[k + 1].end_um) - parts_[k + 1].middle_um));
     parts_[k].blur_um = blur;
   }
   // Ends that the planner's scene did not have: any part may be the one with the most fringes.
@@ -55,8 +57,10 @@ template <class S>
 void EikonalImage<S>::terms_at(const S& rho_um, S* out) const {
   const EikonalRay<S> p = fan_p_.at(rho_um), s = fan_s_.at(rho_um);
   // |E|^2 is flux over the cosine; not aplanatic, only the transverse part of the p field counts.
-  const S p_field = aplanatic_ ? p.amplitude : p.amplitude * root(p.cos_turn), s_field = aplanatic_ ? s.amplitude : s.amplitude * inverse_root(s.cos_turn);
-  // With a = p exp(i phase) and d = s in the (radial, azimuthal) frame the field behind the analyser is (a + d)/2 cos(analyser - polarizer) + (a - d)/2 q.
+  const S p_field = aplanatic_ ? p.amplitude : p.amplitude * root(p.cos_turn),
+          s_field = aplanatic_ ? s.amplitude : s.amplitude * inverse_root(s.cos_turn);
+  // With a = p exp(i phase) and d = s in the (radial, azimuthal) frame the field behind the analyser is (a + d)/2
+  // cos(analyser - polarizer) + (a - d)/2 q.
   S sine, cosine;
   sin_cos(p.phase_rad - s.phase_rad, sine, cosine);
   const S sum = 0.25 * (p_field * p_field + s_field * s_field), mixed = 0.5 * p_field * s_field * cosine;
@@ -68,7 +72,8 @@ void EikonalImage<S>::terms_at(const S& rho_um, S* out) const {
 template <class S>
 RadialTable<S> EikonalImage<S>::table(const Part& part, int panels, int threads) const {
   const S span = inverse(part.inverse_span);
-  return RadialTable<S>(panels, kTerms, threads, [&](const P& v, S* out) { terms_at(part.end_um + span * (v * v), out); });
+  return RadialTable<S>(panels, kTerms, threads,
+                        [&](const P& v, S* out) { terms_at(part.end_um + span * (v * v), out); });
 }
 
 template <class S>
@@ -96,8 +101,8 @@ template <class S>
 void EikonalImage<S>::tabulate(typename PixelModel<S>::Wanted, int threads) {
   // The planner's parts had other fringes, in a fit: by values alone, so that derivatives change nothing.
   constexpr int kMost = 64;
-  for (std::size_t k = 0; k < parts_.size(); ++k)
-    do parts_[k].light = table(parts_[k], panels_[k], threads);
+  for (std::size_t k = 0; k < parts_.size(); ++k) do
+      parts_[k].light = table(parts_[k], panels_[k], threads);
     while (parts_[k].light.tail() > allowed_tail_ && (panels_[k] *= 2) <= kMost);
 }
 
@@ -129,7 +134,9 @@ S EikonalImage<S>::intensity(const P& column, const P& row) const {
   [[maybe_unused]] P by_rho(0.0), by_angle(0.0);
   for (const Part& part : parts_) {
     const double end = lane(plain(part.end_um), 0);
-    if (part.outwards ? farthest < end - part.blur_um || nearest > part.middle_um : farthest < part.middle_um || nearest > end + part.blur_um) continue;
+    if (part.outwards ? farthest < end - part.blur_um || nearest > part.middle_um
+                      : farthest < part.middle_um || nearest > end + part.blur_um)
+      continue;
     P share, slope;
     share_at(part, rho_um, share, slope);
     if (birefit::none(share > P(0.0))) continue;

@@ -10,9 +10,10 @@
 
 namespace birefit {
 
-/// Where rays of either mode begin or end (rims, a core's edge, the aperture, a ring's shadow) light jumps, or ends like a root. Between two such
-/// radii it is smooth and comes from a table for each half, over v = sqrt(distance from the end / half the way); the ends move with the parameters,
-/// and so do the tables. A jump is drawn over a quarter of a pixel, so that pixels know how it moves; over less, where the next end is closer.
+/// Where rays of either mode begin or end (rims, a core's edge, the aperture, a ring's shadow) light jumps, or ends
+/// like a root. Between two such radii it is smooth and comes from a table for each half, over v = sqrt(distance from
+/// the end / half the way); the ends move with the parameters, and so do the tables. A jump is drawn over a quarter of
+/// a pixel, so that pixels know how it moves; over less, where the next end is closer.
 template <class S>
 class EikonalImage final : public PixelModel<S> {
  public:
@@ -27,7 +28,9 @@ class EikonalImage final : public PixelModel<S> {
   // For the planner.
   std::vector<double> ends_um() const;  ///< from the axis outwards
   int integrated_rays() const { return fan_p_.rays(); }
-  double phase_error_rad() const { return fan_p_.path_error() * lane(plain(optics_.k0 * optics_.radius_um * optics_.n_o), 0); }
+  double phase_error_rad() const {
+    return fan_p_.path_error() * lane(plain(optics_.k0 * optics_.radius_um * optics_.n_o), 0);
+  }
   std::size_t parts() const { return parts_.size(); }
   /// How far a table of so many panels is from the functions of a part (RadialTable::tail).
   double tail(std::size_t part, int panels) const { return table(parts_[part], panels, 1).tail(); }

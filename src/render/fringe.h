@@ -18,15 +18,16 @@ struct FringePoint {
 };
 
 /// A parameter that carries all fringes along and changes none: its derivative is the one along
-/// (column, row) + growth (column of the place, row of the place), in pixels for one unit of the parameter; growth is that of the logarithm of the scale.
+/// (column, row) + growth (column of the place, row of the place), in pixels for one unit of the parameter; growth is
+/// that of the logarithm of the scale.
 struct FringeFlow {
   double column, row, growth;
 };
 
 /// What a derivative changes of a FringePoint.
 struct FringeFields {
-  unsigned own = 15;       ///< the fields with values of their own, bit k the k-th
-  double phase_share = 0;  ///< of the phase itself, added to its change: a thickness, a wavelength scale it
+  unsigned own = 15;                 ///< the fields with values of their own, bit k the k-th
+  double phase_share = 0;            ///< of the phase itself, added to its change: a thickness, a wavelength scale it
   std::optional<FringeFlow> flow{};  ///< nothing else, then
   bool has(std::size_t field) const { return own >> field & 1; }
 };
@@ -46,7 +47,8 @@ struct PixelMoments {
   BIREFIT_INLINE explicit PixelMoments(const P& g) {
     const P half = P(0.5) * g, q = half * half;
     P s0, s1, s2;
-    // s = sum (-q)^k/(2k + 1)!, up to half a turn a pixel; beyond, which no camera resolves, q is large enough to divide by.
+    // s = sum (-q)^k/(2k + 1)!, up to half a turn a pixel; beyond, which no camera resolves, q is large enough to
+    // divide by.
     constexpr double kTurn = 2.5;
     if (largest(q) < kTurn) [[likely]] {
       s1 = sum<1>(q), s2 = sum<2>(q), s0 = P(-6.0) * s1 - P(4.0) * (q * s2);
@@ -98,9 +100,16 @@ struct NinePoints {
   template <class At>
   BIREFIT_INLINE static NinePoints of(const At& at) {
     const P middle = at(0, 0), l = at(0, -1), r = at(0, 1), u = at(-1, 0), d = at(1, 0);
-    return {middle, P(0.5) * (r - l), P(0.5) * (d - u), r + l - P(2.0) * middle, P(0.25) * ((at(1, 1) - at(1, -1)) - (at(-1, 1) - at(-1, -1))), d + u - P(2.0) * middle};
+    return {middle,
+            P(0.5) * (r - l),
+            P(0.5) * (d - u),
+            r + l - P(2.0) * middle,
+            P(0.25) * ((at(1, 1) - at(1, -1)) - (at(-1, 1) - at(-1, -1))),
+            d + u - P(2.0) * middle};
   }
-  BIREFIT_INLINE P times(const NinePoints& o) const { return (f * o.f + x * o.x + y * o.y) + (xx * o.xx + xy * o.xy + yy * o.yy); }
+  BIREFIT_INLINE P times(const NinePoints& o) const {
+    return (f * o.f + x * o.x + y * o.y) + (xx * o.xx + xy * o.xy + yy * o.yy);
+  }
 };
 
 /// What a change of nine points changes, once its derivatives by the quadratic's six numbers are known.
@@ -109,11 +118,16 @@ class NineWeights {
  public:
   NineWeights() = default;
   explicit NineWeights(const NinePoints<P>& by)
-      : middle_(by.f - P(2.0) * (by.xx + by.yy)), left_(by.xx - P(0.5) * by.x), right_(by.xx + P(0.5) * by.x), up_(by.yy - P(0.5) * by.y), down_(by.yy + P(0.5) * by.y),
+      : middle_(by.f - P(2.0) * (by.xx + by.yy)),
+        left_(by.xx - P(0.5) * by.x),
+        right_(by.xx + P(0.5) * by.x),
+        up_(by.yy - P(0.5) * by.y),
+        down_(by.yy + P(0.5) * by.y),
         corners_(P(0.25) * by.xy) {}
   template <class At>
   BIREFIT_INLINE P times(const At& at) const {
-    return (middle_ * at(0, 0) + left_ * at(0, -1) + right_ * at(0, 1)) + (up_ * at(-1, 0) + down_ * at(1, 0) + corners_ * ((at(1, 1) - at(1, -1)) - (at(-1, 1) - at(-1, -1))));
+    return (middle_ * at(0, 0) + left_ * at(0, -1) + right_ * at(0, 1)) +
+           (up_ * at(-1, 0) + down_ * at(1, 0) + corners_ * ((at(1, 1) - at(1, -1)) - (at(-1, 1) - at(-1, -1))));
   }
 
  private:
@@ -127,18 +141,24 @@ struct ThirdDerivatives {
   template <class At>
   BIREFIT_INLINE static ThirdDerivatives of(const NinePoints<P>& f, const At& at) {
     const P a = at(-1, -1), b = at(-1, 1), c = at(1, -1), d = at(1, 1), half(0.5), two(2.0);
-    return {half * (at(0, 2) - at(0, -2)) - two * f.x, half * ((c + d) - (a + b)) - two * f.y, half * ((b + d) - (a + c)) - two * f.x, half * (at(2, 0) - at(-2, 0)) - two * f.y};
+    return {half * (at(0, 2) - at(0, -2)) - two * f.x, half * ((c + d) - (a + b)) - two * f.y,
+            half * ((b + d) - (a + c)) - two * f.x, half * (at(2, 0) - at(-2, 0)) - two * f.y};
   }
 };
 
-/// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact in the
-/// phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others, of kMostPlanes at most, their
-/// derivatives by parameters; fields are numbered as in FringePoint, row and column from the middle pixel, whose place in the picture is (column, row). put(plane, mean). kQuadrature = false: it
-/// is zero and not read. fields[plane]: what of them a parameter moves, the others are not read; kFlows = false: none has a flow. What a change of any
-/// of the nine points does to the mean is found once, backwards through the formula, and serves all derivatives; flows read two pixels further.
+/// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact
+/// in the phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others, of
+/// kMostPlanes at most, their derivatives by parameters; fields are numbered as in FringePoint, row and column from the
+/// middle pixel, whose place in the picture is (column, row). put(plane, mean). kQuadrature = false: it is zero and not
+/// read. fields[plane]: what of them a parameter moves, the others are not read; kFlows = false: none has a flow. What
+/// a change of any of the nine points does to the mean is found once, backwards through the formula, and serves all
+/// derivatives; flows read two pixels further.
 template <bool kQuadrature, bool kFlows, int kMostPlanes, class P, class Load, class Put>
-BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P& column, const P& row, const FringeFields* fields, const Load& load, const Put& put) {
-  const auto field = [&load](int plane, int f) BIREFIT_INLINE_LAMBDA { return [&load, plane, f](int j, int i) BIREFIT_INLINE_LAMBDA { return load(plane, f, j, i); }; };
+BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P& column, const P& row,
+                                 const FringeFields* fields, const Load& load, const Put& put) {
+  const auto field = [&load](int plane, int f) BIREFIT_INLINE_LAMBDA {
+    return [&load, plane, f](int j, int i) BIREFIT_INLINE_LAMBDA { return load(plane, f, j, i); };
+  };
   const auto mean_of = [&](int plane) BIREFIT_INLINE_LAMBDA {
     const auto at = field(plane, 2);
     if (traits.averaged) return at(0, 0);
@@ -152,8 +172,10 @@ BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P
   const P xx = mx.curvature * my.m0, yy = mx.m0 * my.curvature, xy = mx.slope * my.slope;
   const P zero = mx.m0 * my.m0, one_x = mx.slope * my.m0, one_y = mx.m0 * my.slope;
   const P bend = P(0.5) * (phase.xx * xx + phase.yy * yy) + phase.xy * xy;
-  const auto even_of = [&](const NinePoints<P>& f) BIREFIT_INLINE_LAMBDA { return f.f * zero - P(0.5) * (f.xx * xx + f.yy * yy) - f.xy * xy; };
-  const auto odd_of = [&](const NinePoints<P>& f) BIREFIT_INLINE_LAMBDA { return P(0.0) - f.x * one_x - f.y * one_y - f.f * bend; };
+  const auto even_of = [&](const NinePoints<P>& f)
+                           BIREFIT_INLINE_LAMBDA { return f.f * zero - P(0.5) * (f.xx * xx + f.yy * yy) - f.xy * xy; };
+  const auto odd_of = [&](const NinePoints<P>& f)
+                          BIREFIT_INLINE_LAMBDA { return P(0.0) - f.x * one_x - f.y * one_y - f.f * bend; };
   P re = even_of(amplitude), im = odd_of(amplitude);
   NinePoints<P> quadrature{};
   if constexpr (kQuadrature) {
@@ -179,31 +201,41 @@ BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P
     return By{even * f.f, -odd * f.x, -odd * f.y, half * f.xx, half * f.yy, -even * f.xy, -odd * f.f};
   };
   const auto points = [&](const P& even, const P& odd) BIREFIT_INLINE_LAMBDA {
-    return NinePoints<P>{even * zero - odd * bend, -odd * one_x, -odd * one_y, -even * half_xx, -even * xy, -even * half_yy};
+    return NinePoints<P>{even * zero - odd * bend, -odd * one_x, -odd * one_y,
+                         -even * half_xx,          -even * xy,   -even * half_yy};
   };
   By by = back(amplitude, c, -s);
   const NinePoints<P> by_amplitude = points(c, -s);
   [[maybe_unused]] NinePoints<P> by_quadrature;
   if constexpr (kQuadrature) {
     const By more = back(quadrature, -s, -c);
-    by = {by.zero + more.zero, by.one_x + more.one_x, by.one_y + more.one_y, by.xx + more.xx, by.yy + more.yy, by.xy + more.xy, by.bend + more.bend};
+    by = {by.zero + more.zero, by.one_x + more.one_x, by.one_y + more.one_y, by.xx + more.xx,
+          by.yy + more.yy,     by.xy + more.xy,       by.bend + more.bend};
     by_quadrature = points(-s, -c);
   }
   const P half_bend = P(0.5) * by.bend;
   by.xx = by.xx + phase.xx * half_bend, by.yy = by.yy + phase.yy * half_bend, by.xy = by.xy + phase.xy * by.bend;
   const P xxx = mx.third * my.m0, yyy = mx.m0 * my.third, xxy = mx.curvature * my.slope, xyy = mx.slope * my.curvature;
-  const NinePoints<P> by_phase{-(re * s + im * c), by.zero * one_x + by.one_x * xx + by.one_y * xy + by.xx * xxx + by.yy * xyy + by.xy * xxy,
-                               by.zero * one_y + by.one_x * xy + by.one_y * yy + by.xx * xxy + by.yy * yyy + by.xy * xyy, xx * half_bend, xy * by.bend, yy * half_bend};
+  const NinePoints<P> by_phase{
+      -(re * s + im * c),
+      by.zero * one_x + by.one_x * xx + by.one_y * xy + by.xx * xxx + by.yy * xyy + by.xy * xxy,
+      by.zero * one_y + by.one_x * xy + by.one_y * yy + by.xx * xxy + by.yy * yyy + by.xy * xyy,
+      xx * half_bend,
+      xy * by.bend,
+      yy * half_bend};
 
-  // Nine points that are carried along change by their quadratic's derivatives and by third ones, of which they take a sixth for slope.
+  // Nine points that are carried along change by their quadratic's derivatives and by third ones, of which they take a
+  // sixth for slope.
   [[maybe_unused]] P by_column(0.0), by_row(0.0), by_growth(0.0);
   if constexpr (kFlows) {
     const auto carry = [&](const NinePoints<P>& f, const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
       by_column = by_column + (mean_by.f * f.x + mean_by.x * f.xx + mean_by.y * f.xy);
       by_row = by_row + (mean_by.f * f.y + mean_by.x * f.xy + mean_by.y * f.yy);
-      by_growth = by_growth + (mean_by.x * f.x + mean_by.y * f.y) + P(2.0) * (mean_by.xx * f.xx + mean_by.xy * f.xy + mean_by.yy * f.yy);
+      by_growth = by_growth + (mean_by.x * f.x + mean_by.y * f.y) +
+                  P(2.0) * (mean_by.xx * f.xx + mean_by.xy * f.xy + mean_by.yy * f.yy);
     };
-    const auto carry_third = [&](int number, const NinePoints<P>& f, const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
+    const auto carry_third = [&](int number, const NinePoints<P>& f,
+                                 const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
       const auto third = ThirdDerivatives<P>::of(f, field(0, number));
       const P sixth = P(-1.0 / 6) * mean_by.f;
       by_column = by_column + ((mean_by.xx + sixth) * third.xxx + mean_by.xy * third.xxy + mean_by.yy * third.xyy);
@@ -234,7 +266,8 @@ BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P
     if constexpr (kFlows)
       if (moved.flow) {
         const P growth(moved.flow->growth);
-        put(plane, (P(moved.flow->column) + growth * column) * by_column + (P(moved.flow->row) + growth * row) * by_row + growth * by_growth);
+        put(plane, (P(moved.flow->column) + growth * column) * by_column +
+                       (P(moved.flow->row) + growth * row) * by_row + growth * by_growth);
         continue;
       }
     P d(0.0);
@@ -263,17 +296,18 @@ S fringe_mean(const FringePoint<S> (&p)[3][3]) {
   };
   constexpr int kPlanes = 1 + ScalarTraits<S>::derivatives;
   static constexpr std::array<FringeFields, kPlanes> kAll{};
-  fringe_means<kQuadrature, false, kPlanes, P>(kPlanes, {}, P(0.0), P(0.0), kAll.data(), load, [&mean](int plane, const P& value) {
-    if constexpr (ScalarTraits<S>::derivatives > 0) {
-      if (plane > 0) {
-        mean.d[static_cast<std::size_t>(plane - 1)] = value;
-        return;
-      }
-      mean.value = value;
-    } else {
-      mean = value;
-    }
-  });
+  fringe_means<kQuadrature, false, kPlanes, P>(kPlanes, {}, P(0.0), P(0.0), kAll.data(), load,
+                                               [&mean](int plane, const P& value) {
+                                                 if constexpr (ScalarTraits<S>::derivatives > 0) {
+                                                   if (plane > 0) {
+                                                     mean.d[static_cast<std::size_t>(plane - 1)] = value;
+                                                     return;
+                                                   }
+                                                   mean.value = value;
+                                                 } else {
+                                                   mean = value;
+                                                 }
+                                               });
   return mean;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// Fringes interpolated over squares of the picture: their phase and amplitudes are smooth where the intensity is not, so
-// that a few rays serve thousands of pixels.
+// Fringes interpolated over squares of the picture: their phase and amplitudes are smooth where the intensity is not,
+// so that a few rays serve thousands of pixels.
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,9 @@ struct FringeBlocks {
   static constexpr int kRim = 2;  ///< pixels around the picture whose fringes its edge needs
   int columns = 0, rows = 0, block_px = 0;
   FringeBlocks(int width, int height, int block)
-      : columns((width + 2 * kRim + block - 1) / block), rows((height + 2 * kRim + block - 1) / block), block_px(block) {}
+      : columns((width + 2 * kRim + block - 1) / block),
+        rows((height + 2 * kRim + block - 1) / block),
+        block_px(block) {}
   int count() const { return columns * rows; }
 };
 
@@ -39,11 +41,13 @@ class FringeTable {
   using P = PlainOf<S>;
 
   FringeTable() = default;
-  /// ray(column, row): the fringe at points of the picture, one a lane, in a scalar whose k-th derivative is the derivatives[k]-th of S.
-  /// `wanted`: one flag a square. What was smooth when it was planned need not be, the image of
-  /// the optic axis may have come in since: squares whose tail (chebyshev.h) would change the intensity by more than `allowed` are left to rays.
+  /// ray(column, row): the fringe at points of the picture, one a lane, in a scalar whose k-th derivative is the
+  /// derivatives[k]-th of S. `wanted`: one flag a square. What was smooth when it was planned need not be, the image of
+  /// the optic axis may have come in since: squares whose tail (chebyshev.h) would change the intensity by more than
+  /// `allowed` are left to rays.
   template <class Ray>
-  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, double allowed, int threads, const std::vector<std::size_t>& derivatives, const Ray& ray)
+  FringeTable(const FringeBlocks& blocks, const std::vector<std::uint8_t>& wanted, double allowed, int threads,
+              const std::vector<std::size_t>& derivatives, const Ray& ray)
       : blocks_(blocks), start_(wanted.size(), -1), derivatives_(derivatives), planes_(1 + derivatives.size()) {
     std::vector<int> list;
     for (std::size_t b = 0; b < wanted.size(); ++b)
@@ -81,35 +85,43 @@ class FringeTable {
     });
     for (std::size_t i = 0; i < list.size(); ++i) {
       const auto field = [&](std::size_t f) { return values.data() + (i * kFields + f) * planes_ * kRays; };
-      const auto largest_of = [&](std::size_t f) { return std::abs(*std::max_element(field(f), field(f) + kRays, [](double a, double b) { return std::abs(a) < std::abs(b); })); };
-      const double left = tail<kPoints>(field(0)) + tail<kPoints>(field(2)) + tail<kPoints>(field(3)) + (largest_of(0) + largest_of(3)) * tail<kPoints>(field(1));
+      const auto largest_of = [&](std::size_t f) {
+        return std::abs(*std::max_element(field(f), field(f) + kRays,
+                                          [](double a, double b) { return std::abs(a) < std::abs(b); }));
+      };
+      const double left = tail<kPoints>(field(0)) + tail<kPoints>(field(2)) + tail<kPoints>(field(3)) +
+                          (largest_of(0) + largest_of(3)) * tail<kPoints>(field(1));
       if (!(left <= allowed)) start_[static_cast<std::size_t>(list[i])] = kGone;
       const auto largest_slope = [&](std::size_t f, int order) { return largest_derivative<kPoints>(field(f), order); };
-      steepest_ = std::max(steepest_, largest_slope(0, 1) + largest_slope(2, 1) + (largest_of(0) + largest_of(3)) * largest_slope(1, 1));
+      steepest_ = std::max(
+          steepest_, largest_slope(0, 1) + largest_slope(2, 1) + (largest_of(0) + largest_of(3)) * largest_slope(1, 1));
       most_third_ = std::max(most_third_, largest_slope(0, 3) + largest_slope(2, 3) + largest_slope(3, 3));
     }
     fields_.fill({.own = 0});
     fields_[0] = {};
-    for (std::size_t plane = 1; plane < planes_; ++plane) fields_[derivatives_[plane - 1] + 1] = fields_of(values, list.size(), plane);
+    for (std::size_t plane = 1; plane < planes_; ++plane)
+      fields_[derivatives_[plane - 1] + 1] = fields_of(values, list.size(), plane);
     parallel_for(static_cast<int>(list.size() * kFields * planes_), threads, [&](int plane) {
       const std::size_t at = static_cast<std::size_t>(plane) * kRays;
       to_powers<kPoints>(values.data() + at, coefficients_.data() + at);
     });
   }
 
-  /// The fringes of up to `count` columns of a row of the picture from `column` on: out[field * (1 + derivatives of S) + plane][i] becomes
-  /// those of column + i, fields in the order of FringePoint, those that fields() names. Returns of how many: up to the end of a square, 0 in one that was not asked for. Places up
-  /// to the next whole number of lanes are overwritten. `scratch` belongs to this table and one thread.
+  /// The fringes of up to `count` columns of a row of the picture from `column` on: out[field * (1 + derivatives of S)
+  /// + plane][i] becomes those of column + i, fields in the order of FringePoint, those that fields() names. Returns of
+  /// how many: up to the end of a square, 0 in one that was not asked for. Places up to the next whole number of lanes
+  /// are overwritten. `scratch` belongs to this table and one thread.
   int run(int column, double row, int count, bool quadrature, FringeScratch& scratch, double* const* out) const {
     const std::size_t fields = quadrature ? kFields : kFields - 1;
     const double* line = line_at(column, row, fields, scratch);
     if (!line) return 0;
-    const int bx = (column + kRim) / blocks_.block_px, end = std::min(column + count, (bx + 1) * blocks_.block_px - kRim);
+    const int bx = (column + kRim) / blocks_.block_px,
+              end = std::min(column + count, (bx + 1) * blocks_.block_px - kRim);
     const double per_px = 2.0 / blocks_.block_px, first = (column + kRim - bx * blocks_.block_px) * per_px - 1;
     alignas(64) double steps[kLanes];
     for (int k = 0; k < kLanes; ++k) steps[k] = first + k * per_px;
     P x0;
-    if constexpr (kLanesOf<S> > 1)
+    if constexpr (kLanesOf < S >> 1)
       x0 = P::load_aligned(steps);
     else
       x0 = first;
@@ -128,7 +140,7 @@ class FringeTable {
             odd = odd * square + c[k - 1];
           }
           const P value = odd * x + even;
-          if constexpr (kLanesOf<S> > 1)
+          if constexpr (kLanesOf < S >> 1)
             value.store_unaligned(to + i);
           else
             to[i] = value;
@@ -137,7 +149,8 @@ class FringeTable {
     return end - column;
   }
 
-  /// From now on the mean field is its mean over a pixel, as far as its curvature makes one, for a picture of which none is traced.
+  /// From now on the mean field is its mean over a pixel, as far as its curvature makes one, for a picture of which
+  /// none is traced.
   void average_means() {
     const double share = square(2.0 / blocks_.block_px) / 24;
     for (std::size_t i = 0; i < coefficients_.size() / (kFields * planes_ * kRays); ++i)
@@ -154,16 +167,22 @@ class FringeTable {
       }
   }
 
-  /// What changes with derivative plane - 1 of S, fields left out to which no square owes more than rounding of it: run() does not write them.
+  /// What changes with derivative plane - 1 of S, fields left out to which no square owes more than rounding of it:
+  /// run() does not write them.
   FringeFields fields(std::size_t plane) const { return fields_[plane]; }
   /// None is left out, for a picture of which a part is traced.
   void keep_all_fields() {
     for (const std::size_t d : derivatives_) fields_[d + 1] = {};
   }
-  /// By which part of the fringes' largest slope differences over three pixels miss that of amplitude, mean and quadrature: a sixth of the third derivative.
-  double slope_error() const { return steepest_ > 0 ? square(2.0 / blocks_.block_px) * most_third_ / (6 * steepest_) : 0; }
+  /// By which part of the fringes' largest slope differences over three pixels miss that of amplitude, mean and
+  /// quadrature: a sixth of the third derivative.
+  double slope_error() const {
+    return steepest_ > 0 ? square(2.0 / blocks_.block_px) * most_third_ / (6 * steepest_) : 0;
+  }
   /// All squares that were asked for are there.
-  bool complete() const { return std::none_of(start_.begin(), start_.end(), [](int s) { return s == kGone; }); }
+  bool complete() const {
+    return std::none_of(start_.begin(), start_.end(), [](int s) { return s == kGone; });
+  }
 
   /// Values at one place; false in a square that was not asked for.
   bool read(double column, double row, FringeScratch& scratch, FringePoint<double>& out) const {
@@ -214,12 +233,16 @@ class FringeTable {
   }
   const double* line_at(int column, double row, std::size_t fields, FringeScratch& scratch) const {
     if (start_.empty()) return nullptr;
-    const int bx = (column + kRim) / blocks_.block_px, by = static_cast<int>(std::floor((row + kRim) / blocks_.block_px));
-    if (column < -kRim || by < 0 || bx >= blocks_.columns || by >= blocks_.rows || start_[static_cast<std::size_t>(by * blocks_.columns + bx)] < 0) return nullptr;
+    const int bx = (column + kRim) / blocks_.block_px,
+              by = static_cast<int>(std::floor((row + kRim) / blocks_.block_px));
+    if (column < -kRim || by < 0 || bx >= blocks_.columns || by >= blocks_.rows ||
+        start_[static_cast<std::size_t>(by * blocks_.columns + bx)] < 0)
+      return nullptr;
     if (scratch.row != row) follow_row(row, by, fields, scratch);
     return scratch.lines.data() + static_cast<std::size_t>(bx) * kFields * kOut * kPoints;
   }
-  /// Polynomials of the column alone for one row: [square][field][value and derivatives of S][power], of the first `fields`.
+  /// Polynomials of the column alone for one row: [square][field][value and derivatives of S][power], of the first
+  /// `fields`.
   void follow_row(double row, int by, std::size_t fields, FringeScratch& scratch) const {
     const double per_px = 2.0 / blocks_.block_px, y = (row - (by * blocks_.block_px - kRim)) * per_px - 1;
     scratch.row = row;
@@ -245,12 +268,14 @@ class FringeTable {
   static const ChebyshevRule<kPoints>& rule() { return chebyshev_rule<kPoints>(); }
 
   FringeBlocks blocks_{0, 0, 1};
-  std::vector<int> start_;                ///< place among the coefficients, -1 = not asked for, kGone = no longer smooth
+  /// place among the coefficients, -1 = not asked for, kGone = no longer smooth
+  std::vector<int> start_;
   std::array<FringeFields, kOut> fields_{};
   std::vector<std::size_t> derivatives_;  ///< of S, one a plane after the first
   std::size_t planes_ = 1;
-  double steepest_ = 0, most_third_ = 0;  ///< first derivative of the fringes, third of amplitude, mean and quadrature, by half a square
-  std::vector<double> coefficients_;      ///< [square][field][plane][power of row][power of column]
+  /// first derivative of the fringes, third of amplitude, mean and quadrature, by half a square
+  double steepest_ = 0, most_third_ = 0;
+  std::vector<double> coefficients_;  ///< [square][field][plane][power of row][power of column]
 };
 
 }  // namespace birefit

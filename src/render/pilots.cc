@@ -1,5 +1,5 @@
-#include "render/cone_view.h"
 #include "render/pilots.h"
+#include "render/cone_view.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,11 +31,13 @@ double checked(double error) { return std::isfinite(error) ? error : 1e300; }
 double intensity_distance(const Mat2<double>& a, const Mat2<double>& b) {
   const Complex<double> inner = conj(b.a) * a.a + conj(b.b) * a.b + conj(b.c) * a.c + conj(b.d) * a.d;
   const double modulus = std::sqrt(norm(inner));
-  const Complex<double> turn = modulus > 0 ? Complex<double>(inner.re / modulus, inner.im / modulus) : Complex<double>(1.0);
+  const Complex<double> turn =
+      modulus > 0 ? Complex<double>(inner.re / modulus, inner.im / modulus) : Complex<double>(1.0);
   return std::sqrt(2.0) * size_of(turn * b - a);
 }
 
-std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value, std::size_t most) {
+std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value,
+                                                        std::size_t most) {
   std::vector<std::pair<double, double>> t;
   if (const std::optional<ParameterRef> half_angle = cone_half_angle(scene); half_angle && scene.view.camera) {
     // Seen from the side no circle is like another: places of the picture, out to its corners.
@@ -51,7 +53,8 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
   } else if (half_angle) {
     const double edge = std::tan(value.radians(*half_angle, 15));
     // Pixels beyond the inscribed circle, up to the corners of the image.
-    const double corner = std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);
+    const double corner =
+        std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);
     t.push_back({0.0, 0.0});
     for (int i = 0; i < 6; ++i)
       for (double f : {0.5, corner})
@@ -62,7 +65,9 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
       t.push_back({f * std::cos(a), f * std::sin(a)});
     }
     if (t.size() > most) {
-      std::stable_sort(t.begin(), t.end(), [](const auto& a, const auto& b) { return std::hypot(a.first, a.second) < std::hypot(b.first, b.second); });
+      std::stable_sort(t.begin(), t.end(), [](const auto& a, const auto& b) {
+        return std::hypot(a.first, a.second) < std::hypot(b.first, b.second);
+      });
       for (std::size_t i = 0; i < most; ++i) t[i] = t[i * (t.size() - 1) / (most - 1)];  // never behind i
       t.resize(most);
     }
@@ -123,8 +128,8 @@ void Pilots::add_ball(const Scene& scene, const Values<double>& value) {
     const DropletRay<double> ray = trace(o->sphere, rim, fraction * rim.rho_max() * o->sphere.radius_um);
     return ball_jones<double>(*o, ray, std::cos(azimuth), std::sin(azimuth), method, mesh);
   };
-  // A ray that grazes a defect takes more steps than all others, of any method: it is for the steps by place (ball.cc), no measure of a
-  // method.
+  // A ray that grazes a defect takes more steps than all others, of any method: it is for the steps by place (ball.cc),
+  // no measure of a method.
   struct Candidate {
     double fraction, azimuth, unsure;
     Mat2<double> exact;
@@ -134,9 +139,12 @@ void Pilots::add_ball(const Scene& scene, const Values<double>& value) {
     for (int k = 0; k < 3; ++k) {
       const double azimuth = 2.399963 * static_cast<double>(candidates.size());  // the golden angle: no two alike
       const Mat2<double> exact = jones(f, azimuth, transport_method<double>("magnus4"), finer);
-      candidates.push_back({f, azimuth, checked(intensity_distance(exact, jones(f, azimuth, transport_method<double>("magnus4"), fine))), exact});
+      candidates.push_back(
+          {f, azimuth, checked(intensity_distance(exact, jones(f, azimuth, transport_method<double>("magnus4"), fine))),
+           exact});
     }
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) { return a.unsure < b.unsure; });
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.unsure < b.unsure; });
   constexpr std::size_t kLeast = 16;
   for (const Candidate& c : candidates) {
     if (scene.method == "auto" && rays_.size() >= kLeast && c.unsure > 0.1 * scene.intensity_accuracy) break;
@@ -170,8 +178,10 @@ void Pilots::add_volume(const Scene& scene, const Values<double>& value) {
   for (int i = 0; i < kMost && rays_.size() < 16; ++i) {
     const auto [x, y] = volume_place(*o->grid, i);
     const Su2<double> exact = volume_retarder<double>(*o, x, y, transport_method<double>("magnus4"), finer);
-    // Through a defect the axis between two nodes is anybody's guess, and turns as fast as it likes: no measure of a method.
-    const double unsure = intensity_distance(exact, volume_retarder<double>(*o, x, y, transport_method<double>("magnus4"), fine));
+    // Through a defect the axis between two nodes is anybody's guess, and turns as fast as it likes: no measure of a
+    // method.
+    const double unsure =
+        intensity_distance(exact, volume_retarder<double>(*o, x, y, transport_method<double>("magnus4"), fine));
     if (unsure > 0.1 * scene.intensity_accuracy && i < kMost - 4) continue;
     rays_.push_back([=, x = x, y = y](const TransportMethod<double>& method, const Mesh& mesh) {
       try {
@@ -216,7 +226,8 @@ void Pilots::add_planar(const Scene& scene, const Values<double>& value) {
     OpticalPoint<double> p[3];
     o->column->sample(ends, p);
     double phase = 0;
-    for (const auto& q : p) phase = std::max(phase, o->k0 * q.depth_slope_um * std::abs(std::sqrt(q.extraordinary) - std::sqrt(q.ordinary)));
+    for (const auto& q : p)
+      phase = std::max(phase, o->k0 * q.depth_slope_um * std::abs(std::sqrt(q.extraordinary) - std::sqrt(q.ordinary)));
     const auto shifted = fresh();
     shifted->k0 = o->k0 * (1 + std::min(0.25, 0.5 * kPi / phase));
     for (const auto& [tx, ty] : directions) add(shifted, tx, ty);
@@ -239,15 +250,19 @@ void Pilots::add_planar(const Scene& scene, const Values<double>& value) {
   };
 }
 
-Effort cheapest_effort(const Pilots& pilots, double target, const std::string& only, bool even_steps, const std::string& but) {
+Effort cheapest_effort(const Pilots& pilots, double target, const std::string& only, bool even_steps,
+                       const std::string& but) {
   std::vector<int> ladder;
   for (int n = even_steps ? 2 : 1; n <= 8192; n += std::max(even_steps ? 2 : 1, n / 16 * 2)) ladder.push_back(n);
   // Breaks make several numbers of steps the same mesh, which would confirm itself.
   if (even_steps)
-    ladder.erase(std::unique(ladder.begin(), ladder.end(), [&](int a, int b) { return pilots.mesh(a).size() == pilots.mesh(b).size(); }), ladder.end());
+    ladder.erase(std::unique(ladder.begin(), ladder.end(),
+                             [&](int a, int b) { return pilots.mesh(a).size() == pilots.mesh(b).size(); }),
+                 ladder.end());
   std::vector<Effort> efforts;
   for (const TransportMethod<double>* method : transport_methods<double>()) {
-    if (method->info().reflections || but == method->info().name || (!only.empty() && only != method->info().name)) continue;
+    if (method->info().reflections || but == method->info().name || (!only.empty() && only != method->info().name))
+      continue;
     // Samples grow by the same number with every step.
     const int at_8 = pilots.samples(*method, uniform_mesh(8)), at_16 = pilots.samples(*method, uniform_mesh(16));
     for (int n : ladder) {
@@ -255,7 +270,8 @@ Effort cheapest_effort(const Pilots& pilots, double target, const std::string& o
       efforts.push_back({method, n, at_8 + (at_16 - at_8) * (steps - 8) / 8, 1e300});
     }
   }
-  std::stable_sort(efforts.begin(), efforts.end(), [](const Effort& a, const Effort& b) { return a.samples < b.samples; });
+  std::stable_sort(efforts.begin(), efforts.end(),
+                   [](const Effort& a, const Effort& b) { return a.samples < b.samples; });
   Effort best;
   for (Effort& effort : efforts) {
     effort.error = pilots.error(*effort.method, pilots.mesh(effort.steps), target);

@@ -31,12 +31,15 @@ S over_lanes(S x) {
 }
 
 /// Every number of points up to 16, and those of kPointsASide.
-inline bool is_tried(int n) { return n <= 16 || std::find(kPointsASide.begin(), kPointsASide.end(), n) != kPointsASide.end(); }
+inline bool is_tried(int n) {
+  return n <= 16 || std::find(kPointsASide.begin(), kPointsASide.end(), n) != kPointsASide.end();
+}
 /// n Gauss points, or the next larger number that there is.
 inline const PixelRule& rule_of(int n) {
   static const std::vector<PixelRule> rules = [] {
     std::vector<PixelRule> r(static_cast<std::size_t>(kMostPoints) + 1);
-    for (int i = kMostPoints; i >= 1; --i) r[static_cast<std::size_t>(i)] = is_tried(i) ? pixel_rule(i) : r[static_cast<std::size_t>(i) + 1];
+    for (int i = kMostPoints; i >= 1; --i)
+      r[static_cast<std::size_t>(i)] = is_tried(i) ? pixel_rule(i) : r[static_cast<std::size_t>(i) + 1];
     return r;
   }();
   return rules[static_cast<std::size_t>(std::min(n, kMostPoints))];
@@ -78,7 +81,8 @@ S sum_over(const PixelModel<S>& model, double column, double row, const Weighted
   using P = PlainOf<S>;
   S sum(0.0);
   for (std::size_t i = 0; i < points.size; i += static_cast<std::size_t>(kLanesOf<S>))
-    sum = sum + S(load_lanes<P>(&points.w[i])) * model.intensity(P(column) + load_lanes<P>(&points.x[i]), P(row) + load_lanes<P>(&points.y[i]));
+    sum = sum + S(load_lanes<P>(&points.w[i])) *
+                    model.intensity(P(column) + load_lanes<P>(&points.x[i]), P(row) + load_lanes<P>(&points.y[i]));
   return over_lanes(sum);
 }
 
@@ -90,16 +94,19 @@ S mean_over_pixels(const PixelModel<S>& model, const PlainOf<S>& column, const P
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const std::size_t a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
-      sum = sum + (rule.w[a] * rule.w[b]) * model.intensity(column + PlainOf<S>(rule.x[a]), row + PlainOf<S>(rule.x[b]));
+      sum =
+          sum + (rule.w[a] * rule.w[b]) * model.intensity(column + PlainOf<S>(rule.x[a]), row + PlainOf<S>(rule.x[b]));
     }
   return sum;
 }
 
-/// n x n Gauss points of a pixel; n = 1: the point value with the correction that render() makes. Filled up to whole packs.
+/// n x n Gauss points of a pixel; n = 1: the point value with the correction that render() makes. Filled up to whole
+/// packs.
 inline const WeightedPoints& points_of_pixel(int n) {
   static const std::vector<WeightedPoints> all = [] {
     std::vector<WeightedPoints> r(static_cast<std::size_t>(kMostPoints) + 1);
-    for (const auto& [x, y] : {std::pair{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}}) r[1].add(x, y, x == 0 && y == 0 ? 1 - 4.0 / 24 : 1.0 / 24);
+    for (const auto& [x, y] : {std::pair{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}})
+      r[1].add(x, y, x == 0 && y == 0 ? 1 - 4.0 / 24 : 1.0 / 24);
     for (int n = 1; n <= kMostPoints; ++n) {
       if (!is_tried(n)) continue;
       const PixelRule& rule = rule_of(n);

@@ -33,7 +33,9 @@ class Values {
   const std::vector<int>& active() const { return active_; }
   /// The same values as another scalar.
   template <class T>
-  Values<T> as() const { return {theta_, active_}; }
+  Values<T> as() const {
+    return {theta_, active_};
+  }
   S get(ParameterRef ref, double fallback) const { return ref ? (*this)(ref) : S(fallback); }
   S radians(ParameterRef ref, double fallback_deg = 0) const {
     return get(ref, fallback_deg) * (std::numbers::pi / 180);
@@ -51,7 +53,8 @@ inline constexpr bool kForTablesOnly = (ScalarTraits<S>::derivatives > 4);
 template <class S>
 inline constexpr int kLanesOf = std::is_same_v<PlainOf<S>, Pack> ? kLanes : 1;
 
-/// What leaves a picture as it is: half a turn about its middle, or a mirror that exchanges its upper and its lower half.
+/// What leaves a picture as it is: half a turn about its middle, or a mirror that exchanges its upper and its lower
+/// half.
 enum class Symmetry { none, half_turn, mirror };
 
 /// A circle in the picture, in pixels.
@@ -68,21 +71,28 @@ class PixelModel {
   virtual ~PixelModel() = default;
   virtual S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const = 0;
   /// The parts of intensity() as smooth functions; only with plan.fringe_means.
-  virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const { throw std::logic_error("no fringes here"); }
-  /// The same of up to `count` columns of a row from `column` on, read from a table (FringeTable::run); 0 where there is none.
-  virtual int fringe_run(int /*column*/, double /*row*/, int /*count*/, FringeScratch&, double* const* /*out*/) const { return 0; }
+  virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const {
+    throw std::logic_error("no fringes here");
+  }
+  /// The same of up to `count` columns of a row from `column` on, read from a table (FringeTable::run); 0 where there
+  /// is none.
+  virtual int fringe_run(int /*column*/, double /*row*/, int /*count*/, FringeScratch&, double* const* /*out*/) const {
+    return 0;
+  }
   /// Which fields the derivative of number plane - 1 changes; plane 0 has all.
   virtual FringeFields fringe_fields(int /*plane*/) const { return {}; }
   /// Once tabulated.
   virtual FringeTraits fringe_traits() const { return {}; }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
-  /// Lines along which the slope of intensity() has no bound on one side, like a root's (edge_pixels.h). The first, if there is any, is the rim of
-  /// all light that intensity() knows; a second one a core's edge, where it is continuous.
+  /// Lines along which the slope of intensity() has no bound on one side, like a root's (edge_pixels.h). The first, if
+  /// there is any, is the rim of all light that intensity() knows; a second one a core's edge, where it is continuous.
   virtual int edges() const { return 0; }
-  /// Positive on the side of that slope, negative on the other, and all but linear across a few pixels of the line, where it does not end (at a rim).
-  /// Of a line that is no circle: about the distance, in pixels.
-  virtual PlainOf<S> beyond_edge(int /*edge*/, const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const { return PlainOf<S>(-1.0); }
+  /// Positive on the side of that slope, negative on the other, and all but linear across a few pixels of the line,
+  /// where it does not end (at a rim). Of a line that is no circle: about the distance, in pixels.
+  virtual PlainOf<S> beyond_edge(int /*edge*/, const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const {
+    return PlainOf<S>(-1.0);
+  }
   /// Places (column, row), apart from the middle, about which light turns within a pixel.
   virtual const std::vector<std::array<double, 2>>& defects() const {
     static const std::vector<std::array<double, 2>> none;
@@ -167,7 +177,8 @@ template <class S>
 Symmetry round_symmetry(const Scene& scene, const Values<S>& value, bool twisted) {
   const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
   if (centred(scene, center_x, center_y)) return Symmetry::half_turn;
-  return !twisted && on_middle_row(scene, center_y) && along_axes(polarizers(scene, value)) ? Symmetry::mirror : Symmetry::none;
+  return !twisted && on_middle_row(scene, center_y) && along_axes(polarizers(scene, value)) ? Symmetry::mirror
+                                                                                            : Symmetry::none;
 }
 
 /// One file a sample kind. `plan` must be of the same scene.

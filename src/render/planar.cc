@@ -7,8 +7,8 @@
 #include "medium/references.h"
 #include "render/cone_view.h"
 #include "render/fringe_table.h"
-#include "render/planar.h"
 #include "render/pixel_model.h"
+#include "render/planar.h"
 #include "transport/methods.h"
 
 namespace birefit {
@@ -22,8 +22,8 @@ std::optional<ParameterRef> cone_half_angle(const Scene& scene) {
 template <class S>
 PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value) {
   PlanarOptics<S> o;
-  o.column = std::make_unique<CachedColumn<S>>(
-      make_planar_column<S>(scene.sample, scene.material, value, value.radians(scene.view.rotation_deg), wavelength_um(scene, value)));
+  o.column = std::make_unique<CachedColumn<S>>(make_planar_column<S>(
+      scene.sample, scene.material, value, value.radians(scene.view.rotation_deg), wavelength_um(scene, value)));
   o.k0 = wavenumber_per_um(scene, value);
   o.n_host = host_index(scene, value);
   o.continuity = scene.ceiling == Ceiling::e_only ? Continuity::e_only : Continuity::e_and_h;
@@ -57,8 +57,8 @@ Mat2<S> planar_jones(const PlanarOptics<S>& o, const TransportMethod<S>& method,
 }
 
 template <class S, class R>
-FringePoint<R> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh& mesh, const R& k0, const Raise<S, R>& raise, const Polarizers<R>& polarizers,
-                             const S& tx, const S& ty) {
+FringePoint<R> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh& mesh, const R& k0,
+                             const Raise<S, R>& raise, const Polarizers<R>& polarizers, const S& tx, const S& ty) {
   using C = Complex<R>;
   const auto raised = [&raise](const Mat2<S>& m) {
     const auto z = [&raise](const Complex<S>& x) { return C(raise(x.re), raise(x.im)); };
@@ -66,7 +66,8 @@ FringePoint<R> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh
   };
   const S c = 1.0 / sqrt(tx * tx + ty * ty + 1.0);
   const Ray<S> ray{o.k0, o.n_host * c * tx, o.n_host * c * ty, o.continuity};
-  const ModalTransfer<R> m = coupling ? modal_transfer(*o.column, ray, k0, raise, mesh) : diagonal_transfer(*o.column, ray, k0, raise, mesh);
+  const ModalTransfer<R> m =
+      coupling ? modal_transfer(*o.column, ray, k0, raise, mesh) : diagonal_transfer(*o.column, ray, k0, raise, mesh);
   const Mat2<R> in = inverse(m.first) * raised(entry_factor(*o.column, ray, o.n_host));
   const Mat2<R> out = raised(exit_factor(*o.column, ray, o.n_host)) * m.last;
   // The polarizer's field rolled onto the plane of incidence (see planar_jones), the analyser seen from inside.
@@ -91,7 +92,8 @@ namespace {
 template <class S>
 std::optional<Mat2<S>> compensator(const Scene& scene, const Values<S>& value) {
   if (!scene.microscope.compensator_phase_deg) return std::nullopt;
-  const S half = 0.5 * value.radians(scene.microscope.compensator_phase_deg), twice = 2.0 * value.radians(scene.microscope.compensator_azimuth_deg);
+  const S half = 0.5 * value.radians(scene.microscope.compensator_phase_deg),
+          twice = 2.0 * value.radians(scene.microscope.compensator_azimuth_deg);
   const S c = cos(half), s = sin(half), along = cos(twice), across = sin(twice);
   return Mat2<S>{{c, s * along}, {S(0.0), s * across}, {S(0.0), s * across}, {c, -(s * along)}};
 }
@@ -135,16 +137,19 @@ class PlanarModel final : public PixelModel<S> {
       constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
     }
     const bool straight = cone_ && cone_->from_front();
-    if (straight && centred(scene, cone_->center_x, cone_->center_y) && axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) {
+    if (straight && centred(scene, cone_->center_x, cone_->center_y) &&
+        axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) {
           return stays_at(p.axis.z, 0.0) || (stays_at(p.axis.x, 0.0) && stays_at(p.axis.y, 0.0));
         }))
       symmetry_ = Symmetry::half_turn;
     else if (straight && on_middle_row(scene, cone_->center_y) && along_axes(polarizers_) && !compensator_ &&
-             axes_all(*optics_.column, mesh_, [](const OpticalPoint<S>& p) { return mirrored(p.axis.x, p.axis.y, p.axis.z); }))
+             axes_all(*optics_.column, mesh_,
+                      [](const OpticalPoint<S>& p) { return mirrored(p.axis.x, p.axis.y, p.axis.z); }))
       symmetry_ = Symmetry::mirror;
     if (symmetry_ != Symmetry::none && !tabulated_blocks_.empty())  // the lower half of a picture is copied
       for (int b = 0; b < blocks_.count(); ++b)
-        if ((b / blocks_.columns) * blocks_.block_px > scene.view.height / 2 + 2 * FringeBlocks::kRim) tabulated_blocks_[static_cast<std::size_t>(b)] = 0;
+        if ((b / blocks_.columns) * blocks_.block_px > scene.view.height / 2 + 2 * FringeBlocks::kRim)
+          tabulated_blocks_[static_cast<std::size_t>(b)] = 0;
   }
   S intensity(const P& column, const P& row) const override {
     if (!cone_) return constant_;
@@ -164,12 +169,14 @@ class PlanarModel final : public PixelModel<S> {
     return plane > 0 && flows_[p - 1] ? FringeFields{.own = 0, .flow = flows_[p - 1]} : table_.fields(p);
   }
   FringeTraits fringe_traits() const override { return traits_; }
-  bool in_phase() const override { return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h; }
+  bool in_phase() const override {
+    return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h;
+  }
   Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
     if (wanted != PixelModel<S>::Wanted::picture || tabulated_blocks_.empty()) return;
-    // Where the cone's middle lies and how wide it is carries fringes along and changes none. Seen from the side a wider cone carries them by other
-    // ways than straight away from the middle: its derivative is left to rays.
+    // Where the cone's middle lies and how wide it is carries fringes along and changes none. Seen from the side a
+    // wider cone carries them by other ways than straight away from the middle: its derivative is left to rays.
     const ParameterRef half_angle = scene_.view.camera ? ParameterRef{} : *cone_half_angle(scene_);
     std::vector<std::size_t> places;
     std::vector<int> changing;
@@ -177,10 +184,12 @@ class PlanarModel final : public PixelModel<S> {
       for (std::size_t j = 0; j < value_.active().size(); ++j) {
         const int index = value_.active()[j];
         int carries = 0, uses = 0;
-        for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle}) carries += ref && ref.index == index;
+        for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle})
+          carries += ref && ref.index == index;
         for_each_ref(scene_, [&](const ParameterRef& ref) { uses += ref.index == index; });
         if (carries > 0 && carries == uses) {
-          const double growth = scene_.view.camera ? 0.0 : lane(cone_->tan_per_px.d[j], 0) / lane(plain(cone_->tan_per_px), 0);
+          const double growth =
+              scene_.view.camera ? 0.0 : lane(cone_->tan_per_px.d[j], 0) / lane(plain(cone_->tan_per_px), 0);
           const auto along = [&](const S& centre) { return -lane(centre.d[j], 0) - growth * lane(plain(centre), 0); };
           flows_[j] = {along(cone_->center_x), along(cone_->center_y), growth};
         } else {
@@ -223,7 +232,8 @@ class PlanarModel final : public PixelModel<S> {
     }
     f(Type<Most>());
   }
-  /// Which of `changing` medium, host or the direction know; others, the wavelength where nothing is dispersive, the polarizers, turn what they have done.
+  /// Which of `changing` medium, host or the direction know; others, the wavelength where nothing is dispersive, the
+  /// polarizers, turn what they have done.
   template <class R>
   std::vector<int> known_inside(const std::vector<int>& changing) const {
     std::vector<int> inside;
@@ -231,13 +241,16 @@ class PlanarModel final : public PixelModel<S> {
       const Values<R> value(value_.theta(), changing);
       const PlanarOptics<R> optics = planar_optics(scene_, value);
       const ConeView<R> cone(scene_, value);
-      const auto corner = cone.at(P(0.0), P(0.0)), side = cone.at(P(scene_.view.width - 1.0), P(0.3 * scene_.view.height));
+      const auto corner = cone.at(P(0.0), P(0.0)),
+                 side = cone.at(P(scene_.view.width - 1.0), P(0.3 * scene_.view.height));
       for (std::size_t j = 0; j < changing.size(); ++j) {
         const auto still = [j](const R& x) { return lane(x.d[j], 0) == 0; };
-        const bool outside = still(optics.n_host) && still(corner.x) && still(corner.y) && still(side.x) && still(side.y) && axes_all(*optics.column, mesh_, [&](const OpticalPoint<R>& p) {
-          return still(p.axis.x) && still(p.axis.y) && still(p.axis.z) && still(p.ordinary) && still(p.extraordinary) && still(p.ordinary_im) && still(p.extraordinary_im) &&
-                 still(p.depth_slope_um);
-        });
+        const bool outside = still(optics.n_host) && still(corner.x) && still(corner.y) && still(side.x) &&
+                             still(side.y) && axes_all(*optics.column, mesh_, [&](const OpticalPoint<R>& p) {
+                               return still(p.axis.x) && still(p.axis.y) && still(p.axis.z) && still(p.ordinary) &&
+                                      still(p.extraordinary) && still(p.ordinary_im) && still(p.extraordinary_im) &&
+                                      still(p.depth_slope_um);
+                             });
         if (!outside) inside.push_back(changing[j]);
       }
     }
@@ -245,12 +258,15 @@ class PlanarModel final : public PixelModel<S> {
   }
   /// With rays that carry the derivatives by `changing` and no others, in T those by `inside`.
   template <class R, class T>
-  void fill_table(const std::vector<int>& changing, const std::vector<int>& inside, const std::vector<std::size_t>& places, int threads) {
+  void fill_table(const std::vector<int>& changing, const std::vector<int>& inside,
+                  const std::vector<std::size_t>& places, int threads) {
     const Values<R> value(value_.theta(), changing);
     const Values<T> value_inside(value_.theta(), std::is_same_v<R, T> ? changing : inside);
     Raise<T, R> raise;
     if constexpr (!std::is_same_v<R, T>)
-      for (std::size_t j = 0; j < inside.size(); ++j) raise.to[j] = static_cast<std::size_t>(std::find(changing.begin(), changing.end(), inside[j]) - changing.begin());
+      for (std::size_t j = 0; j < inside.size(); ++j)
+        raise.to[j] =
+            static_cast<std::size_t>(std::find(changing.begin(), changing.end(), inside[j]) - changing.begin());
     const Polarizers<R> pair = polarizers(scene_, value);
     const R k0 = wavenumber_per_um(scene_, value);
     std::optional<PlanarOptics<T>> own;
@@ -265,10 +281,11 @@ class PlanarModel final : public PixelModel<S> {
       }
     }();
     const ConeView<T> cone(scene_, value_inside);
-    table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places, [&](const P& column, const P& row) {
-      const auto t = cone.at(column, row);
-      return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
-    });
+    table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places,
+                            [&](const P& column, const P& row) {
+                              const auto t = cone.at(column, row);
+                              return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
+                            });
     constexpr double kSlopeError = 1e-5;
     traits_.averaged = !left_to_rays_ && table_.complete();
     traits_.even = traits_.averaged && table_.slope_error() < kSlopeError;
@@ -308,13 +325,14 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_planar_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   return std::make_unique<PlanarModel<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S)                                                                                      \
-  template std::unique_ptr<PixelModel<S>> make_planar_model<S>(const Scene&, const RenderPlan&, const Values<S>&);  \
-  template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&);                                        \
+#define BIREFIT_INSTANTIATE(S)                                                                                     \
+  template std::unique_ptr<PixelModel<S>> make_planar_model<S>(const Scene&, const RenderPlan&, const Values<S>&); \
+  template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&);                                       \
   template Mat2<S> planar_jones<S>(const PlanarOptics<S>&, const TransportMethod<S>&, const Mesh&, const S&, const S&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
-#define BIREFIT_INSTANTIATE_RAISED(S, R) \
-  template FringePoint<R> planar_fringe<S, R>(const PlanarOptics<S>&, bool, const Mesh&, const R&, const Raise<S, R>&, const Polarizers<R>&, const S&, const S&);
+#define BIREFIT_INSTANTIATE_RAISED(S, R)                                                                               \
+  template FringePoint<R> planar_fringe<S, R>(const PlanarOptics<S>&, bool, const Mesh&, const R&, const Raise<S, R>&, \
+                                              const Polarizers<R>&, const S&, const S&);
 BIREFIT_FOR_EACH_RAISE(BIREFIT_INSTANTIATE_RAISED)
 
 }  // namespace birefit

@@ -15,7 +15,8 @@ struct PlanarOptics {
   Continuity continuity = Continuity::e_and_h;
 };
 
-/// Half angle in the host of the cone a plate or slab is seen in, one direction a pixel; none: every pixel sees the same.
+/// Half angle in the host of the cone a plate or slab is seen in, one direction a pixel; none: every pixel sees the
+/// same.
 std::optional<ParameterRef> cone_half_angle(const Scene& scene);
 
 template <class S>
@@ -27,10 +28,11 @@ template <class S>
 Mat2<S> planar_jones(const PlanarOptics<S>& optics, const TransportMethod<S>& method, const Mesh& mesh, const S& tx,
                      const S& ty);
 
-/// The same between polarizers, for the methods `diagonal` and (with coupling) `modal`. Derivatives that the wavenumber k0 (per um) and the
-/// polarizers know and neither medium nor direction cost least in R alone; `raise` brings those of S to their places (optics.k0 is not read).
+/// The same between polarizers, for the methods `diagonal` and (with coupling) `modal`. Derivatives that the wavenumber
+/// k0 (per um) and the polarizers know and neither medium nor direction cost least in R alone; `raise` brings those of
+/// S to their places (optics.k0 is not read).
 template <class S, class R>
-FringePoint<R> planar_fringe(const PlanarOptics<S>& optics, bool coupling, const Mesh& mesh, const R& k0, const Raise<S, R>& raise, const Polarizers<R>& polarizers,
-                             const S& tx, const S& ty);
+FringePoint<R> planar_fringe(const PlanarOptics<S>& optics, bool coupling, const Mesh& mesh, const R& k0,
+                             const Raise<S, R>& raise, const Polarizers<R>& polarizers, const S& tx, const S& ty);
 
 }  // namespace birefit

@@ -1,7 +1,7 @@
 #pragma once
-// Light behind a sphere that looks different from all sides: smooth over most of its disc, so that rays at a few thousand
-// points serve any number of pixels. The squares lie in coordinates of the disc, not of the picture: they go where it goes
-// and grow as it grows.
+// Light behind a sphere that looks different from all sides: smooth over most of its disc, so that rays at a few
+// thousand points serve any number of pixels. The squares lie in coordinates of the disc, not of the picture: they go
+// where it goes and grow as it grows.
 
 #include <algorithm>
 #include <array>
@@ -14,11 +14,13 @@
 
 namespace birefit {
 
-/// The disc's coordinates: v = sqrt(1 - rho/edge), 0 at the rim, where light ends like that root, and turn: y/x and -x/y in turn,
-/// from -1 to 1 in each quarter that is centred on half an axis; an angle without a trigonometric function, 8 a full turn. A shell's core is
-/// a disc of its own, whose rho is the distance at which a ray passes its middle: so begins the way through it at its edge.
+/// The disc's coordinates: v = sqrt(1 - rho/edge), 0 at the rim, where light ends like that root, and turn: y/x and
+/// -x/y in turn, from -1 to 1 in each quarter that is centred on half an axis; an angle without a trigonometric
+/// function, 8 a full turn. A shell's core is a disc of its own, whose rho is the distance at which a ray passes its
+/// middle: so begins the way through it at its edge.
 namespace disc {
-constexpr int kPanels = 4, kSectors = 8, kLevels = 7;  ///< squares of level 0; level l has 2^l times as many along either
+/// squares of level 0; level l has 2^l times as many along either
+constexpr int kPanels = 4, kSectors = 8, kLevels = 7;
 constexpr int panels(int level) { return kPanels << level; }
 constexpr int sectors(int level) { return kSectors << level; }
 
@@ -49,20 +51,23 @@ class DiscMap {
  public:
   DiscMap() = default;
   /// Of the squares of the core, or of the others.
-  explicit DiscMap(const std::vector<DiscSquare>& squares, bool of_core = false) : at_(static_cast<std::size_t>(kAcross * kAround), -1) {
+  explicit DiscMap(const std::vector<DiscSquare>& squares, bool of_core = false)
+      : at_(static_cast<std::size_t>(kAcross * kAround), -1) {
     for (std::size_t i = 0; i < squares.size(); ++i) {
       const DiscSquare& q = squares[i];
       if (q.of_core != of_core) continue;
       const int size = 1 << (disc::kLevels - 1 - q.level);
       for (int r = q.sector * size; r < (q.sector + 1) * size; ++r)
-        for (int c = q.panel * size; c < (q.panel + 1) * size; ++c) at_[static_cast<std::size_t>(r * kAcross + c)] = static_cast<int>(i);
+        for (int c = q.panel * size; c < (q.panel + 1) * size; ++c)
+          at_[static_cast<std::size_t>(r * kAcross + c)] = static_cast<int>(i);
     }
   }
   /// The square's number in the list, -1 where none covers the place, one a lane.
   template <class P>
   P find(const P& v, const P& turn) const {
     using std::floor;
-    const P column = min_of(max_of(floor(v * P(kAcross)), P(0.0)), P(kAcross - 1.0)), row = min_of(max_of(floor(turn * P(kAround / 8.0)), P(0.0)), P(kAround - 1.0));
+    const P column = min_of(max_of(floor(v * P(kAcross)), P(0.0)), P(kAcross - 1.0)),
+            row = min_of(max_of(floor(turn * P(kAround / 8.0)), P(0.0)), P(kAround - 1.0));
     const P cell = column + P(kAcross) * row;
     if constexpr (std::is_same_v<P, Pack>) {
       alignas(64) double which[kLanes];
@@ -83,11 +88,13 @@ class DiscMap {
 template <class P, class Mask, class F>
 void for_each_value(const P& values, const Mask& here, const F& f) {
   const P of_interest = select(here, values, P(1e300));
-  for (double next = smallest(of_interest); next < 1e300; next = smallest(select(of_interest > P(next), of_interest, P(1e300)))) f(next, of_interest == P(next));
+  for (double next = smallest(of_interest); next < 1e300;
+       next = smallest(select(of_interest > P(next), of_interest, P(1e300))))
+    f(next, of_interest == P(next));
 }
 
-/// Polynomials of degree 11 in v and in turn through 12 x 12 Chebyshev points of every smooth square. Derivatives by parameters
-/// are tabulated beside the values, those by place come from the polynomials.
+/// Polynomials of degree 11 in v and in turn through 12 x 12 Chebyshev points of every smooth square. Derivatives by
+/// parameters are tabulated beside the values, those by place come from the polynomials.
 template <class S>
 class PolarTable {
  public:
@@ -96,10 +103,12 @@ class PolarTable {
   using P = PlainOf<S>;
 
   PolarTable() = default;
-  /// light(square, v, cos, sin of the azimuth) at points of the disc, one a lane. What was smooth when it was planned need not be: a core's
-  /// edge, a pole may have come in since. Squares whose tail (chebyshev.h) exceeds `allowed` are left to rays.
+  /// light(square, v, cos, sin of the azimuth) at points of the disc, one a lane. What was smooth when it was planned
+  /// need not be: a core's edge, a pole may have come in since. Squares whose tail (chebyshev.h) exceeds `allowed` are
+  /// left to rays.
   template <class Light>
-  PolarTable(const std::vector<DiscSquare>& squares, double allowed, int threads, const Light& light) : squares_(squares), start_(squares.size(), -1) {
+  PolarTable(const std::vector<DiscSquare>& squares, double allowed, int threads, const Light& light)
+      : squares_(squares), start_(squares.size(), -1) {
     std::vector<int> list;
     for (std::size_t b = 0; b < squares.size(); ++b)
       if (squares[b].smooth) {
@@ -136,14 +145,17 @@ class PolarTable {
         return;
       }
       for (int plane = 0; plane < kPlanes; ++plane)
-        to_powers<kPoints>(values.data() + plane * kRays, coefficients_.data() + (static_cast<std::size_t>(i) * kPlanes + static_cast<std::size_t>(plane)) * kRays);
+        to_powers<kPoints>(
+            values.data() + plane * kRays,
+            coefficients_.data() + (static_cast<std::size_t>(i) * kPlanes + static_cast<std::size_t>(plane)) * kRays);
     });
     // Parameters that only move the disc have nothing here.
     for (int plane = 1; plane < kPlanes; ++plane) {
       double most = 0;
       for (std::size_t i = 0; i < list.size(); ++i) {
         const double* c = coefficients_.data() + (i * kPlanes + static_cast<std::size_t>(plane)) * kRays;
-        most = std::max(most, std::abs(*std::max_element(c, c + kRays, [](double x, double y) { return std::abs(x) < std::abs(y); })));
+        most = std::max(most, std::abs(*std::max_element(
+                                  c, c + kRays, [](double x, double y) { return std::abs(x) < std::abs(y); })));
       }
       if (most > 0) live_[static_cast<std::size_t>(count_++)] = plane;
     }
@@ -154,13 +166,15 @@ class PolarTable {
   struct Slopes {
     P by_v = P(0.0), by_turn = P(0.0);
   };
-  /// The light at v, turn where `here`, square by DiscMap::find, with the derivatives it has where it is; those that it owes to a place that
-  /// moves follow from `slopes`, which are left alone where S has no derivatives. Returns those of these lanes that lie in a square that is not smooth.
+  /// The light at v, turn where `here`, square by DiscMap::find, with the derivatives it has where it is; those that it
+  /// owes to a place that moves follow from `slopes`, which are left alone where S has no derivatives. Returns those of
+  /// these lanes that lie in a square that is not smooth.
   template <class Mask>
   Mask read(const P& square, const P& v, const P& turn, const Mask& here, S& out, Slopes& slopes) const {
     out = S(0.0);
     Mask left = here;
-    // Lanes are neighbours in the picture and mostly lie in one square: its coefficients are single numbers for all of them.
+    // Lanes are neighbours in the picture and mostly lie in one square: its coefficients are single numbers for all of
+    // them.
     for_each_value(square, here, [&](double number, const auto& in_it) {
       const int start = start_[static_cast<std::size_t>(number)];
       if (start < 0) return;
@@ -168,7 +182,8 @@ class PolarTable {
       const DiscSquare& q = squares_[static_cast<std::size_t>(number)];
       const double* c = coefficients_.data() + static_cast<std::size_t>(start) * (kPlanes * kRays);
       const double across = 2.0 * disc::panels(q.level), around = 0.25 * disc::sectors(q.level);
-      const P x = v * P(across) - P(2.0 * q.panel + 1), y = turn * P(around) - P(2.0 * q.sector + 1);  // in the square, each from -1 to 1
+      // in the square, each from -1 to 1
+      const P x = v * P(across) - P(2.0 * q.panel + 1), y = turn * P(around) - P(2.0 * q.sector + 1);
       if constexpr (kPlanes == 1) {
         out = select(in_it, polynomial(c, x, y), out);
       } else {

@@ -29,12 +29,12 @@ class RadialTable {
   /// evaluate(v, out): the functions at v (one a lane), out has `functions` places; called from `threads` threads.
   template <class Evaluate>
   RadialTable(int panels, int functions, int threads, const Evaluate& evaluate)
-      : panels_(panels),
-        plane_(static_cast<std::size_t>(functions) * kPoints) {
+      : panels_(panels), plane_(static_cast<std::size_t>(functions) * kPoints) {
     const ChebyshevRule<kPoints>& rule = chebyshev_rule<kPoints>();
     const int n = panels * kPoints;
     const std::size_t points = static_cast<std::size_t>(n);
-    std::vector<double> values(points * static_cast<std::size_t>(functions) * kPlanes);  // [plane][function][panel][point]
+    // [plane][function][panel][point]
+    std::vector<double> values(points * static_cast<std::size_t>(functions) * kPlanes);
     constexpr int kStep = kLanesOf<S>;
     parallel_for((n + kStep - 1) / kStep, threads, [&](int step) {
       const int first = step * kStep;
@@ -55,7 +55,8 @@ class RadialTable {
           const S& value = out[static_cast<std::size_t>(f)];
           values[at] = lane(plain(value), k);
           if constexpr (kPlanes > 1)
-            for (std::size_t j = 0; j + 1 < kPlanes; ++j) values[(j + 1) * points * static_cast<std::size_t>(functions) + at] = lane(value.d[j], k);
+            for (std::size_t j = 0; j + 1 < kPlanes; ++j)
+              values[(j + 1) * points * static_cast<std::size_t>(functions) + at] = lane(value.d[j], k);
         }
       }
     });
@@ -78,19 +79,22 @@ class RadialTable {
         if (size[static_cast<std::size_t>(f)] > 1e-15 * all) live = f + 1;
       if (plane == 0)
         live_ = live;
-      else if (live > 0 && !combination(values, points * static_cast<std::size_t>(functions), static_cast<int>(plane) - 1))
+      else if (live > 0 &&
+               !combination(values, points * static_cast<std::size_t>(functions), static_cast<int>(plane) - 1))
         (live <= 1 ? of_one_ : live <= 3 ? of_three_ : of_all_).add(static_cast<int>(plane) - 1);
     }
     directions_.clear();
   }
 
-  /// How far a polynomial of this degree is from a function at the worst: the sizes of its two highest Chebyshev coefficients together.
+  /// How far a polynomial of this degree is from a function at the worst: the sizes of its two highest Chebyshev
+  /// coefficients together.
   double tail() const {
     double worst = 0;
     for (std::size_t panel = 0; panel < static_cast<std::size_t>(panels_); ++panel)
       for (std::size_t f = 0; f < plane_; f += kPoints) {
         const double* c = coefficients_.data() + panel * kPlanes * plane_ + f;
-        worst = std::max(worst, std::ldexp(std::abs(c[kPoints - 1]), 2 - kPoints) + std::ldexp(std::abs(c[kPoints - 2]), 3 - kPoints));
+        worst = std::max(worst, std::ldexp(std::abs(c[kPoints - 1]), 2 - kPoints) +
+                                    std::ldexp(std::abs(c[kPoints - 2]), 3 - kPoints));
       }
     return worst;
   }
@@ -99,9 +103,9 @@ class RadialTable {
   struct Slopes {
     P by_v = P(0.0), turned = P(0.0);
   };
-  /// sum_k basis[k] f_k(v) over the F functions that were tabulated, with its derivatives at fixed v and basis; with `slopes` also
-  /// those, turned[k] in the place of basis[k]. v outside [0, 1] is extrapolated from the end panels. Functions after the last
-  /// one that is not negligible are left out.
+  /// sum_k basis[k] f_k(v) over the F functions that were tabulated, with its derivatives at fixed v and basis; with
+  /// `slopes` also those, turned[k] in the place of basis[k]. v outside [0, 1] is extrapolated from the end panels.
+  /// Functions after the last one that is not negligible are left out.
   template <int F>
   BIREFIT_INLINE S sum(const P& v, const P* basis, const P* turned = nullptr, Slopes* slopes = nullptr) const {
     if (F > 1 && live_ <= 1) return sum_of_live<1, F>(v, basis, turned, slopes);
@@ -111,8 +115,9 @@ class RadialTable {
 
  private:
   static constexpr std::size_t kPlanes = 1 + static_cast<std::size_t>(ScalarTraits<S>::derivatives);
-  /// Light knows fewer quantities than a scene has parameters: it does not tell size from wavelength, nor indices that all grow from
-  /// a shorter wavelength. A derivative that is a combination of earlier ones (to rounding, on all points) is not read but combined.
+  /// Light knows fewer quantities than a scene has parameters: it does not tell size from wavelength, nor indices that
+  /// all grow from a shorter wavelength. A derivative that is a combination of earlier ones (to rounding, on all
+  /// points) is not read but combined.
   bool combination(const std::vector<double>& values, std::size_t size, int j) {
     const auto plane = [&](int k) { return values.data() + (static_cast<std::size_t>(k) + 1) * size; };
     std::vector<double> rest(plane(j), plane(j) + size);
@@ -130,7 +135,8 @@ class RadialTable {
     if (!directions_.empty() && left <= 1e-11 * norm) {
       // As a difference of much larger ones it would be rounding.
       for (int k = 0; k < j; ++k)
-        if (std::abs(weights[static_cast<std::size_t>(k)]) * std::sqrt(dot(plane(k), plane(k))) > 1e3 * norm) return false;
+        if (std::abs(weights[static_cast<std::size_t>(k)]) * std::sqrt(dot(plane(k), plane(k))) > 1e3 * norm)
+          return false;
       for (int k = 0; k < j; ++k)
         if (const double w = weights[static_cast<std::size_t>(k)]; w != 0) combined_.push_back({j, k, w});
       return true;
@@ -191,7 +197,8 @@ class RadialTable {
     using std::floor;
     const P cell = min_of(max_of(floor(scaled), P(0.0)), P(panels_ - 1.0));
     const P x = P(2.0) * (scaled - cell) - P(1.0);
-    // Lanes are neighbours in the image and mostly lie on one panel: its coefficients are single numbers for all of them.
+    // Lanes are neighbours in the image and mostly lie on one panel: its coefficients are single numbers for all of
+    // them.
     double panel = smallest(cell);
     S total = on_panel<L, F>(panel, x, basis, turned, slopes);
     for (const double last = largest(cell); panel < last;) {
@@ -230,12 +237,13 @@ class RadialTable {
   }
 
   int panels_ = 0;
-  std::size_t plane_ = 0;                  ///< places of all functions of a plane
-  std::vector<double> coefficients_;       ///< [panel][plane][function][power], plane 0 the value
-  int live_ = 0;                           ///< functions up to the last whose values are not negligible
-  std::vector<Direction> directions_;      ///< of the derivatives that are read; only while the table is made
-  std::vector<Combined> combined_;         ///< derivatives that are not read
-  Planes of_one_, of_three_, of_all_;      ///< read derivatives of which the first one, three, all functions are not negligible
+  std::size_t plane_ = 0;              ///< places of all functions of a plane
+  std::vector<double> coefficients_;   ///< [panel][plane][function][power], plane 0 the value
+  int live_ = 0;                       ///< functions up to the last whose values are not negligible
+  std::vector<Direction> directions_;  ///< of the derivatives that are read; only while the table is made
+  std::vector<Combined> combined_;     ///< derivatives that are not read
+  /// read derivatives of which the first one, three, all functions are not negligible
+  Planes of_one_, of_three_, of_all_;
 };
 
 }  // namespace birefit

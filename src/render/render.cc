@@ -49,7 +49,8 @@ int samples_at(const RenderPlan& plan, double column, double row) {
   return plan.samples[std::min(bin, plan.samples.size() - 1)];
 }
 
-/// load_lanes(x + shift), shift = 0 to 4 and x at a register's boundary: two loads for all of them, none across a cache line's end.
+/// load_lanes(x + shift), shift = 0 to 4 and x at a register's boundary: two loads for all of them, none across a cache
+/// line's end.
 template <class P>
 BIREFIT_INLINE P load_shifted(const double* x, int shift) {
 #ifdef __AVX512F__
@@ -58,10 +59,14 @@ BIREFIT_INLINE P load_shifted(const double* x, int shift) {
     if (shift == 0) return _mm512_castsi512_pd(here);
     const __m512i next = _mm512_load_si512(x + kLanes);
     switch (shift) {
-      case 1: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 1));
-      case 2: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 2));
-      case 3: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 3));
-      default: return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 4));
+      case 1:
+        return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 1));
+      case 2:
+        return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 2));
+      case 3:
+        return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 3));
+      default:
+        return _mm512_castsi512_pd(_mm512_alignr_epi64(next, here, 4));
     }
   }
 #endif
@@ -90,7 +95,8 @@ template <class S, std::size_t N>
 BIREFIT_INLINE void store(const S& value, const std::array<double*, N>& out, int planes, int first, int count) {
   store_lanes(plain(value), out[0], first, count);
   if constexpr (ScalarTraits<S>::derivatives > 0)
-    for (int j = 1; j < planes; ++j) store_lanes(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)], first, count);
+    for (int j = 1; j < planes; ++j)
+      store_lanes(value.d[static_cast<std::size_t>(j - 1)], out[static_cast<std::size_t>(j)], first, count);
 }
 
 /// The value, or its derivative of number plane - 1.
@@ -102,10 +108,12 @@ const PlainOf<S>& plain_of_plane(const S& x, [[maybe_unused]] int plane) {
     return x;
 }
 
-/// samples_at() of a part of one row of the picture. Rings of equal samples are painted from the inside out; a root a ring and row instead of one a pixel.
+/// samples_at() of a part of one row of the picture. Rings of equal samples are painted from the inside out; a root a
+/// ring and row instead of one a pixel.
 class SampleRings {
  public:
-  explicit SampleRings(const RenderPlan& plan) : center_x_(plan.sampling_center_x_px), center_y_(plan.sampling_center_y_px) {
+  explicit SampleRings(const RenderPlan& plan)
+      : center_x_(plan.sampling_center_x_px), center_y_(plan.sampling_center_y_px) {
     rings_.push_back({0, plan.samples.empty() ? std::uint8_t{1} : static_cast<std::uint8_t>(plan.samples[0])});
     for (std::size_t i = 1; i < plan.samples.size(); ++i)
       if (plan.samples[i] != plan.samples[i - 1])
@@ -164,9 +172,10 @@ class NeededPoints {
   std::vector<std::uint8_t> near_, flags_;
 };
 
-/// What a thread works on: a band of rows with `reach` more on either side. Rows are counted from the band's first, columns from the picture's rim, which is as wide as
-/// that of the squares of a table: their runs begin at a register's boundary. Point values of
-/// the last rows are at row(field * planes + plane, r); one field, the intensity, or with plan.fringe_means the four of a FringePoint.
+/// What a thread works on: a band of rows with `reach` more on either side. Rows are counted from the band's first,
+/// columns from the picture's rim, which is as wide as that of the squares of a table: their runs begin at a register's
+/// boundary. Point values of the last rows are at row(field * planes + plane, r); one field, the intensity, or with
+/// plan.fringe_means the four of a FringePoint.
 class Band {
  public:
   static constexpr int kRim = FringeBlocks::kRim;
@@ -175,15 +184,20 @@ class Band {
   void resize(int width, int planes, int reach) {
     held_ = 2 * reach + 1;
     used_ = (static_cast<std::size_t>(width) + 2 * kRim + kLanes - 1) / kLanes * kLanes;
-    // A register more, and an odd number of cache lines: rows that begin at the same place of a page push each other out of the cache.
+    // A register more, and an odd number of cache lines: rows that begin at the same place of a page push each other
+    // out of the cache.
     constexpr std::size_t kLine = 8;
     wide_ = ((used_ + kLanes + kLine - 1) / kLine | 1) * kLine;
     plane_ = wide_ * static_cast<std::size_t>(held_);
     points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes)));
     samples_.resize(wide_ * (kRows + 4 * kRim));
   }
-  double* row(int plane, int r) { return points_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>((r + held_) % held_) * wide_; }
-  /// Makes zeros of all of a row that is not computed: what is left of another picture would steer whole registers (PixelMoments). Without `gaps` that is what lies beyond its end.
+  double* row(int plane, int r) {
+    return points_.data() + static_cast<std::size_t>(plane) * plane_ +
+           static_cast<std::size_t>((r + held_) % held_) * wide_;
+  }
+  /// Makes zeros of all of a row that is not computed: what is left of another picture would steer whole registers
+  /// (PixelMoments). Without `gaps` that is what lies beyond its end.
   void clear(int plane, int r, bool gaps) { std::fill(row(plane, r) + (gaps ? 0 : used_), row(plane, r) + wide_, 0.0); }
   /// Samples of row r, from -2 kRim on.
   std::uint8_t* samples(int r) { return samples_.data() + static_cast<std::size_t>(r + 2 * kRim) * wide_; }
@@ -203,7 +217,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
   const Values<S> value(theta, active);
   std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
   constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives, kRim = Band::kRim;
-  const int w = scene.view.width, h = scene.view.height, wide = w + 2 * kRim, planes = static_cast<int>(active.size()) + 1;
+  const int w = scene.view.width, h = scene.view.height, wide = w + 2 * kRim,
+            planes = static_cast<int>(active.size()) + 1;
   using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
   model->tabulate(PixelModel<S>::Wanted::picture, threads);
   const bool in_phase = model->in_phase();
@@ -211,7 +226,9 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
   std::array<FringeFields, static_cast<std::size_t>(kPlanes)> fields_of{};
   for (int p = 0; p < kPlanes; ++p) fields_of[static_cast<std::size_t>(p)] = model->fringe_fields(p);
   // Flows read two pixels beyond (fringe.h).
-  const int reach = std::any_of(fields_of.begin(), fields_of.end(), [](const FringeFields& f) { return f.flow.has_value(); }) ? kRim : 1;
+  const int reach =
+      std::any_of(fields_of.begin(), fields_of.end(), [](const FringeFields& f) { return f.flow.has_value(); }) ? kRim
+                                                                                                                : 1;
   const SampleRings rings(plan);
   parallel_for(planes, threads, [&](int p) {
     Image& image = *images[static_cast<std::size_t>(p)];
@@ -230,7 +247,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     thread_local NeededPoints needed;
     const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
     band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes, reach);
-    for (int r = -2 * reach; r < rows + 2 * reach; ++r) rings.fill(std::clamp(top + r, -reach, h - 1 + reach), -kRim, band.samples(r), wide);
+    for (int r = -2 * reach; r < rows + 2 * reach; ++r)
+      rings.fill(std::clamp(top + r, -reach, h - 1 + reach), -kRim, band.samples(r), wide);
     if (model->edges() > 0) {
       thread_local EdgeMarks marks;
       marks.look(*model, top - 2 * reach, rows + 4 * reach, -kRim, wide);
@@ -238,7 +256,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     }
     FringeScratch scratch;
     const auto compute = [&](int r) {
-      needed.find(reach, [&](int k) { return band.samples(r + k); }, wide);
+      needed.find(
+          reach, [&](int k) { return band.samples(r + k); }, wide);
       std::array<double*, static_cast<std::size_t>(4 * kPlanes)> fields;
       if (plan.fringe_means)
         for (int f = 0; f < 4; ++f) band.clear(f * kPlanes, r, !needed.all());
@@ -251,7 +270,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
           }
         }
         if (!needed.any(c0, std::min(kStep, wide - c0))) continue;
-        const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0 * kRim), row(static_cast<double>(top + r));
+        const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0 * kRim),
+                         row(static_cast<double>(top + r));
         const auto put = [&](const S& v, int field) {
           Targets out;
           for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
@@ -276,13 +296,20 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
         // Where rows begin is asked for once: a pack reads dozens of them.
         std::array<std::array<const double*, 2 * kRim + 1>, static_cast<std::size_t>(4 * kPlanes)> from;
         for (std::size_t p = 0; p < from.size(); ++p)
-          for (int j = -kRim; j <= kRim; ++j) from[p][static_cast<std::size_t>(j + kRim)] = band.row(static_cast<int>(p), r + j);
+          for (int j = -kRim; j <= kRim; ++j)
+            from[p][static_cast<std::size_t>(j + kRim)] = band.row(static_cast<int>(p), r + j);
         const PlainOf<S> row(static_cast<double>(top + r));
         const Targets to = targets(0);
         for (int c0 = 0; c0 < w; c0 += kStep) {
           using P = PlainOf<S>;
-          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA { return load_shifted<P>(from[static_cast<std::size_t>(field * kPlanes + plane)][static_cast<std::size_t>(j + kRim)] + c0, i + kRim); };
-          const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA { store_lanes(mean, to[static_cast<std::size_t>(plane)] + c0, 0, std::min(kStep, w - c0)); };
+          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA {
+            return load_shifted<P>(
+                from[static_cast<std::size_t>(field * kPlanes + plane)][static_cast<std::size_t>(j + kRim)] + c0,
+                i + kRim);
+          };
+          const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA {
+            store_lanes(mean, to[static_cast<std::size_t>(plane)] + c0, 0, std::min(kStep, w - c0));
+          };
           const P column = load_lanes<P>(kCount.data()) + P(static_cast<double>(c0));
           const auto means = [&]<bool kQuadrature, bool kFlows>() BIREFIT_INLINE_LAMBDA {
             fringe_means<kQuadrature, kFlows, kPlanes, P>(planes, traits, column, row, fields_of.data(), load, put);
@@ -302,7 +329,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
         }
       } else {
         for (int p = 0; p < planes; ++p) {
-          const double *up = band.row(p, r - 1) + kRim, *here = band.row(p, r) + kRim, *down = band.row(p, r + 1) + kRim;
+          const double *up = band.row(p, r - 1) + kRim, *here = band.row(p, r) + kRim,
+                       *down = band.row(p, r + 1) + kRim;
           double* out = images[static_cast<std::size_t>(p)]->row(top + r);
           // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
           for (int c = 0; c < w; ++c)
@@ -316,9 +344,12 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
       std::array<int, 9> count{};
       const auto flush = [&](std::size_t most) {
         double columns[kLanes];
-        for (int k = 0; k < kStep; ++k) columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
-        const S v = mean_over_pixels(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(top + r)), static_cast<int>(most));
-        for (int k = 0; k < count[most]; ++k) store(v, targets(waiting[most][static_cast<std::size_t>(k)]), planes, k, 1);
+        for (int k = 0; k < kStep; ++k)
+          columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
+        const S v = mean_over_pixels(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(top + r)),
+                                     static_cast<int>(most));
+        for (int k = 0; k < count[most]; ++k)
+          store(v, targets(waiting[most][static_cast<std::size_t>(k)]), planes, k, 1);
         count[most] = 0;
       };
       for (int c = 0; c < w; ++c) {
@@ -340,7 +371,8 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
     };
     const auto add_passing = [&](int r) {
       for (int c0 = 0; c0 < w; c0 += kStep) {
-        const S v = model->passing(load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(static_cast<double>(c0)), PlainOf<S>(static_cast<double>(top + r)));
+        const S v = model->passing(load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(static_cast<double>(c0)),
+                                   PlainOf<S>(static_cast<double>(top + r)));
         for (int p = 0; p < planes; ++p) {
           const PlainOf<S>* light = &plain_of_plane(v, p);
           double* out = images[static_cast<std::size_t>(p)]->row(top + r) + c0;
@@ -394,9 +426,12 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   const auto put = [&](std::size_t pixel, const S& v, int k) {
     out.intensity(static_cast<Eigen::Index>(pixel)) = lane(plain(v), k);
     if constexpr (ScalarTraits<S>::derivatives > 0)
-      for (std::size_t j = 0; j < active.size(); ++j) out.derivatives(static_cast<Eigen::Index>(pixel), first_column + static_cast<int>(j)) = lane(v.d[j], k);
+      for (std::size_t j = 0; j < active.size(); ++j)
+        out.derivatives(static_cast<Eigen::Index>(pixel), first_column + static_cast<int>(j)) = lane(v.d[j], k);
   };
-  const int edges = static_cast<int>(std::count_if(samples.begin(), samples.end(), [](std::uint8_t k) { return (k & kEdgePixel) != 0; })), groups = (n - edges + kStep - 1) / kStep;
+  const int edges = static_cast<int>(
+                std::count_if(samples.begin(), samples.end(), [](std::uint8_t k) { return (k & kEdgePixel) != 0; })),
+            groups = (n - edges + kStep - 1) / kStep;
   parallel_for(edges, threads, [&](int i) {
     const std::size_t pixel = order[static_cast<std::size_t>(i)];
     S v = mean_over_cut_pixel(*model, plan, pixels[pixel][0], pixels[pixel][1]);
@@ -434,19 +469,22 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
 /// Of points one by one, and of a picture: eight where they are read from a table.
 std::size_t derivatives_at_once(const RenderPlan& plan) { return plan.radial_panels > 0 ? 8 : 4; }
 std::size_t derivatives_of_picture(const RenderPlan& plan) {
-  const bool all_from_squares = !plan.fringe_blocks.empty() && std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) == plan.fringe_blocks.end();
+  const bool all_from_squares =
+      !plan.fringe_blocks.empty() &&
+      std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) == plan.fringe_blocks.end();
   return all_from_squares ? 8 : derivatives_at_once(plan);
 }
 
-/// Calls body<S>(chunk, first) for the active parameters in chunks of at most `most` (4 or 8) derivatives a pass: every pass
-/// computes the values, too.
+/// Calls body<S>(chunk, first) for the active parameters in chunks of at most `most` (4 or 8) derivatives a pass: every
+/// pass computes the values, too.
 template <class Body>
 void in_chunks(const std::vector<int>& active, std::size_t most, const Body& body) {
   std::size_t first = 0;
   while (first < active.size()) {
     const std::size_t left = active.size() - first;
     const std::size_t take = std::min(left, most);
-    const std::vector<int> chunk(active.begin() + static_cast<long>(first), active.begin() + static_cast<long>(first + take));
+    const std::vector<int> chunk(active.begin() + static_cast<long>(first),
+                                 active.begin() + static_cast<long>(first + take));
     if (take > 4)
       body.template operator()<Dual8>(chunk, static_cast<int>(first));
     else if (take > 2)
@@ -471,7 +509,8 @@ void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, cons
   }
   in_chunks(active, derivatives_of_picture(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
     std::vector<Image*> images{&into.intensity};
-    for (std::size_t j = 0; j < chunk.size(); ++j) images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
+    for (std::size_t j = 0; j < chunk.size(); ++j)
+      images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
     render_planes<S>(scene, plan, theta, chunk, threads, images);
   });
 }
@@ -491,7 +530,8 @@ Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& the
 }
 
 bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::vector<std::array<int, 2>>& pixels) {
-  const double all = static_cast<double>(scene.view.width) * scene.view.height, count = static_cast<double>(pixels.size());
+  const double all = static_cast<double>(scene.view.width) * scene.view.height,
+               count = static_cast<double>(pixels.size());
   if (2 * count > all) return true;
   const bool blocks = !plan.fringe_blocks.empty(), squares = !plan.disc.empty();
   if (pixels.empty() || plan.wave || !(blocks || squares)) return false;
@@ -510,8 +550,10 @@ bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::v
     left = 1 - smooth / static_cast<double>(plan.fringe_blocks.size());
   } else {
     for (const DiscSquare& q : plan.disc) {
-      if (q.smooth) tables += PolarTable<Pack>::kRays;
-      else left += q.points / (all * rays);
+      if (q.smooth)
+        tables += PolarTable<Pack>::kRays;
+      else
+        left += q.points / (all * rays);
     }
   }
   constexpr double kReading = 0.05;  // of a ray's time, a pixel
@@ -530,7 +572,8 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const auto [column, row] = pixels[i];
       out.intensity[static_cast<long>(i)] = all.intensity(column, row);
-      for (std::size_t j = 0; j < active.size(); ++j) out.derivatives(static_cast<long>(i), static_cast<long>(j)) = all.derivatives[j](column, row);
+      for (std::size_t j = 0; j < active.size(); ++j)
+        out.derivatives(static_cast<long>(i), static_cast<long>(j)) = all.derivatives[j](column, row);
     }
     return out;
   }
@@ -546,7 +589,8 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   const Values<double> value(theta, {});
   if (scene.ceiling == Ceiling::wave)
-    throw UserError(Where{}, "under ceiling: wave a point of the image has no Jones matrix of its own ray", "use `render`, or ceiling: one_way");
+    throw UserError(Where{}, "under ceiling: wave a point of the image has no Jones matrix of its own ray",
+                    "use `render`, or ceiling: one_way");
   const double wavelength_nm = value(scene.microscope.wavelength_nm);
   std::vector<JonesRow> rows;
   // From the lab's x, y to the s, p pair of azimuth a: p = (cos a, sin a), s = (-sin a, cos a).
@@ -567,7 +611,8 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
     row.pp = element(p, p);
     rows.push_back(row);
   };
-  if (is_ring_table(scene)) throw UserError(Where{}, "a table of rings has no Jones matrices", "give the plate view: {half_angle_deg} instead");
+  if (is_ring_table(scene))
+    throw UserError(Where{}, "a table of rings has no Jones matrices", "give the plate view: {half_angle_deg} instead");
   const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
   if (std::holds_alternative<Slab>(scene.sample) && !half_angle) {
     const PlanarOptics<double> optics = planar_optics(scene, value);
@@ -589,7 +634,10 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
   const Mesh mesh = plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh;
   if (std::holds_alternative<Droplet>(scene.sample)) {
     if (scene.rays == Rays::eikonal)
-      throw UserError(Where{}, "the two polarizations that curved rays bring to one place came by different ways: no Jones matrix of one ray", "use `render`, or physics.rays: straight");
+      throw UserError(Where{},
+                      "the two polarizations that curved rays bring to one place came by different ways: no Jones "
+                      "matrix of one ray",
+                      "use `render`, or physics.rays: straight");
     const DropletOptics<double> optics = droplet_optics(scene, value);
     const RimTable rim(optics.ratio, optics.n_host, scene.microscope.objective_na);
     const TransportMethod<double>& method = transport_method<double>(plan.method);
@@ -608,7 +656,9 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
         }
         if (ball) {
           const double edge = optics.radius_um * rim.rho_max();
-          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method, ball_mesh(*ball, steps.at(rho / edge, x, y))), 0, row);
+          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method,
+                                 ball_mesh(*ball, steps.at(rho / edge, x, y))),
+              0, row);
           continue;
         }
         // droplet_jones is in (p, s) = (radial, azimuthal): turn it into x, y.
@@ -624,7 +674,9 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
     const VolumeOptics<double> optics(scene, value);
     const Mesh layers = plan.mesh.empty() ? uniform_mesh(plan.steps, optics.breaks) : plan.mesh;
     for (int r = 0; r < h; ++r)
-      for (int c = 0; c < w; ++c) add(volume_jones(optics, c, r, transport_method<double>(plan.method), layers), 0, {.theta_deg = 0, .azimuth_deg = 0, .row = r, .column = c});
+      for (int c = 0; c < w; ++c)
+        add(volume_jones(optics, c, r, transport_method<double>(plan.method), layers), 0,
+            {.theta_deg = 0, .azimuth_deg = 0, .row = r, .column = c});
     return rows;
   }
   if (std::holds_alternative<Crystal>(scene.sample))

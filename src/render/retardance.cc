@@ -19,7 +19,8 @@ S path_um(const Column<S>& column, int steps) {
   std::vector<OpticalPoint<S>> points(u.size());
   column.sample(u, points.data());
   S path(0.0);
-  for (std::size_t i = 0; i < u.size(); ++i) path = path + weight[i] * (points[i].depth_slope_um * retardance_per_length(points[i]));
+  for (std::size_t i = 0; i < u.size(); ++i)
+    path = path + weight[i] * (points[i].depth_slope_um * retardance_per_length(points[i]));
   return path;
 }
 
@@ -29,7 +30,8 @@ class RetardanceModel final : public PixelModel<S> {
   RetardanceModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
     value_ = path_um(*planar_optics(scene, value).column, plan.steps);
     if (plan.observable.quantity == Quantity::retardance_waves) value_ = value_ / wavelength_um(scene, value);
-    if (plan.observable.quantity == Quantity::birefringence) value_ = value_ / value(std::get<Cell>(scene.sample).thickness_um);
+    if (plan.observable.quantity == Quantity::birefringence)
+      value_ = value_ / value(std::get<Cell>(scene.sample).thickness_um);
   }
   S intensity(const PlainOf<S>&, const PlainOf<S>&) const override { return value_; }
 
@@ -42,7 +44,8 @@ class RetardanceModel final : public PixelModel<S> {
 RenderPlan plan_retardance(const Scene& scene, const Values<double>& value) {
   const PlanarOptics<double> optics = planar_optics(scene, value);
   if (!std::holds_alternative<Cell>(scene.sample) || !optics.column->planar)
-    throw UserError(Where{}, "a retardance is that of a cell whose axis does not turn about the light", "give the signal as an intensity");
+    throw UserError(Where{}, "a retardance is that of a cell whose axis does not turn about the light",
+                    "give the signal as an intensity");
   RenderPlan plan;
   plan.method = "diagonal";
   // The two indices' difference is what is asked for: relative to itself, of whatever sign and size.
@@ -55,15 +58,18 @@ RenderPlan plan_retardance(const Scene& scene, const Values<double>& value) {
     plan.steps *= 2;
     now = finer;
   }
-  plan.reasons.push_back(fmt::format("the retardance itself is asked for: the integral of the difference of the indices, {} nodes", 8 * plan.steps));
+  plan.reasons.push_back(fmt::format(
+      "the retardance itself is asked for: the integral of the difference of the indices, {} nodes", 8 * plan.steps));
   return plan;
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_retardance_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+std::unique_ptr<PixelModel<S>> make_retardance_model(const Scene& scene, const RenderPlan& plan,
+                                                     const Values<S>& value) {
   return std::make_unique<RetardanceModel<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S) template std::unique_ptr<PixelModel<S>> make_retardance_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S) \
+  template std::unique_ptr<PixelModel<S>> make_retardance_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -5,7 +5,8 @@
 
 namespace birefit {
 
-/// Nodes that hold the retardance to rounding. Throws UserError where the axis turns about the light: there it is not one number.
+/// Nodes that hold the retardance to rounding. Throws UserError where the axis turns about the light: there it is not
+/// one number.
 RenderPlan plan_retardance(const Scene&, const Values<double>&);
 template <class S>
 std::unique_ptr<PixelModel<S>> make_retardance_model(const Scene&, const RenderPlan&, const Values<S>&);

@@ -53,7 +53,8 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_ring_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   return std::make_unique<RingModel<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S) template std::unique_ptr<PixelModel<S>> make_ring_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S) \
+  template std::unique_ptr<PixelModel<S>> make_ring_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -5,17 +5,17 @@
 
 namespace birefit {
 
-/// kappa^2 (squared tangential wavevector, units of k0) of the direction where the two waves leave a plate cut normal to its axis
-/// with a path difference of `path` = order x wavelength / thickness. From n_o sqrt(1 - k/n_e^2) - sqrt(n_o^2 - k) = path, squared
-/// twice; exact, the same for both signs of n_e - n_o, which must not be 0.
+/// kappa^2 (squared tangential wavevector, units of k0) of the direction where the two waves leave a plate cut normal
+/// to its axis with a path difference of `path` = order x wavelength / thickness. From n_o sqrt(1 - k/n_e^2) -
+/// sqrt(n_o^2 - k) = path, squared twice; exact, the same for both signs of n_e - n_o, which must not be 0.
 template <class S>
 S ring_kappa_squared(const S& n_o, const S& n_e, const S& path) {
   const S ratio = n_o / n_e, g = ratio * ratio - 1.0, d = path * path;
   return (2.0 * sqrt(S((1.0 + g) * d * d + g * g * n_o * n_o * d)) - (g + 2.0) * d) / (g * g);
 }
 
-/// Where such a direction meets a screen at `distance` from the middle of the plate of `thickness`, for the ordinary ray through
-/// the plate's middle; any unit of length. The outside has the index n_host.
+/// Where such a direction meets a screen at `distance` from the middle of the plate of `thickness`, for the ordinary
+/// ray through the plate's middle; any unit of length. The outside has the index n_host.
 template <class S>
 S ring_radius(const S& n_o, const S& kappa_squared, const S& n_host, const S& thickness, const S& distance) {
   const S outside = sqrt(S(kappa_squared / (n_host * n_host - kappa_squared)));

@@ -1,5 +1,6 @@
 #pragma once
-// Pictures that are the same all around a centre: sums of a few functions of the radius times cosines and sines of the azimuth.
+// Pictures that are the same all around a centre: sums of a few functions of the radius times cosines and sines of the
+// azimuth.
 
 #include <algorithm>
 #include <array>
@@ -44,26 +45,35 @@ class CentredView {
  public:
   using P = PlainOf<S>;
   CentredView(const Scene& scene, const Values<S>& value)
-      : pixel_um_(scene.view.pixel_size_um), center_x_(plain(value(scene.view.center_x_px))), center_y_(plain(value(scene.view.center_y_px))), by_center_x_(value(scene.view.center_x_px)),
+      : pixel_um_(scene.view.pixel_size_um),
+        center_x_(plain(value(scene.view.center_x_px))),
+        center_y_(plain(value(scene.view.center_y_px))),
+        by_center_x_(value(scene.view.center_x_px)),
         by_center_y_(value(scene.view.center_y_px)) {}
   struct Place {
     P x, y;         ///< right and up from the centre, um
     P inverse_rho;  ///< 1/um
     P rho_um;
   };
-  Place at(const P& column, const P& row) const { return around((column - center_x_) * P(pixel_um_), (center_y_ - row) * P(pixel_um_)); }
+  Place at(const P& column, const P& row) const {
+    return around((column - center_x_) * P(pixel_um_), (center_y_ - row) * P(pixel_um_));
+  }
   static Place around(const P& x, const P& y) {
     const P rho2 = x * x + y * y + P(1e-18), over = inverse_root(rho2);
     return {x, y, over, rho2 * over};
   }
-  /// Adds the derivatives that light has because its place moves, from its slopes by the radius (um) and by the azimuth.
+  /// Adds the derivatives that light has because its place moves, from its slopes by the radius (um) and by the
+  /// azimuth.
   void add_moves(const Place& p, const P& by_rho, const P& by_azimuth, S& light) const {
-    const P outwards = by_rho * p.inverse_rho * P(pixel_um_), around = by_azimuth * P(pixel_um_) * p.inverse_rho * p.inverse_rho;
+    const P outwards = by_rho * p.inverse_rho * P(pixel_um_),
+            around = by_azimuth * P(pixel_um_) * p.inverse_rho * p.inverse_rho;
     by_center_x_.add(around * p.y - outwards * p.x, light);
     by_center_y_.add(around * p.x + outwards * p.y, light);
   }
   double pixel_um() const { return pixel_um_; }
-  EdgeCircle circle(const S& radius_um) const { return {lane(center_x_, 0), lane(center_y_, 0), lane(plain(radius_um), 0) / pixel_um_}; }
+  EdgeCircle circle(const S& radius_um) const {
+    return {lane(center_x_, 0), lane(center_y_, 0), lane(plain(radius_um), 0) / pixel_um_};
+  }
   /// 1 - (rho/radius)^2, with its derivatives.
   S within(const P& column, const P& row, const S& inverse_radius, const Sensitivity<S>& by_inverse_radius) const {
     const Place p = at(column, row);
@@ -80,7 +90,8 @@ class CentredView {
   Sensitivity<S> by_center_x_, by_center_y_;
 };
 
-/// The same of light that is sum_k basis_k f_k(radius), basis = (q^2, q, 1, s, q s) with q, s = cos, sin of (2 azimuth - analyser - polarizer).
+/// The same of light that is sum_k basis_k f_k(radius), basis = (q^2, q, 1, s, q s) with q, s = cos, sin of (2 azimuth
+/// - analyser - polarizer).
 template <class S>
 class RoundView : public CentredView<S> {
  public:
@@ -96,13 +107,16 @@ class RoundView : public CentredView<S> {
   };
   Place at(const P& column, const P& row) const {
     Place p{CentredView<S>::at(column, row), {}, {}};
-    const P square = p.inverse_rho * p.inverse_rho, c2 = (p.x * p.x - p.y * p.y) * square, s2 = P(2.0) * p.x * p.y * square;
+    const P square = p.inverse_rho * p.inverse_rho, c2 = (p.x * p.x - p.y * p.y) * square,
+            s2 = P(2.0) * p.x * p.y * square;
     p.q = cos_sum_ * c2 + sin_sum_ * s2, p.s = cos_sum_ * s2 - sin_sum_ * c2;
     return p;
   }
   static std::array<P, kMostTerms> basis(const Place& p) { return {p.q * p.q, p.q, P(1.0), p.s, p.q * p.s}; }
   /// Its derivative by 2 azimuth: q' = -s, s' = q.
-  static std::array<P, kMostTerms> turned(const Place& p) { return {P(-2.0) * p.q * p.s, -p.s, P(0.0), p.q, p.q * p.q - p.s * p.s}; }
+  static std::array<P, kMostTerms> turned(const Place& p) {
+    return {P(-2.0) * p.q * p.s, -p.s, P(0.0), p.q, p.q * p.q - p.s * p.s};
+  }
   /// by_angle: the slope by 2 azimuth, with which the polarizers turn.
   void add_moves_and_turns(const Place& p, const P& by_rho, const P& by_angle, S& light) const {
     this->add_moves(p, by_rho, P(2.0) * by_angle, light);
@@ -114,7 +128,8 @@ class RoundView : public CentredView<S> {
   Sensitivity<S> by_sum_;
 };
 
-/// The part of a unit square about (x, y) that lies within a circle of `radius` about the origin, and its derivatives by these three.
+/// The part of a unit square about (x, y) that lies within a circle of `radius` about the origin, and its derivatives
+/// by these three.
 struct SquareInCircle {
   double area = 0, by_x = 0, by_y = 0, by_radius = 0;
   SquareInCircle(double x, double y, double radius) {
@@ -122,20 +137,23 @@ struct SquareInCircle {
     const auto half_chord = [&](double a) { return std::sqrt(std::max(0.0, (radius - a) * (radius + a))); };
     // The integral from 0 to b of min(height, half_chord), odd in either.
     const auto below = [&](double b, double height) {
-      const double sign = (b < 0 ? -1 : 1) * (height < 0 ? -1 : 1), h = std::min(std::abs(height), radius), to = std::min(std::abs(b), radius), flat = half_chord(h);
+      const double sign = (b < 0 ? -1 : 1) * (height < 0 ? -1 : 1), h = std::min(std::abs(height), radius),
+                   to = std::min(std::abs(b), radius), flat = half_chord(h);
       if (to <= flat) return sign * h * to;
       // Two triangles and the sector between them; by small angles, where a large circle all but touches a side.
       const double at_end = half_chord(to);
       return sign * 0.5 * (h * flat + to * at_end + r2 * (std::atan2(h, flat) - std::atan2(at_end, to)));
     };
     area = below(right, high) - below(left, high) - below(right, low) + below(left, low);
-    // What a side that moves outwards takes in is as much of it as lies within the circle; all of the area's change by the radius follows, as areas go
-    // with the square of lengths: 2 area = radius by_radius + the sides' distances from the origin times these lengths.
+    // What a side that moves outwards takes in is as much of it as lies within the circle; all of the area's change by
+    // the radius follows, as areas go with the square of lengths: 2 area = radius by_radius + the sides' distances from
+    // the origin times these lengths.
     const auto within = [&](double side, double from, double to) {
       const double h = half_chord(side);
       return std::clamp(to, -h, h) - std::clamp(from, -h, h);
     };
-    const double at_right = within(right, low, high), at_left = within(left, low, high), at_high = within(high, left, right), at_low = within(low, left, right);
+    const double at_right = within(right, low, high), at_left = within(left, low, high),
+                 at_high = within(high, left, right), at_low = within(low, left, right);
     by_x = at_right - at_left, by_y = at_high - at_low;
     by_radius = (2 * area - right * at_right + left * at_left - high * at_high + low * at_low) / radius;
   }
@@ -147,7 +165,8 @@ class PassingLight {
  public:
   using P = PlainOf<S>;
   PassingLight() = default;
-  PassingLight(double pixel_um, const S& radius_um, const S& cos_between) : pixel_um_(pixel_um), radius_px_(radius_um * (1 / pixel_um)), open_(cos_between * cos_between) {
+  PassingLight(double pixel_um, const S& radius_um, const S& cos_between)
+      : pixel_um_(pixel_um), radius_px_(radius_um * (1 / pixel_um)), open_(cos_between * cos_between) {
     dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
   }
   bool dark() const { return dark_; }
@@ -175,7 +194,8 @@ class PassingLight {
       const P x = load(by_x), y = load(by_y);
       for (std::size_t j = 0; j < inside.d.size(); ++j) inside.d[j] = load(by_radius) * radius_px_.d[j];
       // From x, y to the radius and the azimuth, by which add_moves() asks.
-      view.add_moves(place, (x * place.x + y * place.y) * place.inverse_rho * per_pixel, (y * place.x - x * place.y) * per_pixel, inside);
+      view.add_moves(place, (x * place.x + y * place.y) * place.inverse_rho * per_pixel,
+                     (y * place.x - x * place.y) * per_pixel, inside);
     }
     return open_ * (S(P(1.0)) - inside);
   }

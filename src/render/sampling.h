@@ -13,21 +13,24 @@ namespace birefit {
 inline constexpr std::array<int, 13> kPointsASide{1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96};
 inline constexpr int kMostPoints = kPointsASide.back();
 
-/// As many for a retardance phase that changes by `radians` across the pixel, so that the pixel's mean of (1 - cos)/2 is within about half of
-/// `accuracy`: 1 with the second-order correction (error radians^4 / 680), n Gauss points otherwise, whose error is
-/// (n!)^4 / ((2n + 1) (2n)!^3) of the derivative of order 2n (Abramowitz & Stegun, 25.4.30), radians^(2n) / 2.
+/// As many for a retardance phase that changes by `radians` across the pixel, so that the pixel's mean of (1 - cos)/2
+/// is within about half of `accuracy`: 1 with the second-order correction (error radians^4 / 680), n Gauss points
+/// otherwise, whose error is (n!)^4 / ((2n + 1) (2n)!^3) of the derivative of order 2n (Abramowitz & Stegun, 25.4.30),
+/// radians^(2n) / 2.
 inline int samples_for(double radians, double accuracy) {
   if (std::pow(radians, 4) < 256 * accuracy) return 1;
   const auto log_factorial = [](int n) { return std::lgamma(n + 1.0); };
   for (const int n : kPointsASide) {
     if (n == 1) continue;
-    const double log_error = 4 * log_factorial(n) - 3 * log_factorial(2 * n) - std::log(2 * n + 1.0) + 2 * n * std::log(radians);
+    const double log_error =
+        4 * log_factorial(n) - 3 * log_factorial(2 * n) - std::log(2 * n + 1.0) + 2 * n * std::log(radians);
     if (log_error < std::log(accuracy)) return n;
   }
   return kMostPoints;
 }
 
-/// Points of a round picture's pixels within each radius, 0, 1, 2 .. bins of `samples` (points per pixel side, by radius).
+/// Points of a round picture's pixels within each radius, 0, 1, 2 .. bins of `samples` (points per pixel side, by
+/// radius).
 inline std::vector<double> points_within(const std::vector<int>& samples, double bin_px) {
   std::vector<double> inside{0};
   for (std::size_t i = 0; i < samples.size(); ++i) {

@@ -9,7 +9,8 @@
 namespace birefit {
 
 template <class S>
-VolumeOptics<S>::VolumeOptics(const Scene& scene, const Values<S>& value) : grid(std::get<SampledVolume>(scene.sample).grid) {
+VolumeOptics<S>::VolumeOptics(const Scene& scene, const Values<S>& value)
+    : grid(std::get<SampledVolume>(scene.sample).grid) {
   const S scale = value.get(std::get<SampledVolume>(scene.sample).scale, 1.0);
   const Indices<S> n = material_indices<S>(scene.material, value, wavelength_um(scene, value));
   n_o = n.ordinary;
@@ -27,12 +28,14 @@ VolumeOptics<S>::VolumeOptics(const Scene& scene, const Values<S>& value) : grid
 }
 
 template <class S>
-Su2<S> volume_retarder(const VolumeOptics<S>& o, const S& x, const S& y, const TransportMethod<S>& method, const Mesh& mesh) {
+Su2<S> volume_retarder(const VolumeOptics<S>& o, const S& x, const S& y, const TransportMethod<S>& method,
+                       const Mesh& mesh) {
   const VolumeColumn<S> column(*o.grid, o.breaks, x, y, o.cos_turn, o.sin_turn, o.n_o, o.birefringence, o.depth_um);
   return method.retarder(column, {o.k0, S(0.0), S(0.0), o.continuity}, mesh);
 }
 
-Mat2<double> volume_jones(const VolumeOptics<double>& o, double column, double row, const TransportMethod<double>& method, const Mesh& mesh) {
+Mat2<double> volume_jones(const VolumeOptics<double>& o, double column, double row,
+                          const TransportMethod<double>& method, const Mesh& mesh) {
   double x, y;
   o.place(column, row, x, y);
   if (!(x >= 0 && y >= 0 && x <= o.grid->nx - 1 && y <= o.grid->ny - 1)) return Mat2<double>::identity();
@@ -55,7 +58,8 @@ std::vector<double> volume_phases(const VolumeOptics<double>& o, int rays, doubl
     const VolumeColumn<double> column(*o.grid, o.breaks, x + dx, y + dy, 1.0, 0.0, o.n_o, o.birefringence, o.depth_um);
     column.sample(u, p.data());
     double sum = 0;
-    for (const auto& point : p) sum += retardance_per_length(point) * point.depth_slope_um / static_cast<double>(p.size());
+    for (const auto& point : p)
+      sum += retardance_per_length(point) * point.depth_slope_um / static_cast<double>(p.size());
     phases.push_back(o.k0 * sum);
   }
   return phases;
@@ -94,7 +98,8 @@ class VolumeModel final : public PixelModel<S> {
     const auto beside = plain(x) < P(0.0) || plain(y) < P(0.0) || plain(x) > right || plain(y) > top;
     const S inside_x = select(beside, S(0.0), x), inside_y = select(beside, S(0.0), y);
     const Mat2<S> j = matrix(volume_retarder(optics_, inside_x, inside_y, method_, mesh_));
-    const S light = norm(light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d));
+    const S light =
+        norm(light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d));
     return select(beside, open_, light);
   }
 
@@ -112,9 +117,10 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_volume_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   return std::make_unique<VolumeModel<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S)                                                                                        \
-  template struct VolumeOptics<S>;                                                                                    \
-  template Su2<S> volume_retarder<S>(const VolumeOptics<S>&, const S&, const S&, const TransportMethod<S>&, const Mesh&); \
+#define BIREFIT_INSTANTIATE(S)                                                                              \
+  template struct VolumeOptics<S>;                                                                          \
+  template Su2<S> volume_retarder<S>(const VolumeOptics<S>&, const S&, const S&, const TransportMethod<S>&, \
+                                     const Mesh&);                                                          \
   template std::unique_ptr<PixelModel<S>> make_volume_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 

@@ -13,10 +13,10 @@ namespace birefit {
 template <class S>
 struct VolumeOptics {
   std::shared_ptr<const VolumeGrid> grid;
-  std::vector<double> breaks;            ///< inner layers, in u
+  std::vector<double> breaks;  ///< inner layers, in u
   S center_x_px, center_y_px;
   S nodes_per_px_x, nodes_per_px_y;
-  S cos_turn, sin_turn;                  ///< of the sample in the image
+  S cos_turn, sin_turn;  ///< of the sample in the image
   S n_o, birefringence, k0, depth_um;
   Continuity continuity = Continuity::e_and_h;
 
@@ -34,11 +34,13 @@ template <class S>
 Su2<S> volume_retarder(const VolumeOptics<S>&, const S& x, const S& y, const TransportMethod<S>&, const Mesh&);
 
 /// Jones matrix of the ray at a point of the image in pixels; the identity beside the box.
-Mat2<double> volume_jones(const VolumeOptics<double>&, double column, double row, const TransportMethod<double>&, const Mesh&);
+Mat2<double> volume_jones(const VolumeOptics<double>&, double column, double row, const TransportMethod<double>&,
+                          const Mesh&);
 
 /// Places of rays spread evenly over the box, in nodes.
 std::pair<double, double> volume_place(const VolumeGrid&, int ray);
-/// Retardance phases (rad) of the first so many of them, moved by (dx, dy) nodes, as if the axis did not turn along them.
+/// Retardance phases (rad) of the first so many of them, moved by (dx, dy) nodes, as if the axis did not turn along
+/// them.
 std::vector<double> volume_phases(const VolumeOptics<double>&, int rays, double dx = 0, double dy = 0);
 
 /// Points of the medium that one ray takes.

@@ -18,15 +18,19 @@ constexpr double kPi = std::numbers::pi;
 constexpr int kMost = 8;        ///< points per pixel side
 constexpr int kReference = 10;  ///< what they are measured against
 
-/// plan.samples by distance from the box's middle: in each of a few rings the fewest points whose means hold `target` on a
-/// few pixels. Returns the largest error left.
-double plan_pixel_means(const Scene& scene, const Values<double>& value, const VolumeOptics<double>& o, double target, RenderPlan& plan) {
+/// plan.samples by distance from the box's middle: in each of a few rings the fewest points whose means hold `target`
+/// on a few pixels. Returns the largest error left.
+double plan_pixel_means(const Scene& scene, const Values<double>& value, const VolumeOptics<double>& o, double target,
+                        RenderPlan& plan) {
   const VolumeGrid& grid = *o.grid;
   const double w = scene.view.width, h = scene.view.height;
   const double box = 0.5 * std::hypot((grid.nx - 1) / o.nodes_per_px_x, (grid.ny - 1) / o.nodes_per_px_y);
-  const double view = std::hypot(std::max(o.center_x_px, w - 1 - o.center_x_px), std::max(o.center_y_px, h - 1 - o.center_y_px));
+  const double view =
+      std::hypot(std::max(o.center_x_px, w - 1 - o.center_x_px), std::max(o.center_y_px, h - 1 - o.center_y_px));
   const double most = std::max(1.0, std::min(box, view));
-  if (most > 100000) throw UserError(Where{}, "the volume is more than 200000 pixels across", "check the spacing, scale and pixel_size_um");
+  if (most > 100000)
+    throw UserError(Where{}, "the volume is more than 200000 pixels across",
+                    "check the spacing, scale and pixel_size_um");
   const double near_edge = 0.5 * std::min((grid.nx - 1) / o.nodes_per_px_x, (grid.ny - 1) / o.nodes_per_px_y);
   const Values<Pack> lanes = value.as<Pack>();
   const auto model = make_volume_model<Pack>(scene, plan, lanes);
@@ -43,9 +47,11 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
   for (int ring = 0; ring < rings; ++ring)
     for (int k = 0; k < kPixels; ++k, ++turn) {
       const double radius = most * (ring + (k + 0.5) / kPixels) / rings, azimuth = 2.399963 * turn;  // the golden angle
-      const double column = std::round(o.center_x_px + radius * std::cos(azimuth)), row = std::round(o.center_y_px + radius * std::sin(azimuth));
+      const double column = std::round(o.center_x_px + radius * std::cos(azimuth)),
+                   row = std::round(o.center_y_px + radius * std::sin(azimuth));
       bool whole = column >= 0 && row >= 0 && column < w && row < h;
-      for (const auto& [x, y] : {std::pair{-1.5, -1.5}, {-1.5, 1.5}, {1.5, -1.5}, {1.5, 1.5}}) whole = whole && within(column + x, row + y);
+      for (const auto& [x, y] : {std::pair{-1.5, -1.5}, {-1.5, 1.5}, {1.5, -1.5}, {1.5, 1.5}})
+        whole = whole && within(column + x, row + y);
       if (!whole) continue;
       const double exact = lane(mean_over_one_pixel(*model, column, row, kReference), 0);
       double error = 0;
@@ -65,22 +71,27 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
     // With its neighbours: few pixels stand for a ring.
     const int ring = std::min(rings - 1, static_cast<int>((bin + 0.5) / most * rings));
     int n = bin + 2 > near_edge ? 2 : 1;  // the correction of single points looks a pixel further, beside the box
-    for (int i = std::max(0, ring - 1); i <= std::min(rings - 1, ring + 1); ++i) n = std::max(n, needed[static_cast<std::size_t>(i)]);
+    for (int i = std::max(0, ring - 1); i <= std::min(rings - 1, ring + 1); ++i)
+      n = std::max(n, needed[static_cast<std::size_t>(i)]);
     plan.samples.push_back(n);
   }
   if (most >= box) plan.samples.push_back(1);  // beside the box
   return left;
 }
 
-/// Of all methods with a few equal steps between two layers the one that takes the fewest samples and holds `target` on the pilots;
-/// where none does, the best tried: more steps than these do not mend what lies between the nodes.
+/// Of all methods with a few equal steps between two layers the one that takes the fewest samples and holds `target` on
+/// the pilots; where none does, the best tried: more steps than these do not mend what lies between the nodes.
 Effort cheapest_steps(const Pilots& pilots, int cells, double target, const std::string& only) {
   std::vector<Effort> efforts;
   for (const TransportMethod<double>* method : transport_methods<double>()) {
-    if (method->info().reflections || method->info().name == std::string("modal") || (!only.empty() && only != method->info().name)) continue;
-    for (int steps : {1, 2, 3, 4, 6, 8}) efforts.push_back({method, steps * cells, pilots.samples(*method, pilots.mesh(steps * cells)), 1e300});
+    if (method->info().reflections || method->info().name == std::string("modal") ||
+        (!only.empty() && only != method->info().name))
+      continue;
+    for (int steps : {1, 2, 3, 4, 6, 8})
+      efforts.push_back({method, steps * cells, pilots.samples(*method, pilots.mesh(steps * cells)), 1e300});
   }
-  std::stable_sort(efforts.begin(), efforts.end(), [](const Effort& a, const Effort& b) { return a.samples < b.samples; });
+  std::stable_sort(efforts.begin(), efforts.end(),
+                   [](const Effort& a, const Effort& b) { return a.samples < b.samples; });
   Effort best;
   for (Effort& effort : efforts) {
     effort.error = pilots.error(*effort.method, pilots.mesh(effort.steps), target);
@@ -94,30 +105,41 @@ Effort cheapest_steps(const Pilots& pilots, int cells, double target, const std:
 }  // namespace
 
 RenderPlan plan_volume(const Scene& scene, const Values<double>& value) {
-  if (scene.ceiling == Ceiling::reflections) throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
-  if (!(scene.view.pixel_size_um > 0)) throw UserError(Where{}, "a volume needs micrograph.pixel_size_um", "the size of a pixel on the sample");
+  if (scene.ceiling == Ceiling::reflections)
+    throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
+  if (!(scene.view.pixel_size_um > 0))
+    throw UserError(Where{}, "a volume needs micrograph.pixel_size_um", "the size of a pixel on the sample");
   const VolumeOptics<double> o(scene, value);
   const VolumeGrid& grid = *o.grid;
   RenderPlan plan;
   const Pilots pilots(scene, value);
-  const Effort effort = cheapest_steps(pilots, grid.nz - 1, 0.5 * scene.intensity_accuracy, scene.method == "auto" ? "" : scene.method);
+  const Effort effort =
+      cheapest_steps(pilots, grid.nz - 1, 0.5 * scene.intensity_accuracy, scene.method == "auto" ? "" : scene.method);
   plan.method = effort.method->info().name;
   plan.steps = effort.steps;
-  plan.reasons.push_back(scene.method != "auto" ? fmt::format("method {} was asked for by name", plan.method)
-                                                : "a sampled director turns along the rays: modes couple, so the full 2 x 2 transport is needed");
-  plan.reasons.push_back(fmt::format("{}: {} steps, one or more between any two of the {} layers, {} samples of the medium a ray, hold the intensity to {:.1e} on {} pilot rays (asked: {:.1e}); no method needs fewer",
-                                     plan.method, pilots.mesh(plan.steps).size() - 1, grid.nz, effort.samples, effort.error, pilots.size(), scene.intensity_accuracy));
+  plan.reasons.push_back(
+      scene.method != "auto"
+          ? fmt::format("method {} was asked for by name", plan.method)
+          : "a sampled director turns along the rays: modes couple, so the full 2 x 2 transport is needed");
+  plan.reasons.push_back(
+      fmt::format("{}: {} steps, one or more between any two of the {} layers, {} samples of the medium a ray, hold "
+                  "the intensity to {:.1e} on {} pilot rays (asked: {:.1e}); no method needs fewer",
+                  plan.method, pilots.mesh(plan.steps).size() - 1, grid.nz, effort.samples, effort.error, pilots.size(),
+                  scene.intensity_accuracy));
   if (effort.error > 0.5 * scene.intensity_accuracy)
     plan.warnings.push_back(fmt::format("The {} method errs by {:.1e} here.", plan.method, effort.error));
   const double left = plan_pixel_means(scene, value, o, 0.5 * scene.intensity_accuracy, plan);
   plan.numerical_error = effort.error + left;
   const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
-  plan.reasons.push_back(fmt::format("pixel means from up to {0} x {0} points, measured: they are good to {1:.1e}", most, left));
-  // Across the rays the extraordinary index changes by gradient / (k0 depth): such a ray turns by gradient / (k0 n) on its way
-  // and leaves a point of the mid plane beside the one it is seen at, by the order of turn * depth / 8.
+  plan.reasons.push_back(
+      fmt::format("pixel means from up to {0} x {0} points, measured: they are good to {1:.1e}", most, left));
+  // Across the rays the extraordinary index changes by gradient / (k0 depth): such a ray turns by gradient / (k0 n) on
+  // its way and leaves a point of the mid plane beside the one it is seen at, by the order of turn * depth / 8.
   constexpr int kRays = 65;
-  std::vector<double> squares;  // at defects and at a mask's edge gradients are as steep as the grid is fine: the median
-  const std::vector<double> here = volume_phases(o, kRays, 0, 0), right = volume_phases(o, kRays, 0.01, 0), up = volume_phases(o, kRays, 0, 0.01);
+  // at defects and at a mask's edge gradients are as steep as the grid is fine: the median
+  std::vector<double> squares;
+  const std::vector<double> here = volume_phases(o, kRays, 0, 0), right = volume_phases(o, kRays, 0.01, 0),
+                            up = volume_phases(o, kRays, 0, 0.01);
   double largest = 0;
   for (std::size_t i = 0; i < here.size(); ++i) {
     largest = std::max(largest, std::abs(here[i]));
@@ -127,12 +149,14 @@ RenderPlan plan_volume(const Scene& scene, const Values<double>& value) {
   std::sort(squares.begin(), squares.end());
   const double typical = squares.empty() ? 0 : squares[squares.size() / 2], turn = std::sqrt(typical) / (o.k0 * o.n_o);
   plan.model_error = std::min(0.5, typical * o.depth_um / (8 * o.k0 * o.n_o));
-  plan.left_out.push_back(fmt::format(
-      "Light runs straight through the sampled field: refraction, diffraction and reflections are left out. Its gradients would turn the extraordinary "
-      "ray by some {:.2g} degrees (median), which changes the intensity by the order of {:.1g}.",
-      turn * 180 / kPi, plan.model_error));
+  plan.left_out.push_back(
+      fmt::format("Light runs straight through the sampled field: refraction, diffraction and reflections are left "
+                  "out. Its gradients would turn the extraordinary "
+                  "ray by some {:.2g} degrees (median), which changes the intensity by the order of {:.1g}.",
+                  turn * 180 / kPi, plan.model_error));
   double points = 0;  // by the area of the rings
-  for (std::size_t i = 0; i < plan.samples.size(); ++i) points += plan.samples[i] * plan.samples[i] * kPi * (2.0 * static_cast<double>(i) + 1);
+  for (std::size_t i = 0; i < plan.samples.size(); ++i)
+    points += plan.samples[i] * plan.samples[i] * kPi * (2.0 * static_cast<double>(i) + 1);
   return plan;
 }
 

@@ -19,27 +19,31 @@ struct WavePlan {
 /// Throws UserError where wave optics has no aperture to work with: none given, or one above the host's index.
 void check_objective(const Scene& scene, double n_host);
 
-/// A sphere as it is seen: exactly, by the series; by propagation; and, of sampled fields, by propagation through samples.
+/// A sphere as it is seen: exactly, by the series; by propagation; and, of sampled fields, by propagation through
+/// samples.
 struct RadialTwin {
   std::vector<Scene> scenes;  ///< in that order
   Theta theta;                ///< of all of them: the scene's, constants of the twin behind it
 };
-/// Of a sphere, one of the same size and indices whose axis is radial (shells: concentric). Of a sampled field with host in its box, a ball of as much
-/// liquid crystal of full order in the box's middle, sampled at the same nodes. None of anything else.
+/// Of a sphere, one of the same size and indices whose axis is radial (shells: concentric). Of a sampled field with
+/// host in its box, a ball of as much liquid crystal of full order in the box's middle, sampled at the same nodes. None
+/// of anything else.
 std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta);
 
-/// RMS of the difference from the exact picture over the RMS of that; where it is darker than 1e-12 of the incident light, which nothing tells from
-/// darkness, over 1e-12.
+/// RMS of the difference from the exact picture over the RMS of that; where it is darker than 1e-12 of the incident
+/// light, which nothing tells from darkness, over 1e-12.
 double picture_error(const Image& image, const Image& exact);
 
-/// What image_by_march errs by on the scene's radial twin, which it must have (picture_error); it leaves out light reflected twice.
+/// What image_by_march errs by on the scene's radial twin, which it must have (picture_error); it leaves out light
+/// reflected twice.
 double march_error(const Scene& scene, const Theta& theta, int threads = 0);
 
-/// The plan of one picture. Throws UserError when the scene is neither sphere nor sampled field, the numerical aperture is missing or above the host's index,
-/// or the propagation would need more memory than there should be.
+/// The plan of one picture. Throws UserError when the scene is neither sphere nor sampled field, the numerical aperture
+/// is missing or above the host's index, or the propagation would need more memory than there should be.
 RenderPlan plan_wave(const Scene& scene, const Values<double>& value);
 
 /// The whole picture and its derivatives by `active` (indices of theta), images and all resized to fit.
-void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, const std::vector<int>& active, int threads, Rendering& into);
+void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, const std::vector<int>& active,
+                 int threads, Rendering& into);
 
 }  // namespace birefit

@@ -14,7 +14,9 @@
 namespace birefit::study {
 
 double frobenius(const Mat2<double>& m) { return std::sqrt(norm(m.a) + norm(m.b) + norm(m.c) + norm(m.d)); }
-double relative_distance(const Mat2<double>& m, const Mat2<double>& reference) { return frobenius(m - reference) / frobenius(reference); }
+double relative_distance(const Mat2<double>& m, const Mat2<double>& reference) {
+  return frobenius(m - reference) / frobenius(reference);
+}
 bool finite(const Mat2<double>& m) { return std::isfinite(frobenius(m)); }
 
 namespace {
@@ -25,7 +27,8 @@ Answer refused(const std::string& why, double samples) {
   return {Mat2<double>::identity(), std::numeric_limits<double>::infinity(), samples, why};
 }
 Mat2<double> response(const TransportMethod<double>& method, const Question& q, const Mesh& mesh) {
-  return q.host_index > 0 ? method.transmission(q.column, q.ray, mesh, q.host_index) : method.transfer(q.column, q.ray, mesh);
+  return q.host_index > 0 ? method.transmission(q.column, q.ray, mesh, q.host_index)
+                          : method.transfer(q.column, q.ray, mesh);
 }
 
 }  // namespace
@@ -46,10 +49,12 @@ Answer by_halving(const TransportMethod<double>& method, const Question& questio
   double last_change = std::numeric_limits<double>::infinity();
   for (int n = 32; n <= most; n *= 2) {
     const Mat2<double> now = with_steps(n);
-    const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
+    const double change =
+        finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
     const bool converging = last_change >= falls * change || change < rounding(n);
     // Falling by `falls` a halving from here on, what is left is at most change/(falls - 1).
-    if (change <= tolerance && converging && std::isfinite(last_change)) return {now, 2 * change / (falls - 1) + rounding(n), counted.count(), ""};
+    if (change <= tolerance && converging && std::isfinite(last_change))
+      return {now, 2 * change / (falls - 1) + rounding(n), counted.count(), ""};
     last_change = change;
     before = now;
   }
@@ -66,8 +71,10 @@ Answer diagonal_answer(const Question& question, double tolerance) {
     column.sample({&u, 1}, &p);
     return p;
   };
-  if (modes_turn_over(at, ray, 0, 1, 512)) return refused("the axis passes the wavevector, where the modes change places", answer.samples);
-  // To first order the other mode receives int b e^{-+2 g3}: at most |b/2b3| at both ends and its variation between them.
+  if (modes_turn_over(at, ray, 0, 1, 512))
+    return refused("the axis passes the wavevector, where the modes change places", answer.samples);
+  // To first order the other mode receives int b e^{-+2 g3}: at most |b/2b3| at both ends and its variation between
+  // them.
   constexpr int kNodes = 256;
   double reach = 0, variation = 0;
   Complex<double> last[2];
@@ -75,8 +82,8 @@ Answer diagonal_answer(const Question& question, double tolerance) {
     const double u[1] = {std::clamp(static_cast<double>(i) / kNodes, 1e-9, 1 - 1e-9)};
     OpticalPoint<Slope<double>> p;
     column.sample_with_slope(u, &p);
-    for (double* slope : {&p.axis.x.d[0], &p.axis.y.d[0], &p.axis.z.d[0], &p.ordinary.d[0], &p.extraordinary.d[0], &p.ordinary_im.d[0],
-                          &p.extraordinary_im.d[0]})
+    for (double* slope : {&p.axis.x.d[0], &p.axis.y.d[0], &p.axis.z.d[0], &p.ordinary.d[0], &p.extraordinary.d[0],
+                          &p.ordinary_im.d[0], &p.extraordinary_im.d[0]})
       *slope /= p.depth_slope_um.value;  // by depth
     const auto g = modal_generator(p, ray);
     const Complex<double> ratio[2] = {0.5 * (g.b1 / g.b3), 0.5 * (g.b2 / g.b3)};
@@ -104,7 +111,8 @@ Answer modal_answer(const Question& question, double tolerance) {
     column.sample({&u, 1}, &p);
     return p;
   };
-  if (modes_turn_over(at, ray, 0, 1, 512)) return refused("the axis passes the wavevector, where the modes change places", 513);
+  if (modes_turn_over(at, ray, 0, 1, 512))
+    return refused("the axis passes the wavevector, where the modes change places", 513);
   Mat2<double> before;
   for (int n = 1; n <= 1024; n *= 2) {
     const Mesh mesh = uniform_mesh(n, column.breaks);
@@ -122,7 +130,8 @@ Answer modal_answer(const Question& question, double tolerance) {
       const Mat2<double> less = with_passes(column, kPasses - 1), least = with_passes(column, kPasses - 2);
       const double last = relative_distance(less, now), one_before = relative_distance(least, less);
       const double estimate = 2 * (change + last) + rounding(n);
-      if (estimate <= tolerance && (last < 0.5 * one_before || last < rounding(n))) return {now, estimate, counted.count(), ""};
+      if (estimate <= tolerance && (last < 0.5 * one_before || last < rounding(n)))
+        return {now, estimate, counted.count(), ""};
     }
     before = now;
   }
@@ -148,7 +157,8 @@ Answer wei_norman_answer(bool exponential, int order, const Question& question, 
         now = response(method, question, mesh);
       } catch (const std::domain_error&) {  // layers too thick: the report says so too
       }
-      const double change = finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
+      const double change =
+          finite(now) && finite(before) ? relative_distance(before, now) : std::numeric_limits<double>::infinity();
       before = now;
       // The report knows the dropped coupling and the ends of the series; the phase of the coupling, which is taken for
       // quadratic, shows under halving.

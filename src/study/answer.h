@@ -10,9 +10,9 @@ namespace birefit::study {
 
 struct Answer {
   Mat2<double> transfer;
-  double estimate = 0;     ///< of the relative error (Frobenius) the method stands by
-  double samples = 0;      ///< of the medium
-  std::string flag;        ///< why the answer must not be used; empty = it may
+  double estimate = 0;  ///< of the relative error (Frobenius) the method stands by
+  double samples = 0;   ///< of the medium
+  std::string flag;     ///< why the answer must not be used; empty = it may
 };
 
 /// What a method is asked: a ray through a column, inside it or, with a host on both sides, through its faces too.
@@ -32,11 +32,11 @@ bool finite(const Mat2<double>& m);
 Answer by_halving(const TransportMethod<double>& method, const Question& question, double tolerance, int most = 16384);
 /// The diagonal method: the change under halving, and twice the amplitude that the coupling it leaves out can reach.
 Answer diagonal_answer(const Question& question, double tolerance);
-/// Modal: the change under halving, and what the last pass through the equation for the ratios changed, which must be less
-/// than half of the pass before.
+/// Modal: the change under halving, and what the last pass through the equation for the ratios changed, which must be
+/// less than half of the pass before.
 Answer modal_answer(const Question& question, double tolerance);
-/// wei_norman (exponential = false) or wei_norman_exp with series of `order`: layers halved until the method's own report
-/// is below `tolerance`.
+/// wei_norman (exponential = false) or wei_norman_exp with series of `order`: layers halved until the method's own
+/// report is below `tolerance`.
 Answer wei_norman_answer(bool exponential, int order, const Question& question, double tolerance);
 /// ode_operator (scalar = false) or ode_scalar at `tolerance`, against itself at a tenth of it.
 Answer ode_answer(bool scalar, const Question& question, double tolerance);

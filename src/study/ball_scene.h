@@ -24,11 +24,14 @@ struct BallScene {
     const auto fixed = [&](const char* name, double value) { return table.add_constant(name, value); };
     Droplet droplet{fixed("diameter_um", 2 * ball.radius_um), RadialDirector{}};
     if (ball.twist_deg != 0) droplet.director = RadialDirector{fixed("twist_deg", ball.twist_deg)};
-    if (ball.tilt_deg >= 0) droplet.director = BipolarDirector{fixed("azimuth_deg", 20), fixed("tilt_deg", ball.tilt_deg), {}};
+    if (ball.tilt_deg >= 0)
+      droplet.director = BipolarDirector{fixed("azimuth_deg", 20), fixed("tilt_deg", ball.tilt_deg), {}};
     if (ball.wall_um > 0) {
       ShellDirector shell;
       shell.wall_um = fixed("wall_um", ball.wall_um);
-      if (ball.offset_um != 0) shell.offset_um = {fixed("offset_x_um", ball.offset_um), fixed("offset_y_um", 0), fixed("offset_z_um", ball.offset_um)};
+      if (ball.offset_um != 0)
+        shell.offset_um = {fixed("offset_x_um", ball.offset_um), fixed("offset_y_um", 0),
+                           fixed("offset_z_um", ball.offset_um)};
       droplet.director = shell;
     }
     scene.sample = droplet;

@@ -38,7 +38,8 @@ double intensity_error(const M& m, const M& reference) {
 /// Value and derivative of the first lane.
 M first_lane(const Mat2<Dual1>& m, bool derivative) {
   const auto z = [&](const Complex<Dual1>& c) {
-    return derivative ? Complex<double>{lane(c.re.d[0], 0), lane(c.im.d[0], 0)} : Complex<double>{lane(c.re.value, 0), lane(c.im.value, 0)};
+    return derivative ? Complex<double>{lane(c.re.d[0], 0), lane(c.im.d[0], 0)}
+                      : Complex<double>{lane(c.re.value, 0), lane(c.im.value, 0)};
   };
   return {z(m.a), z(m.b), z(m.c), z(m.d)};
 }
@@ -71,8 +72,8 @@ Ray<S> ray_of(const RaySpec& spec, Continuity continuity) {
   return {S(2 * std::numbers::pi / spec.wavelength_um), S(spec.kx), S(spec.ky), continuity};
 }
 
-/// Everything that is compared on one ray. Methods are compared in the source paper's physics, tangential E continuous, the
-/// one that all of them can do.
+/// Everything that is compared on one ray. Methods are compared in the source paper's physics, tangential E continuous,
+/// the one that all of them can do.
 struct RayBench {
   RaySpec spec;
   std::unique_ptr<Column<double>> column;
@@ -80,18 +81,22 @@ struct RayBench {
   std::unique_ptr<Column<Dual1>> slopes;
   M reference, gradient;
   double agreement = 0;
-  double step = 0;                               ///< of n_e, for derivatives by differences
-  std::unique_ptr<Column<double>> shifted[4];    ///< n_e at -2, -1, 1, 2 steps
+  double step = 0;                             ///< of n_e, for derivatives by differences
+  std::unique_ptr<Column<double>> shifted[4];  ///< n_e at -2, -1, 1, 2 steps
 
-  explicit RayBench(const RaySpec& s) : spec(s), column(ray_column<double>(s.name, 0.0)), lanes(ray_column<Pack>(s.name, Pack(0.0))) {
+  explicit RayBench(const RaySpec& s)
+      : spec(s), column(ray_column<double>(s.name, 0.0)), lanes(ray_column<Pack>(s.name, Pack(0.0))) {
     Dual1 shift(Pack(0.0));
     shift.d[0] = Pack(1.0);
     slopes = ray_column<Dual1>(s.name, shift);
     constexpr int kSteps = 16384;
-    const Mat2<Dual1> exact = Magnus6<Dual1>().transfer(*slopes, ray_of<Dual1>(spec, Continuity::e_only), uniform_mesh(kSteps, column->breaks));
+    const Mat2<Dual1> exact = Magnus6<Dual1>().transfer(*slopes, ray_of<Dual1>(spec, Continuity::e_only),
+                                                        uniform_mesh(kSteps, column->breaks));
     reference = first_lane(exact, false);
     gradient = first_lane(exact, true);
-    agreement = relative(Magnus4<double>().transfer(*column, ray_of<double>(spec, Continuity::e_only), uniform_mesh(4 * kSteps, column->breaks)), reference);
+    agreement = relative(Magnus4<double>().transfer(*column, ray_of<double>(spec, Continuity::e_only),
+                                                    uniform_mesh(4 * kSteps, column->breaks)),
+                         reference);
     // 3 mrad of phase: the formula of fourth order leaves some 1e-12 of the derivative, and so does rounding.
     double depth = 0;
     for (int i = 0; i < 64; ++i) {
@@ -121,8 +126,8 @@ struct RayBench {
     return p;
   }
   /// A method for plain doubles only.
-  ChartPoint value_point(const TransportMethod<double>& method, const Ray<double>& ray, const Mesh& mesh, const std::string& name,
-                         const std::string& effort) const {
+  ChartPoint value_point(const TransportMethod<double>& method, const Ray<double>& ray, const Mesh& mesh,
+                         const std::string& name, const std::string& effort) const {
     ChartPoint p;
     p.scene = spec.name, p.method = name, p.effort = effort;
     p.seconds_in_lanes = p.gradient_error = kNone;
@@ -154,7 +159,9 @@ struct RayBench {
 
  private:
   /// Methods that work on series of the medium ask the column for them, not for samples.
-  static bool counts_samples(const TransportMethod<double>& method) { return std::string(method.info().name).find("wei_norman") == std::string::npos; }
+  static bool counts_samples(const TransportMethod<double>& method) {
+    return std::string(method.info().name).find("wei_norman") == std::string::npos;
+  }
   /// The compiler must not drop the work.
   template <class T>
   static void keep(const T& value) {
@@ -171,15 +178,18 @@ ChartScene describe(const RayBench& bench) {
   const Mesh mesh = uniform_mesh(4096, bench.column->breaks);
   const M everything = Berreman<double>().transmission(*bench.column, ray, mesh, bench.spec.host_index);
   const Magnus4<double> method;
-  scene.one_way_error = intensity_error(method.transmission(*bench.column, ray, mesh, bench.spec.host_index), everything);
+  scene.one_way_error =
+      intensity_error(method.transmission(*bench.column, ray, mesh, bench.spec.host_index), everything);
   scene.e_only_error = intensity_error(
-      method.transmission(*bench.column, ray_of<double>(bench.spec, Continuity::e_only), mesh, bench.spec.host_index), everything);
+      method.transmission(*bench.column, ray_of<double>(bench.spec, Continuity::e_only), mesh, bench.spec.host_index),
+      everything);
   return scene;
 }
 
-// ---- whole frames --------------------------------------------------------------------------------------------------------
+// ---- whole frames --------------------------------------------------------------------------------------------------
 
-/// Some pixels of a frame by magnus4 and 8 x 8 points each: what the slab is judged by, whose every pixel would take minutes.
+/// Some pixels of a frame by magnus4 and 8 x 8 points each: what the slab is judged by, whose every pixel would take
+/// minutes.
 struct PixelTruth {
   std::vector<std::array<int, 2>> pixels;
   Eigen::VectorXd intensity;
@@ -193,7 +203,8 @@ PixelTruth pixel_truth(Scene scene, const Theta& theta) {
   PixelTruth truth;
   for (int i = 0; i < 200; ++i) {
     const auto at = [&](double turn, int size) { return static_cast<int>((turn - std::floor(turn)) * size); };
-    truth.pixels.push_back({at(i * 0.7548776662466927, scene.view.width), at(i * 0.5698402909980532, scene.view.height)});
+    truth.pixels.push_back(
+        {at(i * 0.7548776662466927, scene.view.width), at(i * 0.5698402909980532, scene.view.height)});
   }
   truth.intensity = render_pixels(scene, fine, theta, truth.pixels).intensity;
   return truth;
@@ -244,8 +255,9 @@ void measure_frames(MethodChart& chart, const std::function<void(const std::stri
       double sum = 0;
       const std::size_t count = by_pixels ? some.pixels.size() : image.size();
       for (std::size_t i = 0; i < count; ++i) {
-        const double d = by_pixels ? image(some.pixels[i][0], some.pixels[i][1]) - some.intensity[static_cast<Eigen::Index>(i)]
-                                   : image.values()[i] - exact.values()[i];
+        const double d =
+            by_pixels ? image(some.pixels[i][0], some.pixels[i][1]) - some.intensity[static_cast<Eigen::Index>(i)]
+                      : image.values()[i] - exact.values()[i];
         sum += d * d;
         if (std::abs(d) <= frame.worst_error) continue;
         frame.worst_error = std::abs(d);
@@ -288,8 +300,10 @@ MethodChart measure_chart(bool quick, const std::function<void(const std::string
     for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
       if (quick && tolerance < 1e-6) break;
       const std::string effort = fmt::format("tol={:g}", tolerance);
-      chart.points.push_back(bench.value_point(OdeOperator(tolerance), ray, uniform_mesh(2, bench.column->breaks), "ode_operator", effort));
-      chart.points.push_back(bench.value_point(OdeScalar<double>(tolerance), ray, uniform_mesh(2, bench.column->breaks), "ode_scalar", effort));
+      chart.points.push_back(bench.value_point(OdeOperator(tolerance), ray, uniform_mesh(2, bench.column->breaks),
+                                               "ode_operator", effort));
+      chart.points.push_back(bench.value_point(OdeScalar<double>(tolerance), ray, uniform_mesh(2, bench.column->breaks),
+                                               "ode_scalar", effort));
     }
   }
   if (!quick) measure_frames(chart, say);

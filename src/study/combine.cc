@@ -39,10 +39,11 @@ std::optional<Posterior> marginal(const Posterior& all, const std::vector<std::s
   return inverse(one.covariance) ? std::optional<Posterior>(std::move(one)) : std::nullopt;
 }
 
-/// Given the shared parameters s, the fits are independent: p(s | all) ~ prior(s) prod_i L_i(s), where L_i, the likelihood of fit i with
-/// its own parameters integrated out, is its marginal posterior over the prior. For Gaussians informations and information times mean add
-/// (Bishop, Pattern Recognition and Machine Learning, 2006, eqs. 2.113-2.117). Per fit, in coordinates in which the posterior is a
-/// unit Gaussian, the eigenvalues of the prior's information say what fraction of each direction is not the fit's own.
+/// Given the shared parameters s, the fits are independent: p(s | all) ~ prior(s) prod_i L_i(s), where L_i, the
+/// likelihood of fit i with its own parameters integrated out, is its marginal posterior over the prior. For Gaussians
+/// informations and information times mean add (Bishop, Pattern Recognition and Machine Learning, 2006,
+/// eqs. 2.113-2.117). Per fit, in coordinates in which the posterior is a unit Gaussian, the eigenvalues of the prior's
+/// information say what fraction of each direction is not the fit's own.
 SharedEstimate combine(const std::vector<Posterior>& fits, const std::optional<Posterior>& prior) {
   SharedEstimate shared;
   const Eigen::Index q = fits.front().mean.size();
@@ -50,10 +51,13 @@ SharedEstimate combine(const std::vector<Posterior>& fits, const std::optional<P
   Eigen::VectorXd prior_mean = Eigen::VectorXd::Zero(q);
   // In units of the first fit's standard errors, for the solvers' sake.
   const Eigen::VectorXd unit = fits.front().covariance.diagonal().cwiseSqrt();
-  const auto information_of = [&](const Posterior& p) -> Eigen::MatrixXd { return unit.asDiagonal() * inverse(p.covariance).value() * unit.asDiagonal(); };
+  const auto information_of = [&](const Posterior& p) -> Eigen::MatrixXd {
+    return unit.asDiagonal() * inverse(p.covariance).value() * unit.asDiagonal();
+  };
   if (prior) {
     const Eigen::MatrixXd spread = selection(fits.front().names, prior->names).transpose();
-    prior_information = unit.asDiagonal() * (spread * inverse(prior->covariance).value() * spread.transpose()) * unit.asDiagonal();
+    prior_information =
+        unit.asDiagonal() * (spread * inverse(prior->covariance).value() * spread.transpose()) * unit.asDiagonal();
     prior_mean = (spread * prior->mean).cwiseQuotient(unit);
   }
 
@@ -83,7 +87,8 @@ SharedEstimate combine(const std::vector<Posterior>& fits, const std::optional<P
   const Eigen::LLT<Eigen::MatrixXd> solver(information);
   const Eigen::VectorXd mean = solver.solve(sum);
   const Eigen::MatrixXd covariance = solver.solve(Eigen::MatrixXd::Identity(q, q));
-  shared.posterior = {fits.front().names, mean.cwiseProduct(unit), unit.asDiagonal() * covariance * unit.asDiagonal(), degrees};
+  shared.posterior = {fits.front().names, mean.cwiseProduct(unit), unit.asDiagonal() * covariance * unit.asDiagonal(),
+                      degrees};
   shared.fits = static_cast<int>(fits.size());
 
   // Directions of which a fit tells next to nothing beyond the prior are no observations.
@@ -102,9 +107,11 @@ SharedEstimate combine(const std::vector<Posterior>& fits, const std::optional<P
   }
   shared.chi_square_degrees = std::max(0, shared.chi_square_degrees - static_cast<int>(q));
   constexpr double kByChance = 0.999;
-  shared.consistent = shared.chi_square_degrees == 0 || shared.chi_square <= estimation::chi_square_quantile(kByChance, shared.chi_square_degrees);
-  // Fits that disagree have errors nobody stated: what is common to all is scaled by what they miss each other by (Birge, Phys. Rev. 40,
-  // 207 (1932); the scale factor of the Particle Data Group), and known from that many observations.
+  shared.consistent = shared.chi_square_degrees == 0 ||
+                      shared.chi_square <= estimation::chi_square_quantile(kByChance, shared.chi_square_degrees);
+  // Fits that disagree have errors nobody stated: what is common to all is scaled by what they miss each other by
+  // (Birge, Phys. Rev. 40, 207 (1932); the scale factor of the Particle Data Group), and known from that many
+  // observations.
   if (!shared.consistent) {
     shared.posterior.covariance *= shared.chi_square / shared.chi_square_degrees;
     shared.posterior.degrees_of_freedom = std::min<double>(degrees, shared.chi_square_degrees);
@@ -112,9 +119,10 @@ SharedEstimate combine(const std::vector<Posterior>& fits, const std::optional<P
   return shared;
 }
 
-/// Given s, the other fits say nothing of this one's own parameters: p(all of them | all fits) = p(s | all fits) p(own | s, this fit). With
-/// K = cov(all, s) C_ss^-1 (Bishop, eqs. 2.81-2.82) the mean moves by K times what s moves, and K (C_ss - V) K^T of the covariance is gone,
-/// V being that of s by all fits; in the rows of s itself K is the unit matrix.
+/// Given s, the other fits say nothing of this one's own parameters: p(all of them | all fits) = p(s | all fits) p(own
+/// | s, this fit). With K = cov(all, s) C_ss^-1 (Bishop, eqs. 2.81-2.82) the mean moves by K times what s moves, and K
+/// (C_ss - V) K^T of the covariance is gone, V being that of s by all fits; in the rows of s itself K is the unit
+/// matrix.
 Posterior informed(const Posterior& fit, const SharedEstimate& shared) {
   const Eigen::MatrixXd pick = selection(fit.names, shared.posterior.names);
   const Eigen::MatrixXd alone = pick * fit.covariance * pick.transpose();
@@ -126,6 +134,8 @@ Posterior informed(const Posterior& fit, const SharedEstimate& shared) {
   return result;
 }
 
-double interval95_factor(double degrees_of_freedom) { return estimation::student_t_quantile(0.975, degrees_of_freedom); }
+double interval95_factor(double degrees_of_freedom) {
+  return estimation::student_t_quantile(0.975, degrees_of_freedom);
+}
 
 }  // namespace birefit

@@ -13,7 +13,8 @@ SlabProfile profile_of(const Column<double>& column, int rows) {
     const double u = static_cast<double>(i) / (rows - 1);
     OpticalPoint<double> p;
     column.sample({&u, 1}, &p);
-    const Complex<double> n_o = sqrt(Complex<double>(p.ordinary, p.ordinary_im)), n_e = sqrt(Complex<double>(p.extraordinary, p.extraordinary_im));
+    const Complex<double> n_o = sqrt(Complex<double>(p.ordinary, p.ordinary_im)),
+                          n_e = sqrt(Complex<double>(p.extraordinary, p.extraordinary_im));
     profile.rows.push_back({u * p.depth_slope_um, p.axis.x, p.axis.y, p.axis.z, n_o.re, n_e.re, n_o.im, n_e.im});
   }
   return profile;
@@ -44,15 +45,17 @@ std::vector<FrameScene> frame_scenes() {
       f.scene.microscope.wavelength_nm = f.table.add_constant("wavelength_nm", 500);
       f.scene.view.center_x_px = f.table.add_constant("center_x", 249.8);
       f.scene.view.center_y_px = f.table.add_constant("center_y", 250.3);
-      f.parameters = indices({slab.half_angle_deg, f.scene.microscope.wavelength_nm, f.scene.view.center_x_px, f.scene.view.center_y_px, f.scene.surround_index,
-                              f.scene.microscope.analyzer_deg, f.scene.microscope.polarizer_deg});
+      f.parameters = indices({slab.half_angle_deg, f.scene.microscope.wavelength_nm, f.scene.view.center_x_px,
+                              f.scene.view.center_y_px, f.scene.surround_index, f.scene.microscope.analyzer_deg,
+                              f.scene.microscope.polarizer_deg});
       continue;
     }
     if (i == 2) {
       f.name = "e44_plate";
       Plate plate;
       plate.thickness_um = f.table.add_constant("thickness_um", 800);
-      plate.director.axis = {f.table.add_constant("x", -0.353553), f.table.add_constant("y", 0.353553), f.table.add_constant("z", -0.866025)};
+      plate.director.axis = {f.table.add_constant("x", -0.353553), f.table.add_constant("y", 0.353553),
+                             f.table.add_constant("z", -0.866025)};
       HeatStep heat;
       heat.fourier_number = f.table.add_constant("fourier_number", 0.1);
       heat.cold_k = f.table.add_constant("cold_k", 278);
@@ -65,7 +68,8 @@ std::vector<FrameScene> frame_scenes() {
       f.scene.microscope.wavelength_nm = f.table.add_constant("wavelength_nm", 640);
       f.scene.view.center_x_px = f.table.add_constant("center_x", 249.8);
       f.scene.view.center_y_px = f.table.add_constant("center_y", 250.3);
-      f.parameters = indices({heat.fourier_number, plate.thickness_um, f.scene.view.center_x_px, f.scene.view.center_y_px, plate.half_angle_deg, heat.hot_k,
+      f.parameters = indices({heat.fourier_number, plate.thickness_um, f.scene.view.center_x_px,
+                              f.scene.view.center_y_px, plate.half_angle_deg, heat.hot_k,
                               f.scene.microscope.wavelength_nm, f.scene.microscope.analyzer_deg});
       continue;
     }
@@ -83,7 +87,8 @@ std::vector<FrameScene> frame_scenes() {
     f.scene.view.pixel_size_um = 0.025;
     f.scene.view.center_x_px = f.table.add_constant("center_x", 249.8);
     f.scene.view.center_y_px = f.table.add_constant("center_y", 250.3);
-    f.parameters = indices({droplet.diameter_um, material.birefringence, f.scene.view.center_x_px, f.scene.view.center_y_px, material.ordinary, f.scene.surround_index,
+    f.parameters = indices({droplet.diameter_um, material.birefringence, f.scene.view.center_x_px,
+                            f.scene.view.center_y_px, material.ordinary, f.scene.surround_index,
                             f.scene.microscope.wavelength_nm, f.scene.microscope.analyzer_deg});
   }
   return all;

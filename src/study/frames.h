@@ -13,9 +13,11 @@ struct FrameScene {
   std::string name;
   ParameterTable table;
   Scene scene;
-  std::vector<int> parameters;  ///< eight (a slab given as a profile: seven) that a fit might search, the likeliest first
+  /// eight (a slab given as a profile: seven) that a fit might search, the likeliest first
+  std::vector<int> parameters;
 };
-/// hedgehog (E12, 9 um), twisted_droplet, e44_plate (0.8 mm under heat, cone of 15 degrees), evaluation_slab (0.45 mm, the same cone).
+/// hedgehog (E12, 9 um), twisted_droplet, e44_plate (0.8 mm under heat, cone of 15 degrees), evaluation_slab (0.45 mm,
+/// the same cone).
 std::vector<FrameScene> frame_scenes();
 
 }  // namespace birefit::study

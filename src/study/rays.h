@@ -30,7 +30,11 @@ struct EvaluationSlabLaw {
     sin_cos(T(2.2 * u + 0.5), n_s, n_c);
     sin_cos(T(3.0 * u), k_s, k_c);
     const T n_e = T(shift) + 1.70 + 0.03 * n_c;
-    return {{tilt_c * azimuth_c, tilt_c * azimuth_s, tilt_s}, T(1.52 * 1.52), n_e * n_e, T(0.0), 1e-3 * (1.0 + 0.6 * k_s),
+    return {{tilt_c * azimuth_c, tilt_c * azimuth_s, tilt_s},
+            T(1.52 * 1.52),
+            n_e * n_e,
+            T(0.0),
+            1e-3 * (1.0 + 0.6 * k_s),
             T(thickness_um)};
   }
 };
@@ -88,13 +92,16 @@ std::unique_ptr<Column<S>> ray_column(const std::string& name, const S& shift) {
   if (name == "twisted_droplet") return make(droplet(2.0, 60 * kDeg));
   if (name == "near_defect") return make(droplet(0.025, 60 * kDeg));
   if (name == "e44_plate")
-    return make(HeatedLaw<S>{{S(-0.35355339059327373), S(0.35355339059327373), S(-0.8660254037844386)}, {S(0.1), S(278.0), S(368.0), S(278.0), true}, S(800.0)});
+    return make(HeatedLaw<S>{{S(-0.35355339059327373), S(0.35355339059327373), S(-0.8660254037844386)},
+                             {S(0.1), S(278.0), S(368.0), S(278.0), true},
+                             S(800.0)});
   if (name == "evaluation_slab") {
     auto column = std::make_unique<LawColumn<S, EvaluationSlabLaw<S>>>(EvaluationSlabLaw<S>{shift, 450});
     column->absorbing = true;
     return column;
   }
-  if (name == "twisted_cell") return make(TwistedLaw<S>{S(0.3), S(90 * kDeg), S(0.0), S(1.522 * 1.522), S(1.739 * 1.739), S(5.0)});
+  if (name == "twisted_cell")
+    return make(TwistedLaw<S>{S(0.3), S(90 * kDeg), S(0.0), S(1.522 * 1.522), S(1.739 * 1.739), S(5.0)});
   return make(TwistedLaw<S>{S(0.3), S(3600 * kDeg), S(0.0), S(1.52 * 1.52), S(1.74 * 1.74), S(20.0)});
 }
 

@@ -46,7 +46,12 @@ struct TiltTwist {
   template <class T>
   OpticalPoint<T> at(const T& u) const {
     const T tilt = tilt0 + (tilt1 - tilt0) * u, azimuth = azimuth0 + (azimuth1 - azimuth0) * u;
-    return {axis_from_angles<T>(tilt, azimuth), T(n_o * n_o - k * k), T(n_e * n_e - k * k), T(2 * n_o * k), T(2 * n_e * k), T(thickness_um)};
+    return {axis_from_angles<T>(tilt, azimuth),
+            T(n_o * n_o - k * k),
+            T(n_e * n_e - k * k),
+            T(2 * n_o * k),
+            T(2 * n_e * k),
+            T(thickness_um)};
   }
 };
 /// In the layer plane, turning by pi about the middle within `width` of 5 um.
@@ -56,7 +61,12 @@ struct FastTurn {
   OpticalPoint<T> at(const T& u) const {
     const T x = (u - 0.5) * (5 / width_um * 2), e = exp(x), f = inverse(e + inverse(e));
     const T tanh_x = (e - inverse(e)) * f;
-    return {axis_from_angles<T>(T(0.0), 0.3 + (0.5 * std::numbers::pi) * tanh_x), T(1.52 * 1.52), T(1.74 * 1.74), T(0.0), T(0.0), T(5.0)};
+    return {axis_from_angles<T>(T(0.0), 0.3 + (0.5 * std::numbers::pi) * tanh_x),
+            T(1.52 * 1.52),
+            T(1.74 * 1.74),
+            T(0.0),
+            T(0.0),
+            T(5.0)};
   }
 };
 /// Uniform twist whose extraordinary index passes an extremum of the retardation rate: c2 = -k0 p/(4 d) at the entry.
@@ -88,18 +98,25 @@ struct Kink {
   OpticalPoint<T> at(const T& u) const {
     const double side = lane(plain(u), 0) < place ? 1.0 : -0.5;
     const T x = u - place;
-    return {axis_from_angles<T>(0.4 + side * x, 0.3 + (1.5 * side) * x), T(1.52 * 1.52), T(1.74 * 1.74), T(0.0), T(0.0), T(5.0)};
+    return {axis_from_angles<T>(0.4 + side * x, 0.3 + (1.5 * side) * x),
+            T(1.52 * 1.52),
+            T(1.74 * 1.74),
+            T(0.0),
+            T(0.0),
+            T(5.0)};
   }
 };
 
 std::vector<Trap> traps(bool quick) {
   std::vector<Trap> all;
   const double k0 = 2 * std::numbers::pi / 0.59;
-  const auto add = [&](const std::string& sweep, double value, std::unique_ptr<Column<double>> column, double kx = 0, double ky = 0) {
+  const auto add = [&](const std::string& sweep, double value, std::unique_ptr<Column<double>> column, double kx = 0,
+                       double ky = 0) {
     all.push_back({sweep, value, std::move(column), {k0, kx, ky, Continuity::e_only}});
   };
   /// The same with E and H continuous and a host on both sides.
-  const auto add_with_faces = [&](const std::string& sweep, double value, std::unique_ptr<Column<double>> column, double host, double kx) {
+  const auto add_with_faces = [&](const std::string& sweep, double value, std::unique_ptr<Column<double>> column,
+                                  double host, double kx) {
     all.push_back({sweep, value, std::move(column), {k0, kx, 0.1, Continuity::e_and_h}, host});
   };
   const double radius = 4.5;
@@ -115,21 +132,26 @@ std::vector<Trap> traps(bool quick) {
     add("axis_passes_ray", offset, column_of_law(TiltTwist{0.6, 2.1, offset, offset, 1.522, 1.739, 0, 5}), 0.3);
   for (double dn : {0.2, 1e-2, 1e-4, 1e-8, 0.0, -1e-4, -1e-2, -0.2})
     add("birefringence", dn, column_of_law(TiltTwist{0.2, 0.5, 0.3, 1.4, 1.6, 1.6 + dn, 0, 5}), 0.3);
-  for (double d : {1.0, 10.0, 100.0, 1e3, 1e4}) add("thickness_um", d, column_of_law(TiltTwist{0.2, 0.5, 0.3, 1.4, 1.52, 1.74, 0, d}), 0.3);
+  for (double d : {1.0, 10.0, 100.0, 1e3, 1e4})
+    add("thickness_um", d, column_of_law(TiltTwist{0.2, 0.5, 0.3, 1.4, 1.52, 1.74, 0, d}), 0.3);
   for (double pitch : {100.0, 10.0, 3.0, 1.0, 0.5, 0.36, 0.2})
-    add("pitch_um", pitch, column_of_law(TiltTwist{0, 0, 0.3, 0.3 + 2 * std::numbers::pi * 10 / pitch, 1.52, 1.74, 0, 10}));
+    add("pitch_um", pitch,
+        column_of_law(TiltTwist{0, 0, 0.3, 0.3 + 2 * std::numbers::pi * 10 / pitch, 1.52, 1.74, 0, 10}));
   for (double k : {1e-4, 1e-3, 1e-2, 0.1, 0.5})
     add("absorption_k", k, column_of_law(TiltTwist{0.2, 0.5, 0.3, 1.4, 1.52, 1.74, k, 20}, false, true), 0.3);
   for (double gap : {0.3, 0.1, 1e-2, 1e-3, 1e-5, 1e-8})
     add("gap_to_total_reflection", gap, column_of_law(TiltTwist{0.2, 0.5, 0.3, 1.4, 1.52, 1.74, 0, 5}), 1.52 - gap);
   for (double width : {2.0, 0.5, 0.1, 0.03}) add("turn_width_um", width, column_of_law(FastTurn{width}));
-  for (double p : {0.1, 1e-3, 1e-6, 1e-12, 0.0, -1e-12, -1e-6, -1e-3, -0.1}) add("c2_parameter", p, column_of_law(StationaryRate{p}));
+  for (double p : {0.1, 1e-3, 1e-6, 1e-12, 0.0, -1e-12, -1e-6, -1e-3, -0.1})
+    add("c2_parameter", p, column_of_law(StationaryRate{p}));
   // A turn by 135 degrees in 5 um: g1 of the Wei-Norman factors grows as 1/birefringence on the way.
   for (double dn : {0.1, 1e-2, 1e-3, 1e-4, 1e-6, -1e-3})
     add("pole_birefringence", dn, column_of_law(TiltTwist{0, 0, 0, 135 * kDeg, 1.5, 1.5 + dn, 0, 5}));
-  // 50 degrees in the host (and ky = 0.1): beyond 1.97994 the ordinary wave of the sample is totally reflected, then both.
+  // 50 degrees in the host (and ky = 0.1): beyond 1.97994 the ordinary wave of the sample is totally reflected, then
+  // both.
   for (double host : {1.0, 1.2, 1.52, 1.74, 1.9, 1.97, 1.979, 1.9799, 2.0, 2.5})
-    add_with_faces("host_index", host, column_of_law(TiltTwist{0.2, 0.5, 0.3, 1.4, 1.52, 1.74, 0, 5}), host, host * std::sin(50 * kDeg));
+    add_with_faces("host_index", host, column_of_law(TiltTwist{0.2, 0.5, 0.3, 1.4, 1.52, 1.74, 0, 5}), host,
+                   host * std::sin(50 * kDeg));
   // Breaks on, beside and all but on the nodes of every mesh of 2^n steps.
   const auto broken = [&](auto law, std::vector<double> breaks, bool jumps) {
     auto column = column_of_law(law);
@@ -150,7 +172,8 @@ std::vector<Trap> traps(bool quick) {
   if (quick) {  // the ends and the middle of each sweep
     std::vector<Trap> some;
     for (std::size_t i = 0; i < all.size(); ++i) {
-      const bool first = i == 0 || all[i - 1].sweep != all[i].sweep, last = i + 1 == all.size() || all[i + 1].sweep != all[i].sweep;
+      const bool first = i == 0 || all[i - 1].sweep != all[i].sweep,
+                 last = i + 1 == all.size() || all[i + 1].sweep != all[i].sweep;
       if (first || last || i % 3 == 0) some.push_back(std::move(all[i]));
     }
     return some;
@@ -158,7 +181,7 @@ std::vector<Trap> traps(bool quick) {
   return all;
 }
 
-// ---- whole pictures --------------------------------------------------------------------------------------------------
+// ---- whole pictures ------------------------------------------------------------------------------------------------
 
 /// Polarizers exactly and nearly along what the sample's modes are, crossed and parallel: dark or bright everywhere.
 struct PictureTrap {
@@ -209,7 +232,8 @@ PictureTrap picture_trap(const std::string& sample, double polarizer_deg, double
 void measure_pictures(bool quick, std::vector<StressPoint>& points) {
   constexpr double kAsked = 1e-4, kTruth = 1e-8;
   for (const bool crossed : {true, false})
-    for (const double polarizer_deg : quick ? std::vector<double>{0, 1e-6, 45} : std::vector<double>{0, 1e-9, 1e-6, 1e-3, 1, 45, 90})
+    for (const double polarizer_deg :
+         quick ? std::vector<double>{0, 1e-6, 45} : std::vector<double>{0, 1e-9, 1e-6, 1e-3, 1, 45, 90})
       for (const char* sample : {"droplet", "twisted_droplet", "cell", "plate"}) {
         PictureTrap trap = picture_trap(sample, polarizer_deg, polarizer_deg + (crossed ? 90 : 0));
         const Theta theta = trap.table.values();
@@ -230,8 +254,13 @@ void measure_pictures(bool quick, std::vector<StressPoint>& points) {
           for (const std::string& method : methods) {
             trap.scene.method = method;
             const RenderPlan chosen = plan(trap.scene, theta);
-            StressPoint p{crossed ? "crossed_polarizer_deg" : "parallel_polarizer_deg", polarizer_deg,
-                          fmt::format("{} of a {}{}", method, sample, reflections ? ", reflections" : ""), 0, kAsked, 0, ""};
+            StressPoint p{crossed ? "crossed_polarizer_deg" : "parallel_polarizer_deg",
+                          polarizer_deg,
+                          fmt::format("{} of a {}{}", method, sample, reflections ? ", reflections" : ""),
+                          0,
+                          kAsked,
+                          0,
+                          ""};
             if (chosen.numerical_error > kAsked) {
               p.flag = fmt::format("its plan expects {:.1e}", chosen.numerical_error);
               p.error = std::numeric_limits<double>::quiet_NaN();
@@ -241,7 +270,8 @@ void measure_pictures(bool quick, std::vector<StressPoint>& points) {
               for (std::size_t i = 0; i < truth.size(); ++i) {
                 const double x = image.values()[i], error = std::abs(x - truth.values()[i]);
                 // No light is less than none, whatever accuracy was asked.
-                p.error = x >= -1e-12 && error <= 1e9 ? std::max(p.error, error) : std::numeric_limits<double>::infinity();
+                p.error =
+                    x >= -1e-12 && error <= 1e9 ? std::max(p.error, error) : std::numeric_limits<double>::infinity();
               }
             }
             points.push_back(p);
@@ -262,15 +292,21 @@ std::vector<StressPoint> measure_stress(bool quick, const std::function<void(con
     // The truth: order 6, far beyond what the methods are allowed, checked by order 4.
     const Answer truth = by_halving(Magnus6<double>(), question, 1e-11, 1 << 17);
     const Answer check = by_halving(Magnus4<double>(), question, 1e-9, 1 << 17);
-    const bool known = truth.flag.empty() && check.flag.empty() && relative_distance(check.transfer, truth.transfer) < 1e-8;
-    const auto record_against = [&](const Mat2<double>& exact, bool exact_is_known, const std::string& method, const Answer& answer) {
-      StressPoint p{trap.sweep, trap.value, method, std::numeric_limits<double>::quiet_NaN(), answer.estimate, answer.samples, answer.flag};
+    const bool known =
+        truth.flag.empty() && check.flag.empty() && relative_distance(check.transfer, truth.transfer) < 1e-8;
+    const auto record_against = [&](const Mat2<double>& exact, bool exact_is_known, const std::string& method,
+                                    const Answer& answer) {
+      StressPoint p{trap.sweep,      trap.value,     method,     std::numeric_limits<double>::quiet_NaN(),
+                    answer.estimate, answer.samples, answer.flag};
       if (exact_is_known && answer.flag.empty()) p.error = relative_distance(answer.transfer, exact);
       points.push_back(p);
     };
-    const auto record = [&](const std::string& method, const Answer& answer) { record_against(truth.transfer, known, method, answer); };
+    const auto record = [&](const std::string& method, const Answer& answer) {
+      record_against(truth.transfer, known, method, answer);
+    };
     for (const TransportMethod<double>* method : transport_methods<double>())
-      if (const std::string name = method->info().name; !method->info().reflections && name != "diagonal" && name != "modal")
+      if (const std::string name = method->info().name;
+          !method->info().reflections && name != "diagonal" && name != "modal")
         record(method->info().name, by_halving(*method, question, kTolerance));
     record("diagonal", diagonal_answer(question, kTolerance));
     record("modal", modal_answer(question, kTolerance));
@@ -286,7 +322,8 @@ std::vector<StressPoint> measure_stress(bool quick, const std::function<void(con
     // Other physics: all reflections have their own truth, itself with more steps.
     const Berreman<double> berreman;
     const Answer reflections = by_halving(berreman, trap.with_faces(), kTolerance, 1024);
-    const Answer finer = reflections.flag.empty() ? by_halving(berreman, trap.with_faces(), 1e-3 * kTolerance, 8192) : reflections;
+    const Answer finer =
+        reflections.flag.empty() ? by_halving(berreman, trap.with_faces(), 1e-3 * kTolerance, 8192) : reflections;
     record_against(finer.transfer, finer.flag.empty(), "berreman", reflections);
   }
   if (say) say("polarizers along the modes");

@@ -1,7 +1,7 @@
 // When is a ray an image? Radial droplets by every model against their exact series.
 
-#include <chrono>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -47,7 +47,8 @@ std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const 
       const RenderPlan by_rays = plan(scene, theta);
       Image image;
       const double seconds = seconds_of([&] { image = render(scene, by_rays, theta).intensity; });
-      points.push_back({name, radius, na, rays == Rays::straight ? "straight" : "eikonal", "", seconds, picture_error(image, exact), kNan});
+      points.push_back({name, radius, na, rays == Rays::straight ? "straight" : "eikonal", "", seconds,
+                        picture_error(image, exact), kNan});
     }
     waves.method = "split_step";
     RenderPlan propagated = plan(waves, theta);
@@ -62,7 +63,8 @@ std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const 
       propagated.wave = changed;
       Image image;
       const double seconds = seconds_of([&] { image = render(waves, propagated, theta).intensity; });
-      points.push_back({name, radius, na, "split_step", finer == 1 ? "" : fmt::format("{:g} times as fine", finer), seconds, picture_error(image, exact),
+      points.push_back({name, radius, na, "split_step", finer == 1 ? "" : fmt::format("{:g} times as fine", finer),
+                        seconds, picture_error(image, exact),
                         finer == 1 ? propagated.model_error + propagated.numerical_error : kNan});
     }
     if (radius > 7) return;

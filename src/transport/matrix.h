@@ -63,8 +63,7 @@ struct ComplexCosSinc {
   Complex<S> cos_sq, sinc_sq, sinc_slope;  ///< sinc_slope = d sinc_sq / dq
 };
 template <class S>
-  requires(ScalarTraits<S>::derivatives == 0)
-ComplexCosSinc<S> cos_sinc_sq(const Complex<S>& q) {
+requires(ScalarTraits<S>::derivatives == 0) ComplexCosSinc<S> cos_sinc_sq(const Complex<S>& q) {
   using C = Complex<S>;
   const S modulus_sq = norm(q);
   const auto small = modulus_sq < S(0.01);

@@ -39,7 +39,8 @@ const std::vector<std::string>& transport_method_names() {
 
 void refuse_transfer(const MethodInfo& info) {
   throw std::domain_error(std::string(info.name) +
-                          ": no passive medium does this: steps too long for the method, total reflection inside, or modes where there are none");
+                          ": no passive medium does this: steps too long for the method, total reflection inside, or "
+                          "modes where there are none");
 }
 
 template <class S>
@@ -86,7 +87,8 @@ FaceFactors<S> lossless_faces(const Column<S>& column, const Ray<S>& ray, const 
   OpticalPoint<S> p[2];
   column.sample(ends, p);
   const S eps = host_index * host_index;
-  const Matrix2<S> outside = isotropic_admittance<S>(eps, sqrt(eps - ray.kx * ray.kx - ray.ky * ray.ky), ray.kx, ray.ky);
+  const Matrix2<S> outside =
+      isotropic_admittance<S>(eps, sqrt(eps - ray.kx * ray.kx - ray.ky * ray.ky), ray.kx, ray.ky);
   return {inverse(outside + one_way_lossless(p[0], ray.kx, ray.ky).admittance) * (S(2.0) * outside),
           step_factor(one_way_lossless(p[1], ray.kx, ray.ky).admittance,
                       one_way_lossless(p[1], ray.kx, ray.ky, -1.0).admittance, outside)};
@@ -103,13 +105,13 @@ Mat2<S> TransportMethod<S>::transmission(const Column<S>& column, const Ray<S>& 
   return exit_factor(column, ray, host_index) * inside * entry_factor(column, ray, host_index);
 }
 
-#define BIREFIT_INSTANTIATE(S)                                                                              \
-  template std::span<const TransportMethod<S>* const> transport_methods<S>();                               \
-  template const TransportMethod<S>& transport_method<S>(const std::string&);                               \
-  template Mat2<S> entry_factor<S>(const Column<S>&, const Ray<S>&, const S&);                              \
-  template Mat2<S> exit_factor<S>(const Column<S>&, const Ray<S>&, const S&);                               \
-  template Mat2<S> step_of_medium<S>(const Column<S>&, const Ray<S>&, const Mesh&, std::size_t);            \
-  template FaceFactors<S> lossless_faces<S>(const Column<S>&, const Ray<S>&, const S&);                     \
+#define BIREFIT_INSTANTIATE(S)                                                                   \
+  template std::span<const TransportMethod<S>* const> transport_methods<S>();                    \
+  template const TransportMethod<S>& transport_method<S>(const std::string&);                    \
+  template Mat2<S> entry_factor<S>(const Column<S>&, const Ray<S>&, const S&);                   \
+  template Mat2<S> exit_factor<S>(const Column<S>&, const Ray<S>&, const S&);                    \
+  template Mat2<S> step_of_medium<S>(const Column<S>&, const Ray<S>&, const Mesh&, std::size_t); \
+  template FaceFactors<S> lossless_faces<S>(const Column<S>&, const Ray<S>&, const S&);          \
   template class TransportMethod<S>;
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 

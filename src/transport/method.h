@@ -26,13 +26,13 @@ using Mesh = std::vector<double>;
 /// How a method describes itself to the planner, the charts and the documentation.
 struct MethodInfo {
   const char* name;
-  int order;              ///< global error ~ steps^-order; 0 = spectral (quadrature)
-  bool needs_planar;      ///< exact only where transport is diagonal
-  bool reflections;       ///< has transmission() only, backward waves and faces included
-  const char* summary;    ///< what it is, one line
+  int order;            ///< global error ~ steps^-order; 0 = spectral (quadrature)
+  bool needs_planar;    ///< exact only where transport is diagonal
+  bool reflections;     ///< has transmission() only, backward waves and faces included
+  const char* summary;  ///< what it is, one line
   const char* source;
-  bool slow_axes = false; ///< only where the axis turns slowly against the phase; more steps do not mend it
-  bool magnus = false;    ///< magnus_retarder() of the same order is its retarder()
+  bool slow_axes = false;  ///< only where the axis turns slowly against the phase; more steps do not mend it
+  bool magnus = false;     ///< magnus_retarder() of the same order is its retarder()
 };
 
 template <class S>
@@ -41,10 +41,10 @@ class TransportMethod {
   virtual ~TransportMethod() = default;
   virtual const MethodInfo& info() const = 0;
   /// Transfer matrix of E_t from just inside u = 0 to just inside u = 1, steps of the medium at its breaks included,
-  /// entry and exit faces not. Plain doubles: throws std::domain_error instead of an answer that is not finite or amplifies
-  /// as no passive medium can (see checked_transfer): steps too long for the method (a series in the commutators needs
-  /// less than about pi of what does not commute in a step; a homogeneous medium takes any step), a wave that is
-  /// totally reflected inside, modes where there are none. In lanes, one ray of many, nothing is checked.
+  /// entry and exit faces not. Plain doubles: throws std::domain_error instead of an answer that is not finite or
+  /// amplifies as no passive medium can (see checked_transfer): steps too long for the method (a series in the
+  /// commutators needs less than about pi of what does not commute in a step; a homogeneous medium takes any step), a
+  /// wave that is totally reflected inside, modes where there are none. In lanes, one ray of many, nothing is checked.
   virtual Mat2<S> transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) const = 0;
   /// Normal incidence (kx = ky = 0), lossless, no jumps: the retarder on the flux-normalised field (e_and_h) or on E_t
   /// (e_only), common phase left out.
@@ -61,8 +61,9 @@ template <class S>
 const TransportMethod<S>& transport_method(const std::string& name);  ///< throws std::logic_error when unknown
 const std::vector<std::string>& transport_method_names();
 
-/// What every transfer() ends with: t itself, unless it is a plain double and no answer. A lossless medium changes |E_t| by
-/// sqrt(q_in/q_out) at most, about 1e3 at a gap of 1e-12 to total reflection; beyond 1e6 it is the method that grows.
+/// What every transfer() ends with: t itself, unless it is a plain double and no answer. A lossless medium changes
+/// |E_t| by sqrt(q_in/q_out) at most, about 1e3 at a gap of 1e-12 to total reflection; beyond 1e6 it is the method that
+/// grows.
 [[noreturn]] void refuse_transfer(const MethodInfo& info);  ///< std::domain_error
 template <class S>
 const Mat2<S>& checked_transfer([[maybe_unused]] const MethodInfo& info, const Mat2<S>& t) {
@@ -89,17 +90,20 @@ FaceFactors<S> lossless_faces(const Column<S>& column, const Ray<S>& ray, const 
 Mesh uniform_mesh(int steps, const std::vector<double>& breaks = {});
 /// Steps of magnus4 whose local error (one step against two halves, Frobenius norm) is below tolerance per unit u.
 /// Never fails: stops refining at max_steps and returns what it has; error_estimate receives the sum of local errors.
-Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double tolerance, double* error_estimate = nullptr,
-                  int max_steps = 200000);
+Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double tolerance,
+                  double* error_estimate = nullptr, int max_steps = 200000);
 
 // The scalars all kernels are compiled for, and one more for pictures that are read from a table over the radius: eight
-// derivatives at once cost less there than four and four, but not where every point has its ray (lanes leave the registers).
+// derivatives at once cost less there than four and four, but not where every point has its ray (lanes leave the
+// registers).
 #define BIREFIT_FOR_EACH_SCALAR(X) X(double) X(Pack) X(Dual1) X(Dual2) X(Dual4)
 #define BIREFIT_FOR_EACH_SCALAR_OF_TABLES(X) BIREFIT_FOR_EACH_SCALAR(X) X(Dual8)
 /// Each of them and those with as many derivatives or more.
-#define BIREFIT_FOR_EACH_RAISE(X)                                                                                                            \
-  X(double, double) X(Pack, Pack) X(Pack, Dual1) X(Pack, Dual2) X(Pack, Dual4) X(Pack, Dual8) X(Dual1, Dual1) X(Dual1, Dual2) X(Dual1, Dual4) \
-  X(Dual1, Dual8) X(Dual2, Dual2) X(Dual2, Dual4) X(Dual2, Dual8) X(Dual4, Dual4) X(Dual4, Dual8) X(Dual8, Dual8)
+#define BIREFIT_FOR_EACH_RAISE(X)                                                                             \
+  X(double, double)                                                                                           \
+  X(Pack, Pack)                                                                                               \
+  X(Pack, Dual1) X(Pack, Dual2) X(Pack, Dual4) X(Pack, Dual8) X(Dual1, Dual1) X(Dual1, Dual2) X(Dual1, Dual4) \
+      X(Dual1, Dual8) X(Dual2, Dual2) X(Dual2, Dual4) X(Dual2, Dual8) X(Dual4, Dual4) X(Dual4, Dual8) X(Dual8, Dual8)
 using Dual1 = Dual<Pack, 1>;
 using Dual2 = Dual<Pack, 2>;
 using Dual4 = Dual<Pack, 4>;

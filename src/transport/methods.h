@@ -34,18 +34,21 @@ class Modal final : public TransportMethod<S> {
  private:
   int passes_;
 };
-/// Modal::transfer() in its parts, `passes` times through the equation for the ratios; 0 = no coupling, one Gauss node a
-/// step as in Diagonal. R has derivatives that the medium and the direction do not know, the wavenumber (per um) does; `raise` brings those of S
-/// to their places. The ray's own wavenumber is not read.
+/// Modal::transfer() in its parts, `passes` times through the equation for the ratios; 0 = no coupling, one Gauss node
+/// a step as in Diagonal. R has derivatives that the medium and the direction do not know, the wavenumber (per um)
+/// does; `raise` brings those of S to their places. The ray's own wavenumber is not read.
 template <class S, class R>
-ModalTransfer<R> modal_transfer(const Column<S>&, const Ray<S>&, const R& k0_per_um, const Raise<S, R>& raise, const Mesh&, int passes = Modal<S>::kPasses);
+ModalTransfer<R> modal_transfer(const Column<S>&, const Ray<S>&, const R& k0_per_um, const Raise<S, R>& raise,
+                                const Mesh&, int passes = Modal<S>::kPasses);
 template <class S>
-ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, int passes = Modal<S>::kPasses) {
+ModalTransfer<S> modal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
+                                int passes = Modal<S>::kPasses) {
   return modal_transfer(column, ray, ray.k0_per_um, Raise<S, S>(), mesh, passes);
 }
 /// The same of Diagonal::transfer().
 template <class S, class R>
-ModalTransfer<R> diagonal_transfer(const Column<S>&, const Ray<S>&, const R& k0_per_um, const Raise<S, R>& raise, const Mesh&);
+ModalTransfer<R> diagonal_transfer(const Column<S>&, const Ray<S>&, const R& k0_per_um, const Raise<S, R>& raise,
+                                   const Mesh&);
 template <class S>
 ModalTransfer<S> diagonal_transfer(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh) {
   return diagonal_transfer(column, ray, ray.k0_per_um, Raise<S, S>(), mesh);

@@ -56,9 +56,9 @@ struct ModalTransfer {
   Complex<S> log_o, log_e;
 };
 
-/// Where the axis passes the wavevector the ordinary field a x w turns over, and whoever follows the modes by steps that
-/// miss the place ends with the wrong sign of one of them. True when the field turns by more than 60 degrees between two of
-/// `places` + 1 equally spaced u; medium(u) gives the OpticalPoint<double>.
+/// Where the axis passes the wavevector the ordinary field a x w turns over, and whoever follows the modes by steps
+/// that miss the place ends with the wrong sign of one of them. True when the field turns by more than 60 degrees
+/// between two of `places` + 1 equally spaced u; medium(u) gives the OpticalPoint<double>.
 template <class Medium>
 bool modes_turn_over(const Medium& medium, const Ray<double>& ray, double from, double to, int places) {
   Vec3<double> last{0, 0, 0};
@@ -66,7 +66,8 @@ bool modes_turn_over(const Medium& medium, const Ray<double>& ray, double from, 
     const double inside = 1e-12 + (1 - 2e-12) * i / places;
     const OpticalPoint<double> p = medium(from + (to - from) * inside);
     const double q = std::sqrt(std::max(0.0, p.ordinary - ray.kx * ray.kx - ray.ky * ray.ky));
-    const Vec3<double> now{p.axis.y * q - p.axis.z * ray.ky, p.axis.z * ray.kx - p.axis.x * q, p.axis.x * ray.ky - p.axis.y * ray.kx};
+    const Vec3<double> now{p.axis.y * q - p.axis.z * ray.ky, p.axis.z * ray.kx - p.axis.x * q,
+                           p.axis.x * ray.ky - p.axis.y * ray.kx};
     if (i > 0 && dot(now, last) <= 0.5 * std::sqrt(dot(now, now) * dot(last, last))) return true;
     last = now;
   }
@@ -82,13 +83,21 @@ struct ModalGenerator {
 
 // Two scalars know a derivative in depth: Slope<S> at a point, Series<double> as a whole.
 template <class S>
-Mat2<S> value_of(const Mat2<Slope<S>>& m) { return part(m, false); }
+Mat2<S> value_of(const Mat2<Slope<S>>& m) {
+  return part(m, false);
+}
 template <class S>
-Mat2<S> derivative_of(const Mat2<Slope<S>>& m) { return part(m, true); }
+Mat2<S> derivative_of(const Mat2<Slope<S>>& m) {
+  return part(m, true);
+}
 template <class S>
-OpticalPoint<S> value_of(const OpticalPoint<Slope<S>>& p) { return without_slope(p); }
+OpticalPoint<S> value_of(const OpticalPoint<Slope<S>>& p) {
+  return without_slope(p);
+}
 template <class S>
-Complex<S> value_of(const Complex<Slope<S>>& z) { return {z.re.value, z.im.value}; }
+Complex<S> value_of(const Complex<Slope<S>>& z) {
+  return {z.re.value, z.im.value};
+}
 inline const Mat2<Series<double>>& value_of(const Mat2<Series<double>>& m) { return m; }
 inline Mat2<Series<double>> derivative_of(const Mat2<Series<double>>& m) {
   const auto of = [](const Complex<Series<double>>& z) {

@@ -64,8 +64,8 @@ OneWay<N> one_way_of(const Vec3<S>& axis, const N& eo, const N& ee, const S& kx,
 }
 template <class S>
 OneWay<Complex<S>> one_way(const OpticalPoint<S>& p, const S& kx, const S& ky, double direction = 1.0) {
-  return one_way_of(p.axis, Complex<S>{p.ordinary, p.ordinary_im}, Complex<S>{p.extraordinary, p.extraordinary_im}, kx, ky,
-                    direction);
+  return one_way_of(p.axis, Complex<S>{p.ordinary, p.ordinary_im}, Complex<S>{p.extraordinary, p.extraordinary_im}, kx,
+                    ky, direction);
 }
 template <class S>
 OneWay<S> one_way_lossless(const OpticalPoint<S>& p, const S& kx, const S& ky, double direction = 1.0) {
@@ -74,7 +74,8 @@ OneWay<S> one_way_lossless(const OpticalPoint<S>& p, const S& kx, const S& ky, d
 
 /// Factor on E_t when light steps from medium `before` into `after`, backward waves dropped.
 template <class N>
-Matrix2<N> step_factor(const Matrix2<N>& before_forward, const Matrix2<N>& before_backward, const Matrix2<N>& after_forward) {
+Matrix2<N> step_factor(const Matrix2<N>& before_forward, const Matrix2<N>& before_backward,
+                       const Matrix2<N>& after_forward) {
   return inverse(after_forward - before_backward) * (before_forward - before_backward);
 }
 
@@ -102,8 +103,12 @@ Matrix2<S> part(const Matrix2<Slope<S>>& m, bool slope) {
 /// The point without its slopes.
 template <class S>
 OpticalPoint<S> without_slope(const OpticalPoint<Slope<S>>& p) {
-  return {{p.axis.x.value, p.axis.y.value, p.axis.z.value}, p.ordinary.value,      p.extraordinary.value,
-          p.ordinary_im.value,                               p.extraordinary_im.value, p.depth_slope_um.value};
+  return {{p.axis.x.value, p.axis.y.value, p.axis.z.value},
+          p.ordinary.value,
+          p.extraordinary.value,
+          p.ordinary_im.value,
+          p.extraordinary_im.value,
+          p.depth_slope_um.value};
 }
 
 /// E and H continuous: [i k0 N - (Y - Y-)^-1 dY/dz] du/dz.
@@ -151,8 +156,8 @@ BIREFIT_INLINE Vec3<S> su2_generator_e_and_h(const OpticalPoint<Slope<S>>& p, co
   const S g = eo * de * inverse_d * inverse_sum;
   const S half = 0.5 * k0 * p.depth_slope_um.value * g;
   const S cross = ax * p.axis.y.d[0] - ay * p.axis.x.d[0];
-  // (sqrt n_eff - sqrt n_o)^2 / (2 sqrt(n_o n_eff)) = (1 - x^2)^(-1/2) - 1, x = (n_eff - n_o)/(n_eff + n_o) = g a_t^2/sum,
-  // by its binomial series: x < 0.25 for every nematic and most crystals, next term 0.23 x^12 < 1e-8 of it.
+  // (sqrt n_eff - sqrt n_o)^2 / (2 sqrt(n_o n_eff)) = (1 - x^2)^(-1/2) - 1, x = (n_eff - n_o)/(n_eff + n_o) = g
+  // a_t^2/sum, by its binomial series: x < 0.25 for every nematic and most crystals, next term 0.23 x^12 < 1e-8 of it.
   const S at2 = ax * ax + ay * ay, x_over = g * inverse_sum;
   const S y = square(x_over * at2);
   const S series = 0.5 * (1.0 + y * (0.75 + y * (0.625 + y * (0.546875 + y * (0.4921875 + y * 0.451171875)))));

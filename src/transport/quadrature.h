@@ -1,8 +1,8 @@
 #pragma once
 // Gauss-Legendre nodes.
 
-#include <array>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -25,8 +25,8 @@ inline void gauss8_nodes(const std::vector<double>& mesh, std::vector<double>& u
   }
 }
 
-/// n Gauss-Legendre nodes on (-1, 1), upwards, and their weights: Newton's method on the recurrence of P_n from Tricomi's
-/// estimate of its zeros.
+/// n Gauss-Legendre nodes on (-1, 1), upwards, and their weights: Newton's method on the recurrence of P_n from
+/// Tricomi's estimate of its zeros.
 inline void legendre_nodes(int n, std::vector<double>& x, std::vector<double>& weight) {
   x.resize(static_cast<std::size_t>(n));
   weight.resize(x.size());

@@ -49,7 +49,8 @@ Blocks4<S> berreman_generator(const OpticalPoint<S>& p, const S& k0, const S& kx
   Blocks4<S> d;
   d.ee = {kx * ex, kx * ey, ky * ex, ky * ey};
   d.eh = {kx * hx, C(S(1.0)) + kx * hy, ky * hx - C(S(1.0)), ky * hy};
-  d.he = {-(C(kx * ky) + xy + yz * ex), C(kx * kx) - yy - yz * ey, xx + xz * ex - C(ky * ky), C(kx * ky) + xy + xz * ey};
+  d.he = {-(C(kx * ky) + xy + yz * ex), C(kx * kx) - yy - yz * ey, xx + xz * ex - C(ky * ky),
+          C(kx * ky) + xy + xz * ey};
   d.hh = {-(yz * hx), -(yz * hy), xz * hx, xz * hy};
   const C f(S(0.0), k0 * p.depth_slope_um);
   return {f * d.ee, f * d.eh, f * d.he, f * d.hh};
@@ -68,8 +69,8 @@ template <class S>
 Scattering<S> joined(const Scattering<S>& a, const Scattering<S>& b) {
   const Mat2<S> one = Mat2<S>::identity();
   const Mat2<S> there = inverse(one - a.back * b.front), here = inverse(one - b.front * a.back);
-  return {b.forward * there * a.forward, a.front + a.backward * (b.front * (there * a.forward)), a.backward * (here * b.backward),
-          b.back + b.forward * (a.back * (here * b.backward))};
+  return {b.forward * there * a.forward, a.front + a.backward * (b.front * (there * a.forward)),
+          a.backward * (here * b.backward), b.back + b.forward * (a.back * (here * b.backward))};
 }
 
 /// The slice whose transfer of (E, H) is exp(omega). exp by its Taylor series of a 2^-k part of omega, then k joinings

@@ -14,8 +14,8 @@
 namespace birefit {
 
 int fast_fft_size(int n) {
-  // Products of 2 and 5 with few fives: on these both libraries are fastest for their size (measured), and there is always one
-  // within a quarter of n.
+  // Products of 2 and 5 with few fives: on these both libraries are fastest for their size (measured), and there is
+  // always one within a quarter of n.
   for (int size = n + n % 2;; size += 2) {
     int left = size, fives = 0;
     while (left % 2 == 0) left /= 2;
@@ -53,8 +53,10 @@ struct Fft2::Plans {
 };
 
 Fft2::Fft2(int width, int height)
-    : width_(width), height_(height), plans_(new Plans{{{static_cast<std::size_t>(width), false}, {static_cast<std::size_t>(width), true}},
-                                                       {{static_cast<std::size_t>(height), false}, {static_cast<std::size_t>(height), true}}}) {}
+    : width_(width),
+      height_(height),
+      plans_(new Plans{{{static_cast<std::size_t>(width), false}, {static_cast<std::size_t>(width), true}},
+                       {{static_cast<std::size_t>(height), false}, {static_cast<std::size_t>(height), true}}}) {}
 Fft2::~Fft2() = default;
 void Fft2::forward(Plane& plane) const { plans_->run(0, width_, height_, plane); }
 void Fft2::inverse(Plane& plane) const { plans_->run(1, width_, height_, plane); }
@@ -86,12 +88,15 @@ Fft2::Fft2(int width, int height) : width_(width), height_(height), plans_(new P
   Plane plane(size()), other(size());
   auto *here = reinterpret_cast<fftw_complex*>(plane.data()), *there = reinterpret_cast<fftw_complex*>(other.data());
   const std::lock_guard lock(planner());
-  // Measured plans would differ from run to run, and with them the last bits. Of the estimated ones those from one array to another and back are
-  // the fastest, columns first: in place they copy (up to twice the time), and as one transform of two dimensions too.
+  // Measured plans would differ from run to run, and with them the last bits. Of the estimated ones those from one
+  // array to another and back are the fastest, columns first: in place they copy (up to twice the time), and as one
+  // transform of two dimensions too.
   for (int i = 0; i < 2; ++i) {
     const int sign = i == 0 ? FFTW_FORWARD : FFTW_BACKWARD;
-    plans_->steps[i][0] = fftw_plan_many_dft(1, &height, width, here, nullptr, width, 1, there, nullptr, width, 1, sign, FFTW_ESTIMATE);
-    plans_->steps[i][1] = fftw_plan_many_dft(1, &width, height, there, nullptr, 1, width, here, nullptr, 1, width, sign, FFTW_ESTIMATE);
+    plans_->steps[i][0] =
+        fftw_plan_many_dft(1, &height, width, here, nullptr, width, 1, there, nullptr, width, 1, sign, FFTW_ESTIMATE);
+    plans_->steps[i][1] =
+        fftw_plan_many_dft(1, &width, height, there, nullptr, 1, width, here, nullptr, 1, width, sign, FFTW_ESTIMATE);
   }
 }
 Fft2::~Fft2() {

@@ -1,6 +1,7 @@
 #pragma once
-// Two-dimensional complex Fourier transforms of one size, in place. The one place that knows the library that does them: FFTW, or
-// kissfft where its licence (permissive; FFTW's is the GPL) matters more than speed (README.md, "Licence").
+// Two-dimensional complex Fourier transforms of one size, in place. The one place that knows the library that does
+// them: FFTW, or kissfft where its licence (permissive; FFTW's is the GPL) matters more than speed (README.md,
+// "Licence").
 
 #include <complex>
 #include <cstddef>
@@ -18,7 +19,7 @@ struct AlignedAllocator {
   AlignedAllocator() = default;
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) {}  // NOLINT: containers rebind
-  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t{64})); }
+  T* allocate(std::size_t n) { return static_cast<T*>(::operator new (n * sizeof(T), std::align_val_t{64})); }
   /// Plain numbers stay what the memory held: writing to a table that is filled later costs as much as filling it.
   template <class U>
   void construct(U* p) {
@@ -28,14 +29,14 @@ struct AlignedAllocator {
   void construct(U* p, Args&&... args) {
     ::new (static_cast<void*>(p)) U(std::forward<Args>(args)...);
   }
-  void deallocate(T* p, std::size_t) { ::operator delete(p, std::align_val_t{64}); }
+  void deallocate(T* p, std::size_t) { ::operator delete (p, std::align_val_t{64}); }
   friend bool operator==(const AlignedAllocator&, const AlignedAllocator&) { return true; }
 };
 /// height rows of width values, row after row.
 using Plane = std::vector<std::complex<double>, AlignedAllocator<std::complex<double>>>;
 
-/// Frequency index m in [0, n) stands for m or, from n/2 on, m - n. Calls from several threads at once are fine. Same bits
-/// for the same input, whatever ran before.
+/// Frequency index m in [0, n) stands for m or, from n/2 on, m - n. Calls from several threads at once are fine. Same
+/// bits for the same input, whatever ran before.
 class Fft2 {
  public:
   /// Any sizes >= 1; those of fast_fft_size are fast.

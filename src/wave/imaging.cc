@@ -29,12 +29,13 @@ double part(const S& x, int f) {
 Matrix waves(const std::vector<double>& k, const std::vector<double>& x, double sign) {
   Matrix m(static_cast<long>(k.size()), static_cast<long>(x.size()));
   for (long i = 0; i < m.rows(); ++i)
-    for (long j = 0; j < m.cols(); ++j) m(i, j) = std::polar(1.0, sign * k[static_cast<std::size_t>(i)] * x[static_cast<std::size_t>(j)]);
+    for (long j = 0; j < m.cols(); ++j)
+      m(i, j) = std::polar(1.0, sign * k[static_cast<std::size_t>(i)] * x[static_cast<std::size_t>(j)]);
   return m;
 }
 
-/// Interpolation between points one apart of what has no frequency beyond 1/2.2 of the highest they can carry: sinc under a window,
-/// twelve points, 1e-5 of the value at worst.
+/// Interpolation between points one apart of what has no frequency beyond 1/2.2 of the highest they can carry: sinc
+/// under a window, twelve points, 1e-5 of the value at worst.
 constexpr int kTaps = 12;
 constexpr double kOversampling = 2.2;
 template <class T>
@@ -69,7 +70,8 @@ struct PixelWeights {
       row.weight.assign(static_cast<std::size_t>(high - low + 1), 0.0);
       row.slope = row.weight;
       for (int i = 0; i < n; ++i) {
-        const double at = middle + 0.5 * node[static_cast<std::size_t>(i)] * per_pixel, share = 0.5 * weight[static_cast<std::size_t>(i)];
+        const double at = middle + 0.5 * node[static_cast<std::size_t>(i)] * per_pixel,
+                     share = 0.5 * weight[static_cast<std::size_t>(i)];
         const int cell = static_cast<int>(std::floor(at));
         for (int j = std::max(low, cell - kTaps / 2 + 1); j <= std::min(high, cell + kTaps / 2); ++j) {
           Dual<double, 1> x(at - j);
@@ -88,14 +90,19 @@ struct PixelWeights {
 WaveImaging plan_imaging(const WaveGrid& g, double k0, double na, double reach_x_um, double reach_y_um) {
   WaveImaging r;
   const double box = std::max(g.nx, g.ny) * g.step_um;
-  // The picture's period is three boxes, and more where the objective is weak: what it spreads from one does not meet the next.
+  // The picture's period is three boxes, and more where the objective is weak: what it spreads from one does not meet
+  // the next.
   const double period = std::max(3 * box, box + 24 * kPi / (k0 * na));
   r.pupil_step_per_um = 2 * kPi / period;
-  r.pupil_half = static_cast<int>(std::ceil(1.05 * k0 * na / r.pupil_step_per_um)) + 1;  // 5 %: the wavelength may be fitted
+  // 5 %: the wavelength may be fitted
+  r.pupil_half = static_cast<int>(std::ceil(1.05 * k0 * na / r.pupil_step_per_um)) + 1;
   // Intensity carries twice the field's wavevectors.
   r.spacing_um = kPi / (2 * 1.05 * k0 * na * kOversampling);
   const auto half = [&](double reach, int n) {
-    return n == 1 ? 0 : static_cast<int>(std::ceil(std::min(reach, std::max(0.75 * n * g.step_um, 0.25 * period)) / r.spacing_um)) + kTaps / 2;
+    return n == 1 ? 0
+                  : static_cast<int>(
+                        std::ceil(std::min(reach, std::max(0.75 * n * g.step_um, 0.25 * period)) / r.spacing_um)) +
+                        kTaps / 2;
   };
   r.half_x = half(reach_x_um, g.nx);
   r.half_y = half(reach_y_um, g.ny);
@@ -103,15 +110,16 @@ WaveImaging plan_imaging(const WaveGrid& g, double k0, double na, double reach_x
 }
 
 template <class S>
-void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& light, const WaveMicroscope<S>& m, const std::vector<WaveField>& fields,
-                int threads, const std::vector<Image*>& images) {
+void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& light, const WaveMicroscope<S>& m,
+                const std::vector<WaveField>& fields, int threads, const std::vector<Image*>& images) {
   constexpr int kFields = 1 + ScalarTraits<S>::derivatives;
   const auto places = [](int half, double step) {
     std::vector<double> x;
     for (int i = -half; i <= half; ++i) x.push_back(i * step);
     return x;
   };
-  const std::vector<double> kx = places(plan.pupil_half, plan.pupil_step_per_um), ky = g.ny == 1 ? std::vector<double>{0.0} : kx;
+  const std::vector<double> kx = places(plan.pupil_half, plan.pupil_step_per_um),
+                            ky = g.ny == 1 ? std::vector<double>{0.0} : kx;
   const long nkx = static_cast<long>(kx.size()), nky = static_cast<long>(ky.size());
   // Angular spectrum of the scattered field, by component.
   const auto shifted = [](std::vector<double> k, double by) {
@@ -121,7 +129,8 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   std::vector<double> gx, gy;
   for (int i = 0; i < g.nx; ++i) gx.push_back(g.x_um(i));
   for (int j = 0; j < g.ny; ++j) gy.push_back(g.y_um(j));
-  const Matrix to_kx = waves(gx, shifted(kx, light.kx_per_um), -1) * g.step_um, to_ky = waves(shifted(ky, light.ky_per_um), gy, -1) * (g.ny == 1 ? 1.0 : g.step_um);
+  const Matrix to_kx = waves(gx, shifted(kx, light.kx_per_um), -1) * g.step_um,
+               to_ky = waves(shifted(ky, light.ky_per_um), gy, -1) * (g.ny == 1 ? 1.0 : g.step_um);
   const auto reaches = [&](int f) { return static_cast<std::size_t>(f) < fields.size(); };
   std::vector<Matrix> spectrum(2 * kFields);
   parallel_for(2 * kFields, threads, [&](int job) {
@@ -132,7 +141,8 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   });
   // Objective and analyser: one number a wavevector.
   std::vector<Matrix> seen(kFields, Matrix::Zero(nky, nkx));
-  const S tilt_q = root(light.n_host * light.n_host - (square(light.kx_per_um) + square(light.ky_per_um)) * inverse(light.k0_per_um * light.k0_per_um));
+  const S tilt_q = root(light.n_host * light.n_host - (square(light.kx_per_um) + square(light.ky_per_um)) *
+                                                          inverse(light.k0_per_um * light.k0_per_um));
   const S depth = m.focus_um - g.exit_um, inverse_k0 = inverse(light.k0_per_um);
   parallel_for(static_cast<int>(nkx), threads, [&](int column) {
     alignas(64) double ky_lanes[kLanes];
@@ -143,22 +153,26 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
       const Pack y = Pack::load_aligned(ky_lanes), k2 = y * y + Pack(x * x), f = inverse_root(max_of(k2, Pack(1e-30)));
       const auto centre = k2 < Pack(1e-20);
       const Pack px = select(centre, Pack(1.0), f * Pack(x)), py = select(centre, Pack(0.0), f * y);
-      // Where the pupil ends within a step, about the part of the step that is inside; a cubic ramp, for derivatives without steps.
+      // Where the pupil ends within a step, about the part of the step that is inside; a cubic ramp, for derivatives
+      // without steps.
       const S edge = (m.objective_na * light.k0_per_um - S(k2 * f)) * (1 / (1.29 * plan.pupil_step_per_um)) + 0.5;
       const S inside = min_of(max_of(edge, S(0.0)), S(1.0)), open = inside * inside * (3.0 - 2.0 * inside);
       const S q = root(max_of(S(light.n_host * light.n_host - S(k2) * inverse_k0 * inverse_k0), S(1e-6)));
       // An aplanatic objective turns s and p into the plane and keeps their flux: a itself.
-      const S s_over = m.aplanatic ? S(1.0) : root(light.n_host * inverse(q)), p_over = m.aplanatic ? S(1.0) : inverse(s_over);
+      const S s_over = m.aplanatic ? S(1.0) : root(light.n_host * inverse(q)),
+              p_over = m.aplanatic ? S(1.0) : inverse(s_over);
       S sn, cs;
       sin_cos(light.k0_per_um * (q - tilt_q) * depth, sn, cs);
       const S on_p = S(px) * m.ax + S(py) * m.ay, on_s = S(px) * m.ay - S(py) * m.ax;
-      const S of_x = open * (p_over * on_p * S(px) - s_over * on_s * S(py)), of_y = open * (p_over * on_p * S(py) + s_over * on_s * S(px));
+      const S of_x = open * (p_over * on_p * S(px) - s_over * on_s * S(py)),
+              of_y = open * (p_over * on_p * S(py) + s_over * on_s * S(px));
       const S factor[4] = {of_x * cs, of_x * sn, of_y * cs, of_y * sn};
       for (int k = 0; k < count; ++k) {
         const auto number = [&](int which, int plane) {
           const auto at = [&](const S& s) {
             if constexpr (kFields > 1)
-              return plane == 0 ? s.value.get(static_cast<std::size_t>(k)) : s.d[static_cast<std::size_t>(plane - 1)].get(static_cast<std::size_t>(k));
+              return plane == 0 ? s.value.get(static_cast<std::size_t>(k))
+                                : s.d[static_cast<std::size_t>(plane - 1)].get(static_cast<std::size_t>(k));
             else
               return s.get(static_cast<std::size_t>(k));
           };
@@ -167,7 +181,9 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
         const Z base_x = spectrum[0](row + k, column), base_y = spectrum[1](row + k, column);
         for (int p = 0; p < kFields; ++p) {
           Z v(0);
-          if (reaches(p)) v = number(0, 0) * spectrum[static_cast<std::size_t>(2 * p)](row + k, column) + number(1, 0) * spectrum[static_cast<std::size_t>(2 * p + 1)](row + k, column);
+          if (reaches(p))
+            v = number(0, 0) * spectrum[static_cast<std::size_t>(2 * p)](row + k, column) +
+                number(1, 0) * spectrum[static_cast<std::size_t>(2 * p + 1)](row + k, column);
           if (p > 0) v += number(0, p) * base_x + number(1, p) * base_y;
           seen[static_cast<std::size_t>(p)](row + k, column) = v;
         }
@@ -175,8 +191,10 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
     }
   });
   // Back to space, at the points of the picture.
-  const std::vector<double> x = places(plan.half_x, plan.spacing_um), y = g.ny == 1 ? std::vector<double>{0.0} : places(plan.half_y, plan.spacing_um);
-  const Matrix from_kx = waves(kx, x, 1) * (plan.pupil_step_per_um / (2 * kPi)), from_ky = waves(y, ky, 1) * (g.ny == 1 ? 1.0 : plan.pupil_step_per_um / (2 * kPi));
+  const std::vector<double> x = places(plan.half_x, plan.spacing_um),
+                            y = g.ny == 1 ? std::vector<double>{0.0} : places(plan.half_y, plan.spacing_um);
+  const Matrix from_kx = waves(kx, x, 1) * (plan.pupil_step_per_um / (2 * kPi)),
+               from_ky = waves(y, ky, 1) * (g.ny == 1 ? 1.0 : plan.pupil_step_per_um / (2 * kPi));
   parallel_for(kFields, threads, [&](int p) {
     Matrix& field = seen[static_cast<std::size_t>(p)];
     field = (from_ky * field * from_kx).eval();
@@ -186,15 +204,19 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   const bool collected = std::hypot(light.kx_per_um, light.ky_per_um) <= m.objective_na * k0;
   const S direct = m.ax * light.ex + m.ay * light.ey;
   // Intensity less that of the incident light, which is what remains outside.
-  std::vector<Eigen::MatrixXd> intensity(kFields, Eigen::MatrixXd(static_cast<long>(y.size()), static_cast<long>(x.size())));
+  std::vector<Eigen::MatrixXd> intensity(kFields,
+                                         Eigen::MatrixXd(static_cast<long>(y.size()), static_cast<long>(x.size())));
   parallel_for(static_cast<int>(x.size()), threads, [&](int i) {
     for (long j = 0; j < static_cast<long>(y.size()); ++j) {
-      const Z wave = tilted ? std::polar(1.0, light.kx_per_um * x[static_cast<std::size_t>(i)] + light.ky_per_um * y[static_cast<std::size_t>(j)]) : Z(1);
+      const Z wave = tilted ? std::polar(1.0, light.kx_per_um * x[static_cast<std::size_t>(i)] +
+                                                  light.ky_per_um * y[static_cast<std::size_t>(j)])
+                            : Z(1);
       const Z incident = collected ? part(direct, 0) * wave : Z(0), field = incident + seen[0](j, i);
       intensity[0](j, i) = std::norm(field) - std::norm(incident);
       for (int p = 1; p < kFields; ++p) {
         const Z by = collected ? part(direct, p) * wave : Z(0);
-        intensity[static_cast<std::size_t>(p)](j, i) = 2 * std::real(std::conj(field) * (by + seen[static_cast<std::size_t>(p)](j, i)) - std::conj(incident) * by);
+        intensity[static_cast<std::size_t>(p)](j, i) =
+            2 * std::real(std::conj(field) * (by + seen[static_cast<std::size_t>(p)](j, i)) - std::conj(incident) * by);
       }
     }
   });
@@ -223,7 +245,8 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   for (std::size_t p = 0; p < images.size(); ++p) {
     Image& image = *images[p];
     if (image.width() != m.width || image.height() != m.height) image = Image(m.width, m.height);
-    std::fill(image.row(0), image.row(0) + static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height), part(background, static_cast<int>(p)));
+    std::fill(image.row(0), image.row(0) + static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height),
+              part(background, static_cast<int>(p)));
     along_y(along_x(intensity[p], false), false, 1.0, image);
     if (p == 0) continue;
     const int f = static_cast<int>(p);
@@ -233,9 +256,9 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   }
 }
 
-#define BIREFIT_INSTANTIATE(S)                                                                                                                       \
-  template void form_image<S>(const WaveGrid&, const WaveImaging&, const WaveLight<S>&, const WaveMicroscope<S>&, const std::vector<WaveField>&, int, \
-                              const std::vector<Image*>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                    \
+  template void form_image<S>(const WaveGrid&, const WaveImaging&, const WaveLight<S>&, const WaveMicroscope<S>&, \
+                              const std::vector<WaveField>&, int, const std::vector<Image*>&);
 BIREFIT_INSTANTIATE(Pack)
 BIREFIT_INSTANTIATE(Dual1)
 BIREFIT_INSTANTIATE(Dual2)

@@ -1,6 +1,6 @@
 #pragma once
-// From the scattered field behind an object to what the camera sees: objective, analyser, pixels. Fourier integrals as matrix
-// products, so that pupil and picture have the sampling they need, whatever the propagation's grid.
+// From the scattered field behind an object to what the camera sees: objective, analyser, pixels. Fourier integrals as
+// matrix products, so that pupil and picture have the sampling they need, whatever the propagation's grid.
 
 #include "birefit/image.h"
 #include "wave/split_step.h"
@@ -14,25 +14,25 @@ struct WaveImaging {
   double spacing_um = 0;         ///< of the points where intensity is computed
   int half_x = 0, half_y = 0;    ///< points -half .. half about the object's centre; beyond: the incident light alone
 };
-/// objective_na <= n_host; reach: farthest point of the picture from the object's centre that is wanted (um), along x and y; no further
-/// than the grid's own field tells.
+/// objective_na <= n_host; reach: farthest point of the picture from the object's centre that is wanted (um), along x
+/// and y; no further than the grid's own field tells.
 WaveImaging plan_imaging(const WaveGrid&, double k0_per_um, double objective_na, double reach_x_um, double reach_y_um);
 
 template <class S>
 struct WaveMicroscope {
   double objective_na = 0;
-  bool aplanatic = false;     ///< docs/conventions.md
-  S focus_um = S(0.0);        ///< z of the focal plane
-  S ax, ay;                   ///< analyser, unit vector
-  S center_x_px, center_y_px; ///< where the object's centre is seen
+  bool aplanatic = false;      ///< docs/conventions.md
+  S focus_um = S(0.0);         ///< z of the focal plane
+  S ax, ay;                    ///< analyser, unit vector
+  S center_x_px, center_y_px;  ///< where the object's centre is seen
   double pixel_um = 0;
   int width = 0, height = 0;  ///< of the picture, pixels
 };
 
-/// Mean intensity of every pixel, and its derivatives: 1 + derivatives images, resized to fit. Derivatives beyond those that `fields` has
-/// are by parameters that the light on its way does not depend on.
+/// Mean intensity of every pixel, and its derivatives: 1 + derivatives images, resized to fit. Derivatives beyond those
+/// that `fields` has are by parameters that the light on its way does not depend on.
 template <class S>
-void form_image(const WaveGrid&, const WaveImaging&, const WaveLight<S>&, const WaveMicroscope<S>&, const std::vector<WaveField>&, int threads,
-                const std::vector<Image*>& images);
+void form_image(const WaveGrid&, const WaveImaging&, const WaveLight<S>&, const WaveMicroscope<S>&,
+                const std::vector<WaveField>&, int threads, const std::vector<Image*>& images);
 
 }  // namespace birefit

@@ -12,27 +12,33 @@ namespace {
 
 using Number = std::complex<double>;
 
-/// The generator's coefficients at the points of the box: eps_tt - g g/eps_zz (xx, yy, xy), g/eps_zz (x, y) and 1/eps_zz.
+/// The generator's coefficients at the points of the box: eps_tt - g g/eps_zz (xx, yy, xy), g/eps_zz (x, y) and
+/// 1/eps_zz.
 struct Coefficients {
   std::vector<std::array<double, 6>> at;
   double index = 0;  ///< no mode has |q| above it: sqrt of the largest eigenvalue of eps, or more
 };
 
-/// sqrt of a bound of the largest eigenvalue (Gershgorin) of the medium with these coefficients. Throws unless eps - cut is positive
-/// definite, by its leading minors. That suffices for real q: the flux form's matrix ((0, 1), (1, 0)) A is then positive definite, being
-/// the least over Ez of E*.eps E - |kappa Ez|^2 - |kp.e|^2 + |h + kappa Ez|^2, with |kappa|^2 < cut.
+/// sqrt of a bound of the largest eigenvalue (Gershgorin) of the medium with these coefficients. Throws unless eps -
+/// cut is positive definite, by its leading minors. That suffices for real q: the flux form's matrix ((0, 1), (1, 0)) A
+/// is then positive definite, being the least over Ez of E*.eps E - |kappa Ez|^2 - |kp.e|^2 + |h + kappa Ez|^2, with
+/// |kappa|^2 < cut.
 double checked_index(const std::array<double, 6>& c, double cut) {
-  const double zz = 1 / c[5], xz = c[3] * zz, yz = c[4] * zz, xx = c[0] + xz * c[3], yy = c[1] + yz * c[4], xy = c[2] + xz * c[4];
+  const double zz = 1 / c[5], xz = c[3] * zz, yz = c[4] * zz, xx = c[0] + xz * c[3], yy = c[1] + yz * c[4],
+               xy = c[2] + xz * c[4];
   const double x = xx - cut, y = yy - cut, z = zz - cut;
   if (!(x > 0 && x * y > xy * xy && x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz) > 0))
     throw std::domain_error("march: eps is not above (limit n_host)^2 everywhere; lower the limit");
-  return std::sqrt(std::max({xx + std::abs(xy) + std::abs(xz), yy + std::abs(xy) + std::abs(yz), zz + std::abs(xz) + std::abs(yz)}));
+  return std::sqrt(
+      std::max({xx + std::abs(xy) + std::abs(xz), yy + std::abs(xy) + std::abs(yz), zz + std::abs(xz) + std::abs(yz)}));
 }
 
-/// The two halves of a slab whose exponentials, one after the other, are right to the fourth order of its thickness: means of the
-/// generator with weights 1 -+ 4 u, u = -1/2..1/2 the depth (S. Blanes, P. C. Moan, Appl. Numer. Math. 56, 1519 (2006), their CF4:2).
-/// One mean for the whole slab would be of second order, and needs four times the slabs for 3 % where the director twists.
-std::array<Coefficients, 2> halves(const MarchGrid& grid, int slab, double limit, const DielectricAt& dielectric, int threads) {
+/// The two halves of a slab whose exponentials, one after the other, are right to the fourth order of its thickness:
+/// means of the generator with weights 1 -+ 4 u, u = -1/2..1/2 the depth (S. Blanes, P. C. Moan, Appl. Numer. Math. 56,
+/// 1519 (2006), their CF4:2). One mean for the whole slab would be of second order, and needs four times the slabs for
+/// 3 % where the director twists.
+std::array<Coefficients, 2> halves(const MarchGrid& grid, int slab, double limit, const DielectricAt& dielectric,
+                                   int threads) {
   const double thickness = (grid.z1_um - grid.z0_um) / grid.slabs, gauss = std::sqrt(1.0 / 12);
   const std::size_t width = static_cast<std::size_t>(grid.nx), rows = static_cast<std::size_t>(grid.ny);
   std::array<Coefficients, 2> half;
@@ -47,11 +53,14 @@ std::array<Coefficients, 2> halves(const MarchGrid& grid, int slab, double limit
       for (int sample = 0; sample < 2 * grid.subslices; ++sample) {
         const double u = (sample / 2 + 0.5 + (sample % 2 == 0 ? -gauss : gauss)) / grid.subslices - 0.5;
         const auto [xx, yy, zz, xy, xz, yz] = dielectric(x, y, grid.z0_um + thickness * (slab + 0.5 + u));
-        const std::array<double, 6> values{xx - xz * xz / zz, yy - yz * yz / zz, xy - xz * yz / zz, xz / zz, yz / zz, 1 / zz};
+        const std::array<double, 6> values{xx - xz * xz / zz, yy - yz * yz / zz, xy - xz * yz / zz,
+                                           xz / zz,           yz / zz,           1 / zz};
         for (std::size_t h = 0; h < 2; ++h)
-          for (std::size_t k = 0; k < 6; ++k) half[h].at[here][k] += (1 + (h == 0 ? -4 : 4) * u) / (2 * grid.subslices) * values[k];
+          for (std::size_t k = 0; k < 6; ++k)
+            half[h].at[here][k] += (1 + (h == 0 ? -4 : 4) * u) / (2 * grid.subslices) * values[k];
       }
-      for (std::size_t h = 0; h < 2; ++h) index[row][h] = std::max(index[row][h], checked_index(half[h].at[here], limit * limit));
+      for (std::size_t h = 0; h < 2; ++h)
+        index[row][h] = std::max(index[row][h], checked_index(half[h].at[here], limit * limit));
     }
   });
   for (const auto& row : index)
@@ -59,8 +68,8 @@ std::array<Coefficients, 2> halves(const MarchGrid& grid, int slab, double limit
   return half;
 }
 
-/// One wave's field, by its spectrum inside the limit: ex, ey, hx, hy, one block after the other. Wavevectors are those of the box
-/// plus the incident wave's (Bloch), so a tilted wave is the constant.
+/// One wave's field, by its spectrum inside the limit: ex, ey, hx, hy, one block after the other. Wavevectors are those
+/// of the box plus the incident wave's (Bloch), so a tilted wave is the constant.
 class Field {
  public:
   Field(const MarchGrid& grid, const Fft2& fft, double k0, double n_host, const MarchWave& wave)
@@ -70,7 +79,8 @@ class Field {
         const auto frequency = [](int m, int n) { return m < (n + 1) / 2 ? m : m - n; };
         const int mx = frequency(i, grid.nx), my = frequency(j, grid.ny);
         const double step = 2 * std::numbers::pi / k0;
-        const double kx = wave.kappa[0] + mx * step / grid.box_x_um, ky = wave.kappa[1] + (my == 0 ? 0 : my * step / grid.box_y_um);
+        const double kx = wave.kappa[0] + mx * step / grid.box_x_um,
+                     ky = wave.kappa[1] + (my == 0 ? 0 : my * step / grid.box_y_um);
         // The middle frequency of an even size stands for both signs and is not kept.
         if (kx * kx + ky * ky >= limit_ * limit_ || 2 * mx == -grid.nx || 2 * my == -grid.ny) continue;
         index_.push_back(static_cast<std::size_t>(j) * static_cast<std::size_t>(grid.nx) + static_cast<std::size_t>(i));
@@ -89,7 +99,8 @@ class Field {
     for (Plane& plane : planes_) plane.resize(fft_.size());
   }
 
-  /// The field behind a layer of this medium: exp(i k0 h A) = sum_m (2 - delta_m0) i^m J_m(tau) T_m(A / index), tau = k0 h index.
+  /// The field behind a layer of this medium: exp(i k0 h A) = sum_m (2 - delta_m0) i^m J_m(tau) T_m(A / index), tau =
+  /// k0 h index.
   void advance(const Coefficients& medium, double thickness_um) {
     const double tau = k0_ * thickness_um * medium.index;
     Plane before = state_, now(state_.size()), next(state_.size());
@@ -97,7 +108,8 @@ class Field {
       constexpr Number turn[4] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
       const double bessel = std::cyl_bessel_j(static_cast<double>(m), tau);
       const Number weight = (m == 0 ? 1.0 : 2.0) * bessel * turn[m % 4];
-      for (std::size_t i = 0; i < state_.size(); ++i) state_[i] = m == 0 ? weight * term[i] : state_[i] + weight * term[i];
+      for (std::size_t i = 0; i < state_.size(); ++i)
+        state_[i] = m == 0 ? weight * term[i] : state_[i] + weight * term[i];
       // Beyond m = tau the terms fall faster than any power.
       return m < tau || std::abs(bessel) > 1e-13;
     };
@@ -118,14 +130,16 @@ class Field {
     return sum;
   }
 
-  /// e+ = (e + Y^-1 h)/2, the forward waves of the host (h = +-Y e, Y^-1 = (1 - kappa kappa / n^2)/q), less the incident one.
+  /// e+ = (e + Y^-1 h)/2, the forward waves of the host (h = +-Y e, Y^-1 = (1 - kappa kappa / n^2)/q), less the
+  /// incident one.
   void exit(double z_um, MarchedField& out) {
     const std::size_t n = count();
     out.ex.assign(fft_.size(), 0);
     out.ey.assign(fft_.size(), 0);
     for (std::size_t i = 0; i < n; ++i) {
       const auto [kx, ky] = kappa_[i];
-      const Number hx = state_[2 * n + i], hy = state_[3 * n + i], divergence = (kx * hx + ky * hy) / (n_host_ * n_host_);
+      const Number hx = state_[2 * n + i], hy = state_[3 * n + i],
+                   divergence = (kx * hx + ky * hy) / (n_host_ * n_host_);
       out.ex[index_[i]] = 0.5 * (state_[i] + (hx - kx * divergence) / q(i));
       out.ey[index_[i]] = 0.5 * (state_[n + i] + (hy - ky * divergence) / q(i));
     }
@@ -137,7 +151,9 @@ class Field {
 
  private:
   std::size_t count() const { return index_.size(); }
-  double q(std::size_t i) const { return std::sqrt(n_host_ * n_host_ - kappa_[i][0] * kappa_[i][0] - kappa_[i][1] * kappa_[i][1]); }
+  double q(std::size_t i) const {
+    return std::sqrt(n_host_ * n_host_ - kappa_[i][0] * kappa_[i][0] - kappa_[i][1] * kappa_[i][1]);
+  }
   Number incident_phase(double z_um) const { return std::polar(1.0, k0_ * q(0) * z_um); }
 
   /// out = A in, d/dz = i k0 A: the equations of the header. kappa acts on spectra, the medium at points.
@@ -155,9 +171,9 @@ class Field {
     for (std::size_t p = 0; p < fft_.size(); ++p) {
       const auto [xx, yy, xy, vx, vy, eta] = medium.at[p];
       const Number a = scale * ex[p], b = scale * ey[p], c = scale * divergence[p];
-      ex[p] = xx * a + xy * b - vx * c;                  // Dx
-      ey[p] = xy * a + yy * b - vy * c;                  // Dy
-      divergence[p] = -(vx * a + vy * b + eta * c);      // Ez
+      ex[p] = xx * a + xy * b - vx * c;              // Dx
+      ey[p] = xy * a + yy * b - vy * c;              // Dy
+      divergence[p] = -(vx * a + vy * b + eta * c);  // Ez
     }
     for (Plane& plane : planes_) fft_.forward(plane);
     const Plane& ez = divergence;
@@ -175,8 +191,8 @@ class Field {
   const Fft2& fft_;
   double k0_, n_host_, limit_;
   MarchWave wave_;
-  std::vector<std::size_t> index_;             ///< of the frequencies kept, in a plane
-  std::vector<std::array<double, 2>> kappa_;   ///< of the same
+  std::vector<std::size_t> index_;            ///< of the frequencies kept, in a plane
+  std::vector<std::array<double, 2>> kappa_;  ///< of the same
   Plane state_;
   std::array<Plane, 3> planes_;
 };
@@ -195,7 +211,8 @@ std::vector<MarchedField> march(const MarchGrid& grid, double k0_per_um, double 
   for (int slab = 0; slab < grid.slabs; ++slab) {
     const auto medium = halves(grid, slab, grid.limit * n_host, dielectric, threads);
     parallel_for(n, threads, [&](int w) {
-      for (const Coefficients& half : medium) fields[static_cast<std::size_t>(w)].advance(half, 0.5 * (grid.z1_um - grid.z0_um) / grid.slabs);
+      for (const Coefficients& half : medium)
+        fields[static_cast<std::size_t>(w)].advance(half, 0.5 * (grid.z1_um - grid.z0_um) / grid.slabs);
     });
   }
   for (std::size_t w = 0; w < waves.size(); ++w) {

@@ -12,8 +12,8 @@
 namespace birefit {
 namespace {
 
-/// x - plain(x): no value, only derivatives. f(x) is then f + f' change(x) with f and f' plain numbers, much less work than a
-/// chain of duals where f is long; nothing at all for double.
+/// x - plain(x): no value, only derivatives. f(x) is then f + f' change(x) with f and f' plain numbers, much less work
+/// than a chain of duals where f is long; nothing at all for double.
 template <class S>
 S change(const S& x) {
   if constexpr (ScalarTraits<S>::derivatives == 0)
@@ -45,8 +45,8 @@ RadialPair<S> scaled(const RadialPair<S>& p) {
 /// exp(-(4/3) sqrt(2 / z) L^(3/2)), which is 1e-16 at L = 7.3 z^(1/3); the rest is for small z and for derivatives.
 int miller_margin(double z) { return 10 + static_cast<int>(9 * std::cbrt(z)); }
 
-/// The coefficient of a mode whose inner field has tangential components in the ratio u : v at the surface, where the host's
-/// waves have psi : psi_v and eta : eta_v. N / (N + i M) with real N, M, so |1 - 2 a| = 1 whatever their errors.
+/// The coefficient of a mode whose inner field has tangential components in the ratio u : v at the surface, where the
+/// host's waves have psi : psi_v and eta : eta_v. N / (N + i M) with real N, M, so |1 - 2 a| = 1 whatever their errors.
 template <class S>
 Complex<S> coefficient(const S& u, const S& v, const S& psi, const S& psi_v, const S& eta, const S& eta_v) {
   const S n = u * psi_v - v * psi, m = u * eta_v - v * eta;
@@ -62,8 +62,8 @@ Vec3<double> cross(const Vec3<double>& a, const Vec3<double>& b) {
 
 template <class S>
 RadialPair<S> regular_pair(const S& nu, const S& z) {
-  // Miller's downward recurrence f_(k-1) = (2 (nu + k) + 1) / z f_k - f_(k+1): the continued fraction of psi'/psi without its
-  // divisions, so that zeros of psi do no harm.
+  // Miller's downward recurrence f_(k-1) = (2 (nu + k) + 1) / z f_k - f_(k+1): the continued fraction of psi'/psi
+  // without its divisions, so that zeros of psi do no harm.
   const int start = static_cast<int>(std::max(plain(z) - plain(nu), 0.0)) + miller_margin(plain(z));
   const S over = inverse(z), step = 2.0 * over, first = (2.0 * nu + 1.0) * over;
   S above(0.0), here(1e-20);
@@ -77,8 +77,9 @@ RadialPair<S> regular_pair(const S& nu, const S& z) {
 
 template <class S>
 RadialPair<S> carried(const RadialPair<S>& from, const S& lambda, const S& z_from, const S& z_to) {
-  // Taylor steps z -> z (1 + s). Not longer than 1/5 of the way to the singularity at z = 0 nor than 4 radians (or e-folds),
-  // for which kTerms reach 4^34 / 34! = 1e-18. Outwards the regular solution is the growing one, so errors do not grow past it.
+  // Taylor steps z -> z (1 + s). Not longer than 1/5 of the way to the singularity at z = 0 nor than 4 radians (or
+  // e-folds), for which kTerms reach 4^34 / 34! = 1e-18. Outwards the regular solution is the growing one, so errors do
+  // not grow past it.
   constexpr int kTerms = 34;
   RadialPair<S> here = from;
   S z = z_from;
@@ -88,13 +89,15 @@ RadialPair<S> carried(const RadialPair<S>& from, const S& lambda, const S& z_fro
     last = step >= rest;
     // The last step ends at z_to itself, whose derivatives it thereby takes on; inner stops need none of their own.
     const S next = last ? z_to : z + step;
-    const S h = next - z, over = inverse(z), s = h * over, far = h * (1.0 - lambda * over * over), s_over = s * over, hs = 2.0 * h * s, hss = h * s * s;
-    // With d_j = h^j u^(j) / j! the equation, (1 + s)^2 z^2 u'' + ((1 + s)^2 z^2 - lambda) u = 0, gives each term of the slope
-    // from those before; written without a division by h, which may vanish.
+    const S h = next - z, over = inverse(z), s = h * over, far = h * (1.0 - lambda * over * over), s_over = s * over,
+            hs = 2.0 * h * s, hss = h * s * s;
+    // With d_j = h^j u^(j) / j! the equation, (1 + s)^2 z^2 u'' + ((1 + s)^2 z^2 - lambda) u = 0, gives each term of
+    // the slope from those before; written without a division by h, which may vanish.
     S d0(0.0), d1(0.0), d2 = here.u, d3 = here.slope * h;  // d_(j-2) .. d_(j+1)
     S u = d2 + d3, slope = here.slope;
     for (int j = 0; j < kTerms; ++j) {
-      const S term = (-1.0 / (j + 1)) * ((2.0 * j * (j + 1)) * over * d3 + (j * (j - 1.0) * s_over + far) * d2 + hs * d1 + hss * d0);
+      const S term = (-1.0 / (j + 1)) *
+                     ((2.0 * j * (j + 1)) * over * d3 + (j * (j - 1.0) * s_over + far) * d2 + hs * d1 + hss * d0);
       d0 = d1, d1 = d2, d2 = d3, d3 = (1.0 / (j + 2)) * h * term;
       slope += term;
       u += d3;
@@ -113,7 +116,8 @@ RiccatiBessel<S> riccati_bessel(const S& x, int orders) {
   S s, c;
   sin_cos(x, s, c);
   const S psi0 = s, psi1 = s * over - c;
-  // psi downwards and to scale by its first two, which never vanish together; eta upwards. Both ways are the stable ones.
+  // psi downwards and to scale by its first two, which never vanish together; eta upwards. Both ways are the stable
+  // ones.
   S above(0.0), here(1e-100);
   for (int k = static_cast<int>(std::max<double>(orders, plain(x))) + miller_margin(plain(x)); k > 0; --k) {
     const S below = (2.0 * k + 1.0) * over * here - above;
@@ -130,14 +134,15 @@ RiccatiBessel<S> riccati_bessel(const S& x, int orders) {
   for (S& psi : r.psi) psi = psi * scale;
   r.eta[0] = -c;
   r.eta[1] = -(c * over) - s;
-  for (std::size_t n = 1; n + 1 < size; ++n) r.eta[n + 1] = (2.0 * static_cast<double>(n) + 1.0) * over * r.eta[n] - r.eta[n - 1];
+  for (std::size_t n = 1; n + 1 < size; ++n)
+    r.eta[n + 1] = (2.0 * static_cast<double>(n) + 1.0) * over * r.eta[n] - r.eta[n - 1];
   return r;
 }
 
 int series_orders(double x) {
-  // Outside, wave n is kept off the surface by a barrier: |a_n| is of the order of psi_n / eta_n(x), see miller_margin. A high
-  // index inside does not change that: it makes resonances, but those of larger n are narrower than the rounding of x.
-  // Wiscombe's x + 4 x^(1/3) + 2 (Appl. Opt. 19, 1505, 1980) stops at 1e-7.
+  // Outside, wave n is kept off the surface by a barrier: |a_n| is of the order of psi_n / eta_n(x), see miller_margin.
+  // A high index inside does not change that: it makes resonances, but those of larger n are narrower than the rounding
+  // of x. Wiscombe's x + 4 x^(1/3) + 2 (Appl. Opt. 19, 1505, 1980) stops at 1e-7.
   return static_cast<int>(x + 8 * std::cbrt(x)) + 6;
 }
 
@@ -221,18 +226,21 @@ ScatteringAmplitudes<S> scattering_amplitudes(const RadialSeries<S>& series, con
 template <class S>
 S extinction_efficiency(const RadialSeries<S>& series) {
   S sum(0.0);
-  for (std::size_t i = 0; i < series.a.size(); ++i) sum += (2.0 * static_cast<double>(i) + 3) * (series.a[i].re + series.b[i].re);
+  for (std::size_t i = 0; i < series.a.size(); ++i)
+    sum += (2.0 * static_cast<double>(i) + 3) * (series.a[i].re + series.b[i].re);
   return 2.0 * sum * inverse(square(series.k0 * series.n_host * series.radius_um));
 }
 template <class S>
 S scattering_efficiency(const RadialSeries<S>& series) {
   S sum(0.0);
-  for (std::size_t i = 0; i < series.a.size(); ++i) sum += (2.0 * static_cast<double>(i) + 3) * (norm(series.a[i]) + norm(series.b[i]));
+  for (std::size_t i = 0; i < series.a.size(); ++i)
+    sum += (2.0 * static_cast<double>(i) + 3) * (norm(series.a[i]) + norm(series.b[i]));
   return 2.0 * sum * inverse(square(series.k0 * series.n_host * series.radius_um));
 }
 
 template <class S>
-RadialImage<S>::RadialImage(const RadialSeries<S>& series, double objective_na, const S& defocus_um, double rho_max_um, Pupil pupil, int nodes) {
+RadialImage<S>::RadialImage(const RadialSeries<S>& series, double objective_na, const S& defocus_um, double rho_max_um,
+                            Pupil pupil, int nodes) {
   assert(objective_na > 0 && rho_max_um >= 0);
   const S k = series.k0 * series.n_host;
   // In theta nothing is singular, not even at 90 degrees: q dq / cos = k^2 sin d theta.
@@ -240,9 +248,11 @@ RadialImage<S>::RadialImage(const RadialSeries<S>& series, double objective_na, 
   const double edge_sine = std::min(plain(edge), 1.0), theta = std::asin(edge_sine);
   const S theta_max = edge_sine < 1 ? theta + change(edge) / std::cos(theta) : S(theta);
   if (nodes <= 0) {
-    // The integrand swings no faster than its highest order, J(k rho sin theta) and the defocus together. A rule for a wave
-    // of `swing` radians over half the range is exact from swing / 2 nodes on, up to a tail like that of a Bessel function.
-    const double swing = 0.5 * theta * (series.orders() + plain(k) * (rho_max_um + std::abs(plain(defocus_um)) * edge_sine));
+    // The integrand swings no faster than its highest order, J(k rho sin theta) and the defocus together. A rule for a
+    // wave of `swing` radians over half the range is exact from swing / 2 nodes on, up to a tail like that of a Bessel
+    // function.
+    const double swing =
+        0.5 * theta * (series.orders() + plain(k) * (rho_max_um + std::abs(plain(defocus_um)) * edge_sine));
     nodes = static_cast<int>(0.5 * swing + 5 * std::cbrt(swing)) + 10;
   }
   std::vector<double> x, w;
@@ -259,7 +269,8 @@ RadialImage<S>::RadialImage(const RadialSeries<S>& series, double objective_na, 
     nodes_[i] = {k * s, -(wave * (s2 + f.s1)), wave * (s2 - f.s1)};
   }
 
-  // J0 by Taylor polynomials, from its equation x J'' + J' + x J = 0; 1/8 from the middle the first term left out is 1e-18, 1e-16 in the slope.
+  // J0 by Taylor polynomials, from its equation x J'' + J' + x J = 0; 1/8 from the middle the first term left out is
+  // 1e-18, 1e-16 in the slope.
   bessel_.resize(static_cast<std::size_t>(plain(k) * edge_sine * rho_max_um * (1 + 1e-12) * kPerUnit) + 1);
   for (std::size_t i = 0; i < bessel_.size(); ++i) {
     const double at = (static_cast<double>(i) + 0.5) / kPerUnit;
@@ -297,8 +308,8 @@ RadialAmplitudes<S> RadialImage<S>::operator()(const S& rho_um) const {
   return field;
 }
 
-Mat2<double> scattered_spectrum(const RadialSeries<double>& series, const std::array<double, 2>& kappa_in, const std::array<double, 2>& kappa_out,
-                                double defocus_um, Pupil pupil) {
+Mat2<double> scattered_spectrum(const RadialSeries<double>& series, const std::array<double, 2>& kappa_in,
+                                const std::array<double, 2>& kappa_out, double defocus_um, Pupil pupil) {
   const double n = series.n_host, k = series.k0 * n;
   const auto direction = [&](const std::array<double, 2>& kappa) {
     const double x = kappa[0] / n, y = kappa[1] / n;
@@ -309,11 +320,13 @@ Mat2<double> scattered_spectrum(const RadialSeries<double>& series, const std::a
 
   // Across and in the plane of scattering. Straight on both amplitudes are equal and any plane will do.
   Vec3<double> across = cross(in, out);
-  if (dot(across, across) < 1e-16) across = cross(in, std::abs(in.x) < 0.5 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0});
+  if (dot(across, across) < 1e-16)
+    across = cross(in, std::abs(in.x) < 0.5 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0});
   across = normalized(across + -dot(across, in) * in);
   const Vec3<double> along_in = cross(across, in), along_out = cross(across, out);
   const ScatteringAmplitudes<double> f = scattering_amplitudes(series, dot(in, out));
-  // The far field i / k (S2, S1) exp(i k r) / r belongs to the plane waves F = 2 pi i / (k cos) times that (stationary phase).
+  // The far field i / k (S2, S1) exp(i k r) / r belongs to the plane waves F = 2 pi i / (k cos) times that (stationary
+  // phase).
   double scale = -2 * std::numbers::pi / (k * k * out.z);
   if (pupil == Pupil::aplanatic) scale *= std::sqrt(out.z / in.z);
   const Complex<double> wave = scale * exp(Complex<double>(0.0, k * (out.z - in.z) * defocus_um));
@@ -327,7 +340,8 @@ Mat2<double> scattered_spectrum(const RadialSeries<double>& series, const std::a
     if (pupil != Pupil::focal_plane) e = e + (-tilt / (1 + in.z)) * Vec3<double>{in.x, in.y, 0};
     const Complex<double> parallel = dot(e, along_in) * (wave * f.s2), perpendicular = dot(e, across) * (wave * f.s1);
     const auto seen = [&](Vec3<double> v) {
-      if (pupil != Pupil::focal_plane) v = v + (-((out.x * v.x + out.y * v.y) / (1 + out.z) + v.z)) * Vec3<double>{out.x, out.y, 0};
+      if (pupil != Pupil::focal_plane)
+        v = v + (-((out.x * v.x + out.y * v.y) / (1 + out.z) + v.z)) * Vec3<double>{out.x, out.y, 0};
       return v;
     };
     const Vec3<double> p = seen(along_out), s = seen(across);
@@ -337,14 +351,14 @@ Mat2<double> scattered_spectrum(const RadialSeries<double>& series, const std::a
   return {entry[0], entry[1], entry[2], entry[3]};
 }
 
-#define BIREFIT_INSTANTIATE(S)                                                                                    \
-  template RadialSeries<S> radial_series(const RadialBall<S>&, int);                                              \
-  template ScatteringAmplitudes<S> scattering_amplitudes(const RadialSeries<S>&, const S&);                       \
-  template S extinction_efficiency(const RadialSeries<S>&);                                                       \
-  template S scattering_efficiency(const RadialSeries<S>&);                                                       \
-  template class RadialImage<S>;                                                                                  \
-  template RadialPair<S> regular_pair(const S&, const S&);                                                        \
-  template RadialPair<S> carried(const RadialPair<S>&, const S&, const S&, const S&);                             \
+#define BIREFIT_INSTANTIATE(S)                                                              \
+  template RadialSeries<S> radial_series(const RadialBall<S>&, int);                        \
+  template ScatteringAmplitudes<S> scattering_amplitudes(const RadialSeries<S>&, const S&); \
+  template S extinction_efficiency(const RadialSeries<S>&);                                 \
+  template S scattering_efficiency(const RadialSeries<S>&);                                 \
+  template class RadialImage<S>;                                                            \
+  template RadialPair<S> regular_pair(const S&, const S&);                                  \
+  template RadialPair<S> carried(const RadialPair<S>&, const S&, const S&, const S&);       \
   template RiccatiBessel<S> riccati_bessel(const S&, int);
 BIREFIT_INSTANTIATE(double)
 using Dual1 = Dual<double, 1>;

@@ -1,15 +1,17 @@
 #pragma once
-// The exact image of a ball or of concentric shells whose optic axis is radial (permittivity n_e^2 along r, n_o^2 across) in
-// an isotropic host: the Mie series, its angular spectrum and the focal plane of an objective. Maxwell's equations without
-// approximation, so the anchor of every approximate wave model.
+// The exact image of a ball or of concentric shells whose optic axis is radial (permittivity n_e^2 along r, n_o^2
+// across) in an isotropic host: the Mie series, its angular spectrum and the focal plane of an objective. Maxwell's
+// equations without approximation, so the anchor of every approximate wave model.
 //
-// Sources: C. F. Bohren & D. R. Huffman, Absorption and Scattering of Light by Small Particles (1983), chapter 4 (series,
-// angular functions, efficiencies); J. Roth & M. J. Dignam, J. Opt. Soc. Am. 63, 308 (1973) for the radial axis, see also
-// C.-W. Qiu et al., IEEE Trans. Antennas Propag. 55, 3515 (2007). Conventions: docs/conventions.md, C1, C7, C9; the centre of
-// the ball is the origin, the incident wave runs towards +z and has amplitude 1 and phase 0 in the middle of the focal plane.
+// Sources: C. F. Bohren & D. R. Huffman, Absorption and Scattering of Light by Small Particles (1983), chapter 4
+// (series, angular functions, efficiencies); J. Roth & M. J. Dignam, J. Opt. Soc. Am. 63, 308 (1973) for the radial
+// axis, see also C.-W. Qiu et al., IEEE Trans. Antennas Propag. 55, 3515 (2007). Conventions: docs/conventions.md, C1,
+// C7, C9; the centre of the ball is the origin, the incident wave runs towards +z and has amplitude 1 and phase 0 in
+// the middle of the focal plane.
 //
-// All indices are real: absorption is not supported. Scalars S: double and Dual<double, N>, N = 1, 2, 4, 8 (a line at the end of
-// radial_series.cc adds more); with duals every result carries its derivatives by whatever the inputs depend on.
+// All indices are real: absorption is not supported. Scalars S: double and Dual<double, N>, N = 1, 2, 4, 8 (a line at
+// the end of radial_series.cc adds more); with duals every result carries its derivatives by whatever the inputs depend
+// on.
 
 #include <array>
 #include <vector>
@@ -41,12 +43,14 @@ struct RadialSeries {
   int orders() const { return static_cast<int>(a.size()); }
 };
 
-/// Orders that matter for a ball of size x = k0 n_host R: those left out are below 1e-16. The sum ends at `orders` if positive.
+/// Orders that matter for a ball of size x = k0 n_host R: those left out are below 1e-16. The sum ends at `orders` if
+/// positive.
 int series_orders(double x);
 template <class S>
 RadialSeries<S> radial_series(const RadialBall<S>&, int orders = 0);
 
-/// Amplitude functions of a far field (Bohren & Huffman 4.74), S1 across and S2 in the plane of scattering, -1 <= cos <= 1.
+/// Amplitude functions of a far field (Bohren & Huffman 4.74), S1 across and S2 in the plane of scattering, -1 <= cos
+/// <= 1.
 template <class S>
 struct ScatteringAmplitudes {
   Complex<S> s1, s2;
@@ -75,15 +79,17 @@ struct RadialAmplitudes {
   Complex<S> a0, a2;
 };
 
-/// The image as a function of its radius. Building it costs the angular sums and a table of Bessel functions, each radius then
-/// two sums over the nodes of one Gauss-Legendre rule in theta, long enough for 1e-13 up to the largest radius.
+/// The image as a function of its radius. Building it costs the angular sums and a table of Bessel functions, each
+/// radius then two sums over the nodes of one Gauss-Legendre rule in theta, long enough for 1e-13 up to the largest
+/// radius.
 template <class S>
 class RadialImage {
  public:
-  /// objective_na > 0; from n_host on the whole forward half space is accepted. The plane in focus lies defocus_um beyond the
-  /// centre along the light. 0 <= rho_max_um bounds what may be asked later. `nodes` overrides the length of the rule.
-  RadialImage(const RadialSeries<S>& series, double objective_na, const S& defocus_um, double rho_max_um, Pupil pupil = Pupil::focal_plane,
-              int nodes = 0);
+  /// objective_na > 0; from n_host on the whole forward half space is accepted. The plane in focus lies defocus_um
+  /// beyond the centre along the light. 0 <= rho_max_um bounds what may be asked later. `nodes` overrides the length of
+  /// the rule.
+  RadialImage(const RadialSeries<S>& series, double objective_na, const S& defocus_um, double rho_max_um,
+              Pupil pupil = Pupil::focal_plane, int nodes = 0);
   /// 0 <= rho_um <= rho_max_um.
   RadialAmplitudes<S> operator()(const S& rho_um) const;
   int nodes() const { return static_cast<int>(nodes_.size()); }
@@ -100,17 +106,20 @@ class RadialImage {
 };
 
 /// Angular spectrum of the scattered field for light from any forward direction:
-///   e(x, y) = e_in exp(i k0 kappa_in . x) + integral d^2k / (2 pi)^2  F(k; kappa_in) e_in exp(i k . x),  k = k0 kappa_out (1/um),
-/// in the focal plane, for each pair (x, y) of components that `pupil` makes of a plane wave, the incident one included: for
-/// focal_plane they are the transverse field, otherwise the field turned from the wave's direction to z the short way
-/// (p to the azimuth of kappa, s across), for aplanatic times sqrt(cos theta). F is in um^2, rows: scattered x, y; columns: incident x, y.
-/// kappa in units of k0, |kappa| < n_host: forward travelling waves only.
-Mat2<double> scattered_spectrum(const RadialSeries<double>&, const std::array<double, 2>& kappa_in, const std::array<double, 2>& kappa_out,
-                                double defocus_um, Pupil pupil = Pupil::focal_plane);
+///   e(x, y) = e_in exp(i k0 kappa_in . x) + integral d^2k / (2 pi)^2  F(k; kappa_in) e_in exp(i k . x),  k = k0
+///   kappa_out (1/um),
+/// in the focal plane, for each pair (x, y) of components that `pupil` makes of a plane wave, the incident one
+/// included: for focal_plane they are the transverse field, otherwise the field turned from the wave's direction to z
+/// the short way (p to the azimuth of kappa, s across), for aplanatic times sqrt(cos theta). F is in um^2, rows:
+/// scattered x, y; columns: incident x, y. kappa in units of k0, |kappa| < n_host: forward travelling waves only.
+Mat2<double> scattered_spectrum(const RadialSeries<double>&, const std::array<double, 2>& kappa_in,
+                                const std::array<double, 2>& kappa_out, double defocus_um,
+                                Pupil pupil = Pupil::focal_plane);
 
-// ---- radial functions, also for tests ----------------------------------------------------------------------------------
+// ---- radial functions, also for tests ------------------------------------------------------------------------------
 
-/// A solution u(z) of u'' + (1 - lambda / z^2) u = 0 and du/dz at one z, both times the same constant, which nobody needs.
+/// A solution u(z) of u'' + (1 - lambda / z^2) u = 0 and du/dz at one z, both times the same constant, which nobody
+/// needs.
 template <class S>
 struct RadialPair {
   S u, slope;
@@ -121,7 +130,8 @@ RadialPair<S> regular_pair(const S& nu, const S& z);
 /// The same solution at z_to >= z_from.
 template <class S>
 RadialPair<S> carried(const RadialPair<S>&, const S& lambda, const S& z_from, const S& z_to);
-/// psi_n(x) = x j_n(x) and eta_n(x) = x y_n(x), n = 0 .. orders, so that xi_n = psi_n + i eta_n. x > 0; orders about series_orders(x).
+/// psi_n(x) = x j_n(x) and eta_n(x) = x y_n(x), n = 0 .. orders, so that xi_n = psi_n + i eta_n. x > 0; orders about
+/// series_orders(x).
 template <class S>
 struct RiccatiBessel {
   std::vector<S> psi, eta;

@@ -11,24 +11,28 @@
 namespace birefit {
 
 /// A node of liquid crystal, not of the host.
-inline bool is_crystal(const std::array<double, 6>& tensor) { return tensor[0] != 0 || tensor[1] != 0 || tensor[2] != 0; }
+inline bool is_crystal(const std::array<double, 6>& tensor) {
+  return tensor[0] != 0 || tensor[1] != 0 || tensor[2] != 0;
+}
 
 template <class S>
 struct SampledOptics {
   const VolumeGrid* grid = nullptr;
-  S scale = S(1.0);              ///< of the box
+  S scale = S(1.0);                        ///< of the box
   S cos_turn = S(1.0), sin_turn = S(0.0);  ///< of the box about the view, counter-clockwise in the image
   S n_o, n_e, n_host;
 };
 
-/// The host is where a node's tensor is zero, and beyond the box. Between nodes tensor and share of liquid crystal are interpolated trilinearly, so a
-/// surface inside the box is blurred over a cell and lies half-way between the nodes on its two sides; that of the box is a ramp of ramp_um. Either is
-/// mixed across its normal, the share's gradient or the box's own.
+/// The host is where a node's tensor is zero, and beyond the box. Between nodes tensor and share of liquid crystal are
+/// interpolated trilinearly, so a surface inside the box is blurred over a cell and lies half-way between the nodes on
+/// its two sides; that of the box is a ramp of ramp_um. Either is mixed across its normal, the share's gradient or the
+/// box's own.
 template <class S>
 class SampledMedium final : public WaveMedium<S> {
  public:
   using P = PlainOf<S>;
-  SampledMedium(const SampledOptics<S>& optics, double ramp_um) : o_(optics), g_(*optics.grid), width_(kRampWidth * ramp_um), over_scale_(inverse(o_.scale)) {}
+  SampledMedium(const SampledOptics<S>& optics, double ramp_um)
+      : o_(optics), g_(*optics.grid), width_(kRampWidth * ramp_um), over_scale_(inverse(o_.scale)) {}
 
   bool reaches(const P& x, const P& y, double z) const override {
     S place[3];
@@ -47,7 +51,8 @@ class SampledMedium final : public WaveMedium<S> {
       const S ramp = surface_ramp(depth_um(place, i), width_);
       const auto near = plain(ramp) < plain(inside);  // the nearest face of the box so far
       const P on(i == 0 ? 1.0 : 0.0), up(i == 1 ? 1.0 : 0.0), along(i == 2 ? 1.0 : 0.0);
-      face = {S(select(near, on, plain(face.x))), S(select(near, up, plain(face.y))), S(select(near, along, plain(face.z)))};
+      face = {S(select(near, on, plain(face.x))), S(select(near, up, plain(face.y))),
+              S(select(near, along, plain(face.z)))};
       inside = inside * ramp;
       place[i] = min_of(max_of(place[i], S(0.0)), S(nodes(i) - 1.0));
       const P cell = min_of(P(floor(plain(place[i]))), P(nodes(i) - 2.0));
@@ -55,7 +60,9 @@ class SampledMedium final : public WaveMedium<S> {
       corners.cell[i] = cell;
     }
     corners.find(g_);
-    const auto value = [&](std::size_t component) { return corners.value([&](std::size_t node) { return g_.nodes[node][component]; }); };
+    const auto value = [&](std::size_t component) {
+      return corners.value([&](std::size_t node) { return g_.nodes[node][component]; });
+    };
     const SymmetricTensor<S> a{value(0), value(1), value(2), value(3), value(4), value(5)};
     const auto crystal = [&](std::size_t node) { return is_crystal(g_.nodes[node]) ? 1.0 : 0.0; };
     Vec3<S> slope;
@@ -63,11 +70,14 @@ class SampledMedium final : public WaveMedium<S> {
     slope = {slope.x * (1 / g_.spacing_um[0]), slope.y * (1 / g_.spacing_um[1]), slope.z * (1 / g_.spacing_um[2])};
     const S steep = inverse_root(S(slope.x * slope.x + slope.y * slope.y + slope.z * slope.z + 1e-24));
     const auto at_box = plain(inside) < P(1.0);
-    face = {select(at_box, face.x, steep * slope.x), select(at_box, face.y, steep * slope.y), select(at_box, face.z, steep * slope.z)};
+    face = {select(at_box, face.x, steep * slope.x), select(at_box, face.y, steep * slope.y),
+            select(at_box, face.z, steep * slope.z)};
     // The liquid crystal's own order, without the host's share.
-    const S order = (a.xx + a.yy + a.zz) * inverse(S(share + 1e-12)), extraordinary = o_.n_o + (o_.n_e - o_.n_o) * order;
+    const S order = (a.xx + a.yy + a.zz) * inverse(S(share + 1e-12)),
+            extraordinary = o_.n_o + (o_.n_e - o_.n_o) * order;
     const S c = share * inside, eh = o_.n_host * o_.n_host, rest = 1.0 - c;
-    return mixed_at_surface(turned(principal_axis(a)), turned(face), S(o_.n_o * o_.n_o), S(extraordinary * extraordinary), c, S(rest * eh), S(rest * inverse(eh)));
+    return mixed_at_surface(turned(principal_axis(a)), turned(face), S(o_.n_o * o_.n_o),
+                            S(extraordinary * extraordinary), c, S(rest * eh), S(rest * inverse(eh)));
   }
 
  private:
@@ -79,7 +89,9 @@ class SampledMedium final : public WaveMedium<S> {
     std::size_t first[kWide], row = 0, layer = 0;
 
     void find(const VolumeGrid& g) {
-      for (int k = 0; k < kWide; ++k) first[k] = g.at(static_cast<int>(lane(cell[0], k)), static_cast<int>(lane(cell[1], k)), static_cast<int>(lane(cell[2], k)));
+      for (int k = 0; k < kWide; ++k)
+        first[k] = g.at(static_cast<int>(lane(cell[0], k)), static_cast<int>(lane(cell[1], k)),
+                        static_cast<int>(lane(cell[2], k)));
       row = static_cast<std::size_t>(g.nx);
       layer = row * static_cast<std::size_t>(g.ny);
     }
@@ -98,14 +110,17 @@ class SampledMedium final : public WaveMedium<S> {
           return Pack::load_aligned(values);
         }
       };
-      const P a = corner(0), x = corner(1), y = corner(row), xy = corner(row + 1), z = corner(layer), xz = corner(layer + 1), yz = corner(layer + row), xyz = corner(layer + row + 1);
-      return {a, x - a, y - a, z - a, xy - x - y + a, xz - x - z + a, yz - y - z + a, xyz - xy - xz - yz + x + y + z - a};
+      const P a = corner(0), x = corner(1), y = corner(row), xy = corner(row + 1), z = corner(layer),
+              xz = corner(layer + 1), yz = corner(layer + row), xyz = corner(layer + row + 1);
+      return {
+          a, x - a, y - a, z - a, xy - x - y + a, xz - x - z + a, yz - y - z + a, xyz - xy - xz - yz + x + y + z - a};
     }
     /// A number whose slopes by the fractions are these.
     S with_slopes(const P& value, const P& gx, const P& gy, const P& gz) const {
       S r(value);
       if constexpr (ScalarTraits<S>::derivatives > 0)
-        for (std::size_t i = 0; i < r.d.size(); ++i) r.d[i] = gx * fraction[0].d[i] + gy * fraction[1].d[i] + gz * fraction[2].d[i];
+        for (std::size_t i = 0; i < r.d.size(); ++i)
+          r.d[i] = gx * fraction[0].d[i] + gy * fraction[1].d[i] + gz * fraction[2].d[i];
       return r;
     }
     template <class At>
@@ -132,8 +147,12 @@ class SampledMedium final : public WaveMedium<S> {
     place[2] = over_scale_ * (z / g_.spacing_um[2]) + 0.5 * (g_.nz - 1);
   }
   /// Below the nearer of two opposite faces of the box.
-  S depth_um(const S* place, std::size_t i) const { return min_of(place[i], S(nodes(i) - 1.0 - place[i])) * o_.scale * g_.spacing_um[i]; }
-  Vec3<S> turned(const Vec3<S>& a) const { return {o_.cos_turn * a.x - o_.sin_turn * a.y, o_.sin_turn * a.x + o_.cos_turn * a.y, a.z}; }
+  S depth_um(const S* place, std::size_t i) const {
+    return min_of(place[i], S(nodes(i) - 1.0 - place[i])) * o_.scale * g_.spacing_um[i];
+  }
+  Vec3<S> turned(const Vec3<S>& a) const {
+    return {o_.cos_turn * a.x - o_.sin_turn * a.y, o_.sin_turn * a.x + o_.cos_turn * a.y, a.z};
+  }
 
   SampledOptics<S> o_;
   const VolumeGrid& g_;
@@ -145,9 +164,11 @@ class SampledMedium final : public WaveMedium<S> {
 inline WaveGrid sampled_grid(const SampledOptics<double>& o, double k0_per_um, double objective_na) {
   const VolumeGrid& v = *o.grid;
   const auto half = [&](int nodes, std::size_t i) { return 0.5 * o.scale * v.spacing_um[i] * (nodes - 1); };
-  const double a = half(v.nx, 0), b = half(v.ny, 1), depth = half(v.nz, 2), c = std::abs(o.cos_turn), s = std::abs(o.sin_turn);
+  const double a = half(v.nx, 0), b = half(v.ny, 1), depth = half(v.nz, 2), c = std::abs(o.cos_turn),
+               s = std::abs(o.sin_turn);
   const double margin = std::max(1.5 + 3 * objective_na, spread_um(depth, objective_na, o.n_host));
-  WaveGrid g = object_grid({1.05 * (c * a + s * b), 1.05 * (s * a + c * b), depth, margin}, o.n_o, o.n_e, o.n_host, k0_per_um, objective_na);
+  WaveGrid g = object_grid({1.05 * (c * a + s * b), 1.05 * (s * a + c * b), depth, margin}, o.n_o, o.n_e, o.n_host,
+                           k0_per_um, objective_na);
   // As many layers as the samples tell apart, two by two.
   const double slab = (g.exit_um - g.entry_um) / g.slabs;
   g.layers = std::clamp(2 * static_cast<int>(std::ceil(0.5 * slab / (o.scale * v.spacing_um[2]))), 4, 12);

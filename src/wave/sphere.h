@@ -24,7 +24,8 @@ template <class S>
 class SphereMedium final : public WaveMedium<S> {
  public:
   using P = PlainOf<S>;
-  SphereMedium(const SphereOptics<S>& optics, double ramp_um) : o_(optics), width_(kRampWidth * ramp_um), inverse_radius_(inverse(o_.radius_um)) {}
+  SphereMedium(const SphereOptics<S>& optics, double ramp_um)
+      : o_(optics), width_(kRampWidth * ramp_um), inverse_radius_(inverse(o_.radius_um)) {}
 
   bool reaches(const P& x, const P& y, double z) const override {
     const double most = lane(plain(o_.radius_um), 0) + 0.5 * width_;
@@ -37,19 +38,25 @@ class SphereMedium final : public WaveMedium<S> {
     const S eo = o_.n_o * o_.n_o, ee = o_.n_e * o_.n_e, eh = o_.n_host * o_.n_host;
     Vec3<S> place{S(x), S(y), S(P(z))};
     const S outside = 1.0 - inside;
-    if (!o_.has_core) return mixed_at_surface(axis(place), Vec3<S>{S(normal.x), S(normal.y), S(normal.z)}, eo, ee, inside, outside * eh, outside * inverse(eh));
+    if (!o_.has_core)
+      return mixed_at_surface(axis(place), Vec3<S>{S(normal.x), S(normal.y), S(normal.z)}, eo, ee, inside, outside * eh,
+                              outside * inverse(eh));
     const Vec3<S>& d = o_.core_offset_um;
     const Vec3<S> away{place.x - d.x, place.y - d.y, place.z - d.z};
-    const S away2 = away.x * away.x + away.y * away.y + away.z * away.z + 1e-12, inverse_away = inverse_root(away2), distance = away2 * inverse_away;
+    const S away2 = away.x * away.x + away.y * away.y + away.z * away.z + 1e-12, inverse_away = inverse_root(away2),
+            distance = away2 * inverse_away;
     // Inside the core the axis does not matter: that of the nearest point outside.
     const S out = max_of(S(1.0), o_.core_um * inverse_away);
     const Vec3<S> n = axis({d.x + out * away.x, d.y + out * away.y, d.z + out * away.z});
     const S in_core = 1.0 - ramped(distance - o_.core_um), ec = o_.core_index * o_.core_index;
-    // Both surfaces are near only in a wall thinner than the ramp, where they are as good as parallel: any of their normals will do.
+    // Both surfaces are near only in a wall thinner than the ramp, where they are as good as parallel: any of their
+    // normals will do.
     const auto outer = plain(inside) < P(1.0);
-    const Vec3<S> face{select(outer, S(normal.x), inverse_away * away.x), select(outer, S(normal.y), inverse_away * away.y),
+    const Vec3<S> face{select(outer, S(normal.x), inverse_away * away.x),
+                       select(outer, S(normal.y), inverse_away * away.y),
                        select(outer, S(normal.z), inverse_away * away.z)};
-    return mixed_at_surface(n, face, eo, ee, inside - in_core, outside * eh + in_core * ec, outside * inverse(eh) + in_core * inverse(ec));
+    return mixed_at_surface(n, face, eo, ee, inside - in_core, outside * eh + in_core * ec,
+                            outside * inverse(eh) + in_core * inverse(ec));
   }
 
  private:
@@ -66,10 +73,13 @@ class SphereMedium final : public WaveMedium<S> {
 
 /// The grid for pictures of a sphere, surfaces being ramps one step thick.
 inline WaveGrid sphere_grid(const SphereOptics<double>& o, double k0_per_um, double objective_na) {
-  // Light that leaves the box on its way to the exit plane is lost to the picture. Solid spheres send little past their rims at a
-  // slant, large ones more (measured: an error of 0.04 at a radius of 15 um without the third term); a wall does, from its widest part on.
-  const double near = 1.5 + 3 * objective_na + std::max(0.0, 0.4 * (o.radius_um - 5)), far = spread_um(o.radius_um, objective_na, o.n_host), r = o.radius_um;
-  return object_grid({r, r, r, o.has_core ? std::max(near, far) : near}, o.n_o, o.n_e, o.n_host, k0_per_um, objective_na);
+  // Light that leaves the box on its way to the exit plane is lost to the picture. Solid spheres send little past their
+  // rims at a slant, large ones more (measured: an error of 0.04 at a radius of 15 um without the third term); a wall
+  // does, from its widest part on.
+  const double near = 1.5 + 3 * objective_na + std::max(0.0, 0.4 * (o.radius_um - 5)),
+               far = spread_um(o.radius_um, objective_na, o.n_host), r = o.radius_um;
+  return object_grid({r, r, r, o.has_core ? std::max(near, far) : near}, o.n_o, o.n_e, o.n_host, k0_per_um,
+                     objective_na);
 }
 
 }  // namespace birefit

@@ -15,13 +15,16 @@ using Z = std::complex<double>;
 
 // One slab of thickness h takes the field through
 //   a <- exp(i k0 V'_2) D^(1/2) S D^(1/2) exp(i k0 V'_1) a,
-// D free propagation in n_ref, S the screen: the ordered product over thin layers of exp(i k0 dz (N - n_ref)), N the exact 2 x 2
-// operator of normal incidence (N_e along the transverse director t, N_o along s), and V'_1, V'_2 what transverse wavevectors
-// kappa = k / k0 add to the second order, summed over the layers of the first and of the second half. The second half of one slab and the first
-// of the next are taken together: second order in h for the price of the first.
-//   V' a = -1/2 [kappa (v . a) + v (kappa . a)] - 1/2 kappa (sd (kappa . a)) - 1/2 kappa' (sc (kappa' . a)) + kappa_i (D_ij (kappa_j a)).
-// It follows from the Riccati equation of the one-way Maxwell system, h = Y e; the order of wavevector and coefficient counts. v walks
-// extraordinary light off sideways; sd, sc and D are what diffraction in the medium has beyond that in n_ref.
+// D free propagation in n_ref, S the screen: the ordered product over thin layers of exp(i k0 dz (N - n_ref)), N the
+// exact 2 x 2 operator of normal incidence (N_e along the transverse director t, N_o along s), and V'_1, V'_2 what
+// transverse wavevectors kappa = k / k0 add to the second order, summed over the layers of the first and of the second
+// half. The second half of one slab and the first of the next are taken together: second order in h for the price of
+// the first.
+//   V' a = -1/2 [kappa (v . a) + v (kappa . a)] - 1/2 kappa (sd (kappa . a)) - 1/2 kappa' (sc (kappa' . a)) + kappa_i
+//   (D_ij (kappa_j a)).
+// It follows from the Riccati equation of the one-way Maxwell system, h = Y e; the order of wavevector and coefficient
+// counts. v walks extraordinary light off sideways; sd, sc and D are what diffraction in the medium has beyond that in
+// n_ref.
 
 /// V' of some thickness at one point, thickness and k0 taken in: h v, (h / k0) of the others.
 template <class S>
@@ -71,39 +74,46 @@ Flat<S> add_layer(ObliquePoint<S>& p, const OpticalPoint<S>& medium, const S& k0
   const S scale = inverse(k0) * thickness, mean = 0.5 * sum, over_mean = 2.0 * over;
   p.sd = p.sd + scale * (eta * mean - 1.0 / n_ref);
   p.sc = p.sc + scale * (over_mean - 1.0 / n_ref);
-  const S w = de * n.z * eta, w2 = w * w * t2, c = no * over, w2c = w2 * c, w2c2 = w2c * c, inverse_ne = inverse(ne), inverse_no = inverse(no);
+  const S w = de * n.z * eta, w2 = w * w * t2, c = no * over, w2c = w2 * c, w2c2 = w2c * c, inverse_ne = inverse(ne),
+          inverse_no = inverse(no);
   // Per kt^2 on (tt, ss), per ks^2, and per kt ks on ts: S less the parts of sd and sc.
   const S tt_tt = 0.25 * eta * (no - ne), tt_ss = 0.5 * (over_mean - inverse_no);
-  const S ss_tt = 0.5 * (over_mean - inverse_ne) + (w2c2 - 2.0 * w2c) * 0.5 * inverse_ne, ss_ss = 0.25 * eta * (ne - no) + 0.5 * w2c2 * inverse_no;
+  const S ss_tt = 0.5 * (over_mean - inverse_ne) + (w2c2 - 2.0 * w2c) * 0.5 * inverse_ne,
+          ss_ss = 0.25 * eta * (ne - no) + 0.5 * w2c2 * inverse_no;
   const S ts_ts = (1.0 + eta * ne * no + w2c) * over - eta * root(ne * no) + 0.5 * (eta * mean - over_mean);
   const S inverse_t2 = inverse(S(t2 + 1e-24));
   const S t[3] = {n.x * n.x * inverse_t2, n.x * n.y * inverse_t2, n.y * n.y * inverse_t2};  // t t^T
   const S o[3] = {t[2], S(0.0) - t[1], t[0]};                                               // s s^T
   const S m[3] = {S(0.0) - 2.0 * t[1], t[0] - t[2], 2.0 * t[1]};                            // t s^T + s t^T
   for (int ij = 0; ij < 3; ++ij) {
-    const S on_t = scale * (tt_tt * t[ij] + ss_tt * o[ij]), on_s = scale * (tt_ss * t[ij] + ss_ss * o[ij]), mixed = 0.5 * scale * ts_ts * m[ij];
+    const S on_t = scale * (tt_tt * t[ij] + ss_tt * o[ij]), on_s = scale * (tt_ss * t[ij] + ss_ss * o[ij]),
+            mixed = 0.5 * scale * ts_ts * m[ij];
     for (int ab = 0; ab < 3; ++ab) p.d[ij][ab] = p.d[ij][ab] + on_t * t[ab] + on_s * o[ab] + mixed * m[ab];
   }
   return {sum, g, n.x, n.y};
 }
 
-/// The screen of thickness h, N known at its two Gauss points: the fourth order of Magnus' series, by Gauss' rule and the commutator,
+/// The screen of thickness h, N known at its two Gauss points: the fourth order of Magnus' series, by Gauss' rule and
+/// the commutator,
 ///   exp(i k0 h ((N_1 + N_2) / 2 - n_ref) + sqrt(3)/12 (k0 h)^2 [N_1, N_2]),
-/// and where N turns by dphi the field turns back by dphi (N_e - N_o)^2 / (2 (N_e + N_o)^2): what dY/dz leaves of the Riccati equation, to second order in
-/// d/dz / k0, where N is constant in front and behind. A helix's exact modes have it.
+/// and where N turns by dphi the field turns back by dphi (N_e - N_o)^2 / (2 (N_e + N_o)^2): what dY/dz leaves of the
+/// Riccati equation, to second order in d/dz / k0, where N is constant in front and behind. A helix's exact modes have
+/// it.
 template <class S>
 void pass_layers(SlabPoint<S>& slab, const Flat<S>& one, const Flat<S>& two, const S& k0, double n_ref, double h) {
   const S phase = k0 * h, mean = 0.25 * (one.sum + two.sum), over = inverse(mean), quarter = 0.25 * phase;
   // N_1 + N_2 in parts: 1, i (x x - y y), i (x y + y x); and a rotation.
   const S p3 = quarter * (one.g * (one.x * one.x - one.y * one.y) + two.g * (two.x * two.x - two.y * two.y));
   const S p1 = 2.0 * quarter * (one.g * one.x * one.y + two.g * two.x * two.y);
-  const S turned = std::numbers::sqrt3 * one.g * two.g * (one.x * two.x + one.y * two.y) * (one.x * two.y - one.y * two.x);
+  const S turned =
+      std::numbers::sqrt3 * one.g * two.g * (one.x * two.x + one.y * two.y) * (one.x * two.y - one.y * two.x);
   const S p2 = turned * ((-1.0 / 12) * phase * phase - 0.125 * over * over);
   const CosSinc<S> turn = cos_sinc_sq(S(p3 * p3 + p1 * p1 + p2 * p2));
   S sm, cm;
   sin_cos(phase * (mean - n_ref), sm, cm);
   const Complex<S> whole(cm, sm);
-  const Complex<S> a = whole * Complex<S>(turn.cos_sq, turn.sinc_sq * p3), d = whole * Complex<S>(turn.cos_sq, S(0.0) - turn.sinc_sq * p3);
+  const Complex<S> a = whole * Complex<S>(turn.cos_sq, turn.sinc_sq * p3),
+                   d = whole * Complex<S>(turn.cos_sq, S(0.0) - turn.sinc_sq * p3);
   const S rotation = turn.sinc_sq * p2, across = turn.sinc_sq * p1;
   const Complex<S> b = whole * Complex<S>(S(0.0) - rotation, across), c = whole * Complex<S>(rotation, across);
   for (int i = 0; i < 2; ++i) {
@@ -130,14 +140,17 @@ SlabPoint<S> slab_point(int layers, double slab_um, const S& k0, double n_ref, c
   return p;
 }
 
-/// Complex numbers, one a lane, with only what is needed below: real and imaginary parts apart, so that coefficients are plain packs.
+/// Complex numbers, one a lane, with only what is needed below: real and imaginary parts apart, so that coefficients
+/// are plain packs.
 struct Lanes {
   Pack re, im;
 };
 BIREFIT_INLINE Lanes operator+(const Lanes& a, const Lanes& b) { return {a.re + b.re, a.im + b.im}; }
 BIREFIT_INLINE Lanes operator-(const Lanes& a, const Lanes& b) { return {a.re - b.re, a.im - b.im}; }
 BIREFIT_INLINE Lanes operator*(const Pack& a, const Lanes& b) { return {a * b.re, a * b.im}; }
-BIREFIT_INLINE Lanes operator*(const Lanes& a, const Lanes& b) { return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re}; }
+BIREFIT_INLINE Lanes operator*(const Lanes& a, const Lanes& b) {
+  return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+}
 using Interleaved = xsimd::batch<Z, Pack::arch_type>;
 /// The `count` numbers from here on; zeros in lanes beyond.
 BIREFIT_INLINE Lanes load(const Z* from, int count) {
@@ -182,7 +195,13 @@ class Propagation {
  public:
   static constexpr int kFields = 1 + ScalarTraits<S>::derivatives;
   Propagation(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium)
-      : g_(grid), light_(light), medium_(medium), fft_(shared_fft(grid.nx, grid.ny)), n_(fft_->size()), blocks_((static_cast<std::size_t>(grid.nx) + kLanes - 1) / kLanes), h_((grid.exit_um - grid.entry_um) / grid.slabs) {
+      : g_(grid),
+        light_(light),
+        medium_(medium),
+        fft_(shared_fft(grid.nx, grid.ny)),
+        n_(fft_->size()),
+        blocks_((static_cast<std::size_t>(grid.nx) + kLanes - 1) / kLanes),
+        h_((grid.exit_um - grid.entry_um) / grid.slabs) {
     for (auto& field : fields_)
       for (Plane* plane : {&field.a[0], &field.a[1], &field.term[0], &field.term[1]}) plane->resize(n_);
     for (auto& field : fields_)
@@ -194,7 +213,9 @@ class Propagation {
     for (auto& halves : hosts_halves_) halves.assign(blocks_ * static_cast<std::size_t>(grid.ny), 0);
     const auto wavenumbers = [&](int n, double tilt) {
       std::vector<double> k(static_cast<std::size_t>(n));
-      for (int m = 0; m < n; ++m) k[static_cast<std::size_t>(m)] = tilt + (n == 1 ? 0.0 : 2 * std::numbers::pi / (n * g_.step_um) * (m < n - m ? m : m - n));
+      for (int m = 0; m < n; ++m)
+        k[static_cast<std::size_t>(m)] =
+            tilt + (n == 1 ? 0.0 : 2 * std::numbers::pi / (n * g_.step_um) * (m < n - m ? m : m - n));
       return k;
     };
     kx_ = wavenumbers(g_.nx, light.kx_per_um);
@@ -220,7 +241,8 @@ class Propagation {
     host_q_ = root(kh * kh - tilt2_) * inverse(light.k0_per_um);
     // a = Y^(1/2) e, in units of n_host^(1/2): q / n_host for s, its inverse for p.
     to_flux(incident_, true);
-    host_ = OpticalPoint<S>{{S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
+    host_ = OpticalPoint<S>{
+        {S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
     host_slab_ = slab_point(g_.layers, h_, light.k0_per_um, g_.n_ref, [&](int) { return host_; });
     felt_.assign(static_cast<std::size_t>(g_.ny) * kFields, 0);
     put_screen(host_slab_, host_screen_.data(), felt_.data());
@@ -230,10 +252,12 @@ class Propagation {
       for (int half = 0; half < 2; ++half)
         if (halves >> half & 1) put_oblique(host_slab_.half[half], to, to, felt_.data());
     }
-    for (int f = 0; f < kFields; ++f) host_feels_[static_cast<std::size_t>(f)] = f == 0 || felt_[static_cast<std::size_t>(f)];
+    for (int f = 0; f < kFields; ++f)
+      host_feels_[static_cast<std::size_t>(f)] = f == 0 || felt_[static_cast<std::size_t>(f)];
     awake_[0] = 1;
     for (int f = 1; f < kFields; ++f)
-      awake_[static_cast<std::size_t>(f)] = part(light.k0_per_um, f) != 0 || part(incident_[0], f) != Z(0) || part(incident_[1], f) != Z(0);
+      awake_[static_cast<std::size_t>(f)] =
+          part(light.k0_per_um, f) != 0 || part(incident_[0], f) != Z(0) || part(incident_[1], f) != Z(0);
     for (int a = 0; a < 2; ++a)
       for (int f = 0; f < kFields; ++f) {
         std::fill(fields_[f].a[a].begin(), fields_[f].a[a].end(), Z(0));
@@ -263,8 +287,8 @@ class Propagation {
   /// By pieces of a row, one pack of points each: [row][piece][quantity][value or derivative].
   using Table = std::vector<double, AlignedAllocator<double>>;
   struct Field {
-    Plane a[2];      ///< spectrum
-    Plane term[2];   ///< of the Taylor series
+    Plane a[2];     ///< spectrum
+    Plane term[2];  ///< of the Taylor series
     Plane work[6];
   };
 
@@ -300,12 +324,14 @@ class Propagation {
     std::vector<double> r(static_cast<std::size_t>(n), 1.0);
     if (g_.frame_um <= 0 || n == 1) return r;
     for (int i = 0; i < n; ++i) {
-      const double edge = 0.5 * n * g_.step_um, x = std::abs((i + 0.5 - 0.5 * n) * g_.step_um), inside = (x - (edge - g_.frame_um)) / g_.frame_um;
+      const double edge = 0.5 * n * g_.step_um, x = std::abs((i + 0.5 - 0.5 * n) * g_.step_um),
+                   inside = (x - (edge - g_.frame_um)) / g_.frame_um;
       if (inside > 0) r[static_cast<std::size_t>(i)] = std::exp(-kAbsorption * h_ * square(inside));
     }
     return r;
   }
-  static constexpr double kAbsorption = 1.5;  ///< 1/um at the outer edge: strong enough over a frame, weak enough not to reflect
+  /// 1/um at the outer edge: strong enough over a frame, weak enough not to reflect
+  static constexpr double kAbsorption = 1.5;
 
   /// Parameters that the light has not met yet, or never will (where the picture lies), cost nothing.
   void wake() {
@@ -318,7 +344,9 @@ class Propagation {
   static Pack entry(const double* piece, int quantity, int field) {
     return Pack::load_aligned(piece + (quantity * kFields + field) * kLanes);
   }
-  std::size_t piece(int row, std::size_t first) const { return static_cast<std::size_t>(row) * blocks_ + first / kLanes; }
+  std::size_t piece(int row, std::size_t first) const {
+    return static_cast<std::size_t>(row) * blocks_ + first / kLanes;
+  }
 
   void sample_row(int slab, int row) {
     alignas(64) double x[kLanes];
@@ -335,10 +363,13 @@ class Propagation {
       if (host)
         keep_host(slab, n);
       else
-        keep(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref, [&](int l) { return medium_.at(place, y, depth(l)); }), slab, row, n);
+        keep(slab_point(g_.layers, h_, light_.k0_per_um, g_.n_ref,
+                        [&](int l) { return medium_.at(place, y, depth(l)); }),
+             slab, row, n);
     }
   }
-  /// Most of the box is host, the same at all points: what is kept of it is that it is host, lest tables be read that no cache holds.
+  /// Most of the box is host, the same at all points: what is kept of it is that it is host, lest tables be read that
+  /// no cache holds.
   void keep_host(int slab, std::size_t n) {
     if (char& halves = hosts_halves_[slab % 2][n]; halves != kOwn)
       halves |= 1;
@@ -359,7 +390,8 @@ class Propagation {
   /// What is known of V' about a slab's entry there.
   const double* oblique_at_piece(int slab, std::size_t n) const {
     const char halves = hosts_halves_[slab % 2][n];
-    return halves == kOwn ? oblique_[slab % 2].data() + n * kObliques * kPiece : host_oblique_[static_cast<std::size_t>(halves)].data();
+    return halves == kOwn ? oblique_[slab % 2].data() + n * kObliques * kPiece
+                          : host_oblique_[static_cast<std::size_t>(halves)].data();
   }
   double* oblique_piece(int slab, std::size_t n) { return oblique_[slab % 2].data() + n * kObliques * kPiece; }
 
@@ -379,14 +411,16 @@ class Propagation {
   }
   /// to <- before + o
   void put_oblique(const ObliquePoint<S>& o, const double* before, double* to, char* felt) const {
-    const auto set = [&](int quantity, const S& x) { put(to + quantity * kPiece, x, before + quantity * kPiece, felt); };
+    const auto set = [&](int quantity, const S& x) {
+      put(to + quantity * kPiece, x, before + quantity * kPiece, felt);
+    };
     set(kWalk, o.v[0]), set(kWalk + 1, o.v[1]), set(kSd, o.sd), set(kSc, o.sc);
     for (int ij = 0; ij < 3; ++ij)
       for (int ab = 0; ab < 3; ++ab) set(kD + 3 * ij + ab, o.d[ij][ab]);
   }
 
-  /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the f-th coefficients: adds what
-  /// stays as it is (out 0, 1) and what kx, ky will be applied to (out 2 .. 5, the same order).
+  /// V' at one point on a, kx a, ky a in real space (`in`: ax, ay, kx ax, ky ax, kx ay, ky ay), with the f-th
+  /// coefficients: adds what stays as it is (out 0, 1) and what kx, ky will be applied to (out 2 .. 5, the same order).
   BIREFIT_INLINE static void oblique_at(const double* coefficients, int f, const Lanes* in, Lanes* out) {
     const auto c = [&](int quantity) { return entry(coefficients, quantity, f); };
     const Lanes div = in[2] + in[5], curl = in[3] - in[4];  // kappa . a, kappa' . a
@@ -419,7 +453,9 @@ class Propagation {
         if (which < 2)
           std::copy_n(in, nx, out);
         else if (which % 2 == 0)
-          in_packs(nx, [&](std::size_t i, int count) { store(Pack::load_unaligned(kx_.data() + i) * load(in + i, count), out + i, count); });
+          in_packs(nx, [&](std::size_t i, int count) {
+            store(Pack::load_unaligned(kx_.data() + i) * load(in + i, count), out + i, count);
+          });
         else
           in_packs(nx, [&](std::size_t i, int count) { store(Pack(ky_[row]) * load(in + i, count), out + i, count); });
       }
@@ -457,7 +493,8 @@ class Propagation {
           const std::size_t i = static_cast<std::size_t>(row) * nx + first;
           const Pack kx = Pack::load_unaligned(kx_.data() + first), f = factor * Pack::load_unaligned(kept_.data() + i);
           for (int a = 0; a < 2; ++a) {
-            const Lanes v = load(field.work[a].data() + i, count) + kx * load(field.work[2 + 2 * a].data() + i, count) + ky * load(field.work[3 + 2 * a].data() + i, count);
+            const Lanes v = load(field.work[a].data() + i, count) + kx * load(field.work[2 + 2 * a].data() + i, count) +
+                            ky * load(field.work[3 + 2 * a].data() + i, count);
             const Lanes t{-f * v.im, f * v.re};
             store(t, field.term[a].data() + i, count);
             store(load(field.a[a].data() + i, count) + t, field.a[a].data() + i, count);
@@ -503,7 +540,8 @@ class Propagation {
     Complex<S> at_screen[2] = {incident_[0], incident_[1]};
     incident_half_step(at_screen);
     Complex<S> behind[2];
-    for (int a = 0; a < 2; ++a) behind[a] = host_slab_.screen[a][0] * at_screen[0] + host_slab_.screen[a][1] * at_screen[1];
+    for (int a = 0; a < 2; ++a)
+      behind[a] = host_slab_.screen[a][0] * at_screen[0] + host_slab_.screen[a][1] * at_screen[1];
     for (int f = 0; f < kFields; ++f)
       for (int a = 0; a < 2; ++a) inc[f][a] = part(behind[a], f);
     const double over = 1.0 / static_cast<double>(n_);  // of the transform there and back
@@ -514,11 +552,15 @@ class Propagation {
         const double* c = own_point ? screen_.data() + n * kScreens * kPiece : host_screen_.data();
         const std::size_t i = static_cast<std::size_t>(row) * nx + first;
         const Pack frame = frame_y_[static_cast<std::size_t>(row)] * Pack::load_unaligned(frame_x_.data() + first);
-        const auto at_point = [&](int f, int a) { return Pack(over) * load(fields_[static_cast<std::size_t>(f)].a[a].data() + i, count); };
+        const auto at_point = [&](int f, int a) {
+          return Pack(over) * load(fields_[static_cast<std::size_t>(f)].a[a].data() + i, count);
+        };
         const Lanes x = at_point(0, 0), y = at_point(0, 1);
         for (int f = kFields - 1; f >= 0; --f) {
           if (asleep(f)) continue;
-          const auto screen = [&](int a, int b, int of) { return Lanes{entry(c, 4 * a + 2 * b, of), entry(c, 4 * a + 2 * b + 1, of)}; };
+          const auto screen = [&](int a, int b, int of) {
+            return Lanes{entry(c, 4 * a + 2 * b, of), entry(c, 4 * a + 2 * b + 1, of)};
+          };
           const Lanes own_x = at_point(f, 0), own_y = at_point(f, 1);
           for (int a = 0; a < 2; ++a) {
             Lanes r = screen(a, 0, 0) * own_x + screen(a, 1, 0) * own_y;
@@ -539,11 +581,13 @@ class Propagation {
   void incident_oblique(int slab) {
     if (tilt2_ == 0) return;
     const S kx(light_.kx_per_um), ky(light_.ky_per_um), none(0.0);
-    const ObliquePoint<S>*half = host_slab_.half;
-    const S sd = (slab > 0 ? half[1].sd : none) + (slab < g_.slabs ? half[0].sd : none), sc = (slab > 0 ? half[1].sc : none) + (slab < g_.slabs ? half[0].sc : none);
+    const ObliquePoint<S>* half = host_slab_.half;
+    const S sd = (slab > 0 ? half[1].sd : none) + (slab < g_.slabs ? half[0].sd : none),
+            sc = (slab > 0 ? half[1].sc : none) + (slab < g_.slabs ? half[0].sc : none);
     Complex<S> term[2] = {incident_[0], incident_[1]};
     for (int order = 1; order <= g_.order; ++order) {
-      const Complex<S> div = S(-0.5 * sd) * (kx * term[0] + ky * term[1]), curl = S(-0.5 * sc) * (ky * term[0] - kx * term[1]);
+      const Complex<S> div = S(-0.5 * sd) * (kx * term[0] + ky * term[1]),
+                       curl = S(-0.5 * sc) * (ky * term[0] - kx * term[1]);
       const Complex<S> x = kx * div + ky * curl, y = ky * div - kx * curl;
       const S f(1.0 / order);
       term[0] = Complex<S>(S(0.0) - f * x.im, f * x.re);
@@ -582,7 +626,8 @@ class Propagation {
         for (Z& x : to) x = times(turn, over * x - inc);
         if (f == 0)
           for (int g = 1; g < kFields; ++g)  // base of the rest: i dphase of what has been turned back
-            for (std::size_t i = 0; i < n_; ++i) out[static_cast<std::size_t>(g)].a[a][i] -= part(phase, g) * Z(-to[i].imag(), to[i].real());
+            for (std::size_t i = 0; i < n_; ++i)
+              out[static_cast<std::size_t>(g)].a[a][i] -= part(phase, g) * Z(-to[i].imag(), to[i].real());
       }
     return out;
   }
@@ -600,7 +645,8 @@ class Propagation {
   static constexpr char kOwn = 4;
   Table screen_;      ///< of the slab
   Table oblique_[2];  ///< of V' about the slab's entry and exit, by turns
-  std::vector<char> screen_is_hosts_, hosts_halves_[2];  ///< [row][piece]: a piece is host_screen_; which halves of host_oblique_ it is, or kOwn
+  /// [row][piece]: a piece is host_screen_; which halves of host_oblique_ it is, or kOwn
+  std::vector<char> screen_is_hosts_, hosts_halves_[2];
   alignas(64) std::array<double, kScreens * kPiece> host_screen_;
   struct alignas(64) HostPiece : std::array<double, kObliques * kPiece> {};
   std::array<HostPiece, 4> host_oblique_;  ///< no half, that behind an interface (1), that before it (2), both
@@ -619,14 +665,18 @@ class Propagation {
 }  // namespace
 
 template <class S>
-std::vector<WaveField> propagate(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium, int threads) {
+std::vector<WaveField> propagate(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium,
+                                 int threads) {
   // A phase of work is a few hundred microseconds: more threads than a dozen would wait for each other.
   return Propagation<S>(grid, light, medium).run(std::min(thread_count(threads), 12));
 }
 
 template std::vector<WaveField> propagate<Pack>(const WaveGrid&, const WaveLight<Pack>&, const WaveMedium<Pack>&, int);
-template std::vector<WaveField> propagate<Dual1>(const WaveGrid&, const WaveLight<Dual1>&, const WaveMedium<Dual1>&, int);
-template std::vector<WaveField> propagate<Dual2>(const WaveGrid&, const WaveLight<Dual2>&, const WaveMedium<Dual2>&, int);
-template std::vector<WaveField> propagate<Dual4>(const WaveGrid&, const WaveLight<Dual4>&, const WaveMedium<Dual4>&, int);
+template std::vector<WaveField> propagate<Dual1>(const WaveGrid&, const WaveLight<Dual1>&, const WaveMedium<Dual1>&,
+                                                 int);
+template std::vector<WaveField> propagate<Dual2>(const WaveGrid&, const WaveLight<Dual2>&, const WaveMedium<Dual2>&,
+                                                 int);
+template std::vector<WaveField> propagate<Dual4>(const WaveGrid&, const WaveLight<Dual4>&, const WaveMedium<Dual4>&,
+                                                 int);
 
 }  // namespace birefit

@@ -1,7 +1,7 @@
 #pragma once
-// One-way wave optics through an inhomogeneous birefringent object in an isotropic host: split step in the flux-normalised
-// transverse field a = Y^(1/2) e, Y the wave admittance h = Y e (docs/methods.md, "Waves"). Derivatives by tangents carried
-// beside the field: exact for the discrete scheme.
+// One-way wave optics through an inhomogeneous birefringent object in an isotropic host: split step in the
+// flux-normalised transverse field a = Y^(1/2) e, Y the wave admittance h = Y e (docs/methods.md, "Waves"). Derivatives
+// by tangents carried beside the field: exact for the discrete scheme.
 
 #include <memory>
 
@@ -10,17 +10,17 @@
 
 namespace birefit {
 
-/// The discretisation; fixed during a fit, so that the image is a smooth function of the parameters. Lengths in um, the object's
-/// centre at the origin, light along +z. Grid points lie half a step off the origin: no point is on the axis.
+/// The discretisation; fixed during a fit, so that the image is a smooth function of the parameters. Lengths in um, the
+/// object's centre at the origin, light along +z. Grid points lie half a step off the origin: no point is on the axis.
 struct WaveGrid {
-  int nx = 0, ny = 0;              ///< ny = 1: nothing changes along y
-  double step_um = 0;              ///< between points, both directions
+  int nx = 0, ny = 0;                ///< ny = 1: nothing changes along y
+  double step_um = 0;                ///< between points, both directions
   double entry_um = 0, exit_um = 0;  ///< planes in the host, z
-  int slabs = 0, layers = 0;       ///< layers: of the medium in every slab; even
-  double n_ref = 0;                ///< of the free propagation; any near the medium's
-  double cut_per_um = 0;           ///< transverse wavevectors beyond are left out; below k0 n_ref
-  double frame_um = 0;             ///< width of the absorbing frame; 0: periodic
-  int order = 2;                   ///< of the Taylor series of one slab's oblique terms
+  int slabs = 0, layers = 0;         ///< layers: of the medium in every slab; even
+  double n_ref = 0;                  ///< of the free propagation; any near the medium's
+  double cut_per_um = 0;             ///< transverse wavevectors beyond are left out; below k0 n_ref
+  double frame_um = 0;               ///< width of the absorbing frame; 0: periodic
+  int order = 2;                     ///< of the Taylor series of one slab's oblique terms
 
   double x_um(int i) const { return (i + 0.5 - 0.5 * nx) * step_um; }
   double y_um(int j) const { return ny == 1 ? 0.0 : (j + 0.5 - 0.5 * ny) * step_um; }
@@ -39,15 +39,16 @@ class WaveMedium {
 /// A unit plane wave. S has the same value in all lanes.
 template <class S>
 struct WaveLight {
-  S k0_per_um;   ///< 2 pi / vacuum wavelength
+  S k0_per_um;  ///< 2 pi / vacuum wavelength
   S n_host;
-  S ex, ey;      ///< transverse field in the host
+  S ex, ey;                             ///< transverse field in the host
   double kx_per_um = 0, ky_per_um = 0;  ///< transverse wavevector
 };
 
-/// The scattered flux-normalised field (x, y) in the plane grid.exit_um: a = Y^(1/2) e less the incident wave's, in units of the
-/// incident wave's phase there (with exp(i (kx x + ky y)), where it is tilted) and of n_host^(1/2), so that a = e for light along z.
-/// In the host a_s = (q / n_host)^(1/2) e_s, a_p = (n_host / q)^(1/2) e_p, n_host^2 = q^2 + kappa^2, e_p the transverse part.
+/// The scattered flux-normalised field (x, y) in the plane grid.exit_um: a = Y^(1/2) e less the incident wave's, in
+/// units of the incident wave's phase there (with exp(i (kx x + ky y)), where it is tilted) and of n_host^(1/2), so
+/// that a = e for light along z. In the host a_s = (q / n_host)^(1/2) e_s, a_p = (n_host / q)^(1/2) e_p, n_host^2 = q^2
+/// + kappa^2, e_p the transverse part.
 struct WaveField {
   Plane a[2];
 };

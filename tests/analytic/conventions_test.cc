@@ -19,8 +19,8 @@ struct CellCase {
   Scene scene;
 };
 /// A cell of n_o = 1.5 in a host of 1.5: no reflections for ordinary light.
-CellCase cell_case(double birefringence, double thickness_um, double azimuth_deg, double twist_deg, double polarizer_deg,
-                   double analyzer_deg, double rotation_deg = 0) {
+CellCase cell_case(double birefringence, double thickness_um, double azimuth_deg, double twist_deg,
+                   double polarizer_deg, double analyzer_deg, double rotation_deg = 0) {
   CellCase c;
   c.scene.microscope.wavelength_nm = c.t.fixed("wavelength_nm", 600);
   c.scene.microscope.polarizer_deg = c.t.fixed("polarizer_deg", polarizer_deg);
@@ -62,9 +62,9 @@ TEST(Conventions, CrossedIntensityOfARetarder) {
                 std::pow(std::sin(2 * (f - 10) * kDeg) * std::sin(delta / 2), 2), 1e-9);
 }
 
-// A quarter-wave plate with its slow axis at +45 degrees from the polarizer: E_slow lags, i.e. (time exp(-i w t)) it has
-// the phase factor +i. x-polarized light becomes (1, i)-like, the counter-clockwise circle; a second quarter-wave plate
-// of the same axis then makes it y-polarized, one of opposite axis gives x back.
+// A quarter-wave plate with its slow axis at +45 degrees from the polarizer: E_slow lags, i.e. (time exp(-i w t)) it
+// has the phase factor +i. x-polarized light becomes (1, i)-like, the counter-clockwise circle; a second quarter-wave
+// plate of the same axis then makes it y-polarized, one of opposite axis gives x back.
 TEST(Conventions, QuarterWaveHandedness) {
   SlabProfile profile;
   profile.interpolation = SlabProfile::Interpolation::constant;
@@ -81,8 +81,10 @@ TEST(Conventions, QuarterWaveHandedness) {
 
 TEST(Conventions, RotationTurnsTheSampleCounterClockwise) {
   for (double twist : {0.0, 70.0})
-    EXPECT_NEAR(intensity(cell_case(0.08, 5, 0, twist, 10, 80, 30)), intensity(cell_case(0.08, 5, 30, twist, 10, 80, 0)), 1e-9);
-  EXPECT_GT(std::abs(intensity(cell_case(0.08, 5, 30, 0, 10, 70)) - intensity(cell_case(0.08, 5, -30, 0, 10, 70))), 0.01);
+    EXPECT_NEAR(intensity(cell_case(0.08, 5, 0, twist, 10, 80, 30)),
+                intensity(cell_case(0.08, 5, 30, twist, 10, 80, 0)), 1e-9);
+  EXPECT_GT(std::abs(intensity(cell_case(0.08, 5, 30, 0, 10, 70)) - intensity(cell_case(0.08, 5, -30, 0, 10, 70))),
+            0.01);
 }
 
 TEST(Conventions, PolarizerAnglesAreCounterClockwiseInTheImage) {
@@ -123,7 +125,8 @@ TEST(Conventions, PolarizerAnglesAreCounterClockwiseInTheImage) {
 }
 
 TEST(TwistedCell, FollowsGoochTarryMinima) {
-  // 90 degrees between parallel polarizers along the entry director: T = sin^2(pi/2 sqrt(1 + u^2))/(1 + u^2), u = 2 d dn/lambda.
+  // 90 degrees between parallel polarizers along the entry director: T = sin^2(pi/2 sqrt(1 + u^2))/(1 + u^2), u = 2 d
+  // dn/lambda.
   for (double u : {0.4, 1.0, std::sqrt(3.0), 2.3, std::sqrt(15.0)}) {
     const double dn = u * 0.6 / 2 / 5;
     const double expected = std::pow(std::sin(std::numbers::pi / 2 * std::sqrt(1 + u * u)), 2) / (1 + u * u);
@@ -170,7 +173,9 @@ TEST(Conventions, IsotropicSlabHasFresnelTransmissionsAndNoCrossTerms) {
   auto column = std::make_unique<LawColumn<double, ProfileLaw<double>>>(ProfileLaw<double>{table});
   const PlanarOptics<double> o = optics_of(std::move(column), 0.6, 1.0, Continuity::e_and_h);
   const double theta = 40 * kDeg, azimuth = 25 * kDeg, t = std::tan(theta);
-  const SpJones j = sp_jones(planar_jones<double>(o, Magnus4<double>(), uniform_mesh(2), t * std::cos(azimuth), t * std::sin(azimuth)), azimuth);
+  const SpJones j = sp_jones(
+      planar_jones<double>(o, Magnus4<double>(), uniform_mesh(2), t * std::cos(azimuth), t * std::sin(azimuth)),
+      azimuth);
   const double c1 = std::cos(theta), c2 = std::sqrt(1 - std::pow(std::sin(theta) / 1.5, 2));
   const double ts = 4 * c1 * 1.5 * c2 / std::pow(c1 + 1.5 * c2, 2), tp = 4 * 1.5 * c1 * c2 / std::pow(1.5 * c1 + c2, 2);
   EXPECT_NEAR(std::abs(j.ss), ts, 1e-12);

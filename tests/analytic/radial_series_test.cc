@@ -1,5 +1,5 @@
-// The exact series of the radial ball against its own laws, against textbook series coded here from Boost's Bessel functions,
-// against the Born approximation and against tabulated images (tests/data/wave/README.md).
+// The exact series of the radial ball against its own laws, against textbook series coded here from Boost's Bessel
+// functions, against the Born approximation and against tabulated images (tests/data/wave/README.md).
 
 #include "wave/radial_series.h"
 
@@ -46,11 +46,12 @@ double largest_difference(const RadialSeries<double>& f, const RadialSeries<doub
   return most;
 }
 
-// ---- the radial functions ----------------------------------------------------------------------------------------------
+// ---- the radial functions ------------------------------------------------------------------------------------------
 
-// The equation is u'' = (lambda / z^2 - 1) u, and both numbers of a pair carry the same factor, which may depend on z; the
-// logarithmic derivative p = u'/u does not know it: p' = lambda / z^2 - 1 - p^2, multiplied here by u^2 so that zeros of u do
-// no harm. Pairs are scaled to 1; their rounding comes magnified by the number of Miller's steps, and by lambda / z^2.
+// The equation is u'' = (lambda / z^2 - 1) u, and both numbers of a pair carry the same factor, which may depend on z;
+// the logarithmic derivative p = u'/u does not know it: p' = lambda / z^2 - 1 - p^2, multiplied here by u^2 so that
+// zeros of u do no harm. Pairs are scaled to 1; their rounding comes magnified by the number of Miller's steps, and by
+// lambda / z^2.
 TEST(RadialSeries, RegularSolutionSolvesItsEquation) {
   std::mt19937 random(7);
   for (int trial = 0; trial < 400; ++trial) {
@@ -60,7 +61,8 @@ TEST(RadialSeries, RegularSolutionSolvesItsEquation) {
     at.d[0] = 1;
     const auto pair = regular_pair(Dual<double, 1>(nu), at);
     const double u = pair.u.value, v = pair.slope.value, well = nu * (nu + 1) / (z * z) - 1;
-    EXPECT_NEAR((pair.slope.d[0] * u - v * pair.u.d[0]), well * u * u - v * v, 1e-12 * (1 + std::abs(well))) << nu << ' ' << z;
+    EXPECT_NEAR((pair.slope.d[0] * u - v * pair.u.d[0]), well * u * u - v * v, 1e-12 * (1 + std::abs(well)))
+        << nu << ' ' << z;
   }
 }
 
@@ -77,7 +79,8 @@ TEST(RadialSeries, RegularSolutionIsABesselFunctionOfRealOrder) {
     }
 }
 
-// psi xi' - psi' xi = i (psi eta' - psi' eta), that is psi_(n-1) eta_n - psi_n eta_(n-1) = -1. n steps of recurrence, each rounding.
+// psi xi' - psi' xi = i (psi eta' - psi' eta), that is psi_(n-1) eta_n - psi_n eta_(n-1) = -1. n steps of recurrence,
+// each rounding.
 TEST(RadialSeries, HostWavesHaveTheirWronskian) {
   for (double x : {1e-3, 0.1, 1.0, kPi, 10.0, 73.0, 700.0}) {
     const int orders = series_orders(x);
@@ -86,7 +89,8 @@ TEST(RadialSeries, HostWavesHaveTheirWronskian) {
       const double turn = static_cast<double>(n) / x;
       const double psi_slope = f.psi[n - 1] - turn * f.psi[n], eta_slope = f.eta[n - 1] - turn * f.eta[n];
       // Both products grow as 2n / x below the surface of the barrier; rounding is relative to them.
-      EXPECT_NEAR(f.psi[n] * eta_slope - psi_slope * f.eta[n], 1, 1e-15 * (50 + static_cast<double>(n)) * (1 + turn)) << x << ' ' << n;
+      EXPECT_NEAR(f.psi[n] * eta_slope - psi_slope * f.eta[n], 1, 1e-15 * (50 + static_cast<double>(n)) * (1 + turn))
+          << x << ' ' << n;
     }
   }
 }
@@ -98,12 +102,14 @@ TEST(RadialSeries, CarriedSolutionIsTheSolutionFurtherOut) {
       for (double ratio : {1.0, 1.0001, 1.3, 6.0}) {
         const double lambda = nu * (nu + 1), to = from * ratio;
         const RadialPair<double> carry = carried(regular_pair(nu, from), lambda, from, to), anew = regular_pair(nu, to);
-        EXPECT_NEAR((carry.u * anew.slope - carry.slope * anew.u) / std::hypot(carry.u, carry.slope) / std::hypot(anew.u, anew.slope), 0, 2e-12)
+        EXPECT_NEAR((carry.u * anew.slope - carry.slope * anew.u) / std::hypot(carry.u, carry.slope) /
+                        std::hypot(anew.u, anew.slope),
+                    0, 2e-12)
             << nu << ' ' << from << ' ' << ratio;
       }
 }
 
-// ---- the coefficients --------------------------------------------------------------------------------------------------
+// ---- the coefficients ----------------------------------------------------------------------------------------------
 
 // Without absorption each partial wave comes out with the modulus it went in with: rounding only.
 TEST(RadialSeries, EveryWaveKeepsItsFlux) {
@@ -113,7 +119,8 @@ TEST(RadialSeries, EveryWaveKeepsItsFlux) {
       EXPECT_NEAR(std::abs(1.0 - 2.0 * number(series.a[i])), 1, 1e-13);
       EXPECT_NEAR(std::abs(1.0 - 2.0 * number(series.b[i])), 1, 1e-13);
     }
-    // Nothing is cut off: the last waves pass untouched. More orders start Miller's recurrence elsewhere: rounding of x steps.
+    // Nothing is cut off: the last waves pass untouched. More orders start Miller's recurrence elsewhere: rounding of x
+    // steps.
     EXPECT_LT(std::abs(number(series.a.back())) + std::abs(number(series.b.back())), 1e-16);
     EXPECT_LT(largest_difference(series, radial_series(ball, series.orders() + 5)), 1e-14);
   }
@@ -131,8 +138,8 @@ struct Riccati {
   }
 };
 
-/// a_n and b_n of a ball with one shell, Bohren & Huffman (8.2), with the TM order of each radial medium: the field in the shell is
-/// psi - A chi. A plain ball has an inner radius of zero (A = 0).
+/// a_n and b_n of a ball with one shell, Bohren & Huffman (8.2), with the TM order of each radial medium: the field in
+/// the shell is psi - A chi. A plain ball has an inner radius of zero (A = 0).
 std::array<Cplx, 2> textbook(const Ball& ball, int n) {
   using Real = long double;
   const RadialLayer<double>& outer = ball.layers.back();
@@ -149,7 +156,8 @@ std::array<Cplx, 2> textbook(const Ball& ball, int n) {
       const Real x = Real(ball.k0) * ball.n_host * inner.radius_um, m1 = Real(inner.n_o) / ball.n_host;
       const Riccati core(order(inner, tm), m1 * x), shell(order(outer, tm), m2 * x);
       const Real f = tm ? m2 : m1, g = tm ? m1 : m2;
-      mix = (f * shell.psi * core.psi_slope - g * shell.psi_slope * core.psi) / (f * shell.chi * core.psi_slope - g * shell.chi_slope * core.psi);
+      mix = (f * shell.psi * core.psi_slope - g * shell.psi_slope * core.psi) /
+            (f * shell.chi * core.psi_slope - g * shell.chi_slope * core.psi);
     }
     const Riccati in(order(outer, tm), m2 * y), out(n, y);
     const Real u = in.psi - mix * in.chi, v = in.psi_slope - mix * in.chi_slope;
@@ -175,7 +183,8 @@ double difference_from_textbook(const Ball& ball) {
 // Coefficients of modulus up to 1 behind some hundred steps of recurrence, each rounded: 1e-12.
 TEST(RadialSeries, IsotropicBallIsMies) {
   for (double n : {1.33, 1.43001, 1.6, 2.2})
-    for (double radius_um : {0.3, 1.0, 4.5}) EXPECT_LT(difference_from_textbook({{{radius_um, n, n}}, 1.43, k0_of(0.59)}), 1e-12) << n << ' ' << radius_um;
+    for (double radius_um : {0.3, 1.0, 4.5})
+      EXPECT_LT(difference_from_textbook({{{radius_um, n, n}}, 1.43, k0_of(0.59)}), 1e-12) << n << ' ' << radius_um;
   // Rayleigh's limit, Bohren & Huffman 5.4; the next term is x^2 = 1e-4 of it.
   const Ball dust{{{0.001, 1.6, 1.6}}, 1.0, k0_of(0.59)};
   const double x = dust.k0 * 0.001, m2 = 1.6 * 1.6;
@@ -210,13 +219,14 @@ TEST(RadialSeries, LayersThatDoNotDifferAreOne) {
   const RadialSeries<double> dressed = radial_series(wall);
   EXPECT_LT(largest_difference(whole, dressed), 1e-12);
   parted.layers = {{4.5e-5, 1.46, 1.46}, {4.5, 1.52, 1.52}};
-  EXPECT_LT(largest_difference(radial_series(parted), radial_series(Ball{{{4.5, 1.52, 1.52}}, 1.43, k0_of(0.59)})), 5e-11);
+  EXPECT_LT(largest_difference(radial_series(parted), radial_series(Ball{{{4.5, 1.52, 1.52}}, 1.43, k0_of(0.59)})),
+            5e-11);
 }
 
-// ---- flux --------------------------------------------------------------------------------------------------------------
+// ---- flux ----------------------------------------------------------------------------------------------------------
 
-// Scattered flux by integrating the far field over all directions. S1, S2 are polynomials of degree `orders` in cos, so the rule
-// is exact; rounding of sums of 1e3 terms that reach x^2.
+// Scattered flux by integrating the far field over all directions. S1, S2 are polynomials of degree `orders` in cos, so
+// the rule is exact; rounding of sums of 1e3 terms that reach x^2.
 TEST(RadialSeries, ExtinctionIsScattering) {
   for (const Ball& ball : {kDroplet, kNegative, kShell, kOnion, kBig, kBigShell}) {
     const RadialSeries<double> series = radial_series(ball);
@@ -233,12 +243,12 @@ TEST(RadialSeries, ExtinctionIsScattering) {
     // The optical theorem, Bohren & Huffman 4.76.
     EXPECT_NEAR(4 * scattering_amplitudes(series, 1.0).s1.re / (x * x) / extinction_efficiency(series), 1, 1e-12);
   }
-  // A big ball takes away twice its shadow; the edge adds 2 x^(-2/3) = 0.034 here, and the light straight through the middle
-  // interferes with it by 4 / (phase delay) = 0.07 in each of two modes.
+  // A big ball takes away twice its shadow; the edge adds 2 x^(-2/3) = 0.034 here, and the light straight through the
+  // middle interferes with it by 4 / (phase delay) = 0.07 in each of two modes.
   EXPECT_NEAR(extinction_efficiency(radial_series(kBig)), 2, 0.034 + 2 * 0.07 + 0.03);
 }
 
-// ---- the image ---------------------------------------------------------------------------------------------------------
+// ---- the image -----------------------------------------------------------------------------------------------------
 
 // The table was printed with eleven digits.
 TEST(RadialSeries, ImagesAgreeWithTheTable) {
@@ -266,7 +276,8 @@ TEST(RadialSeries, QuadratureIsLongEnough) {
     for (double na : {0.1, 0.8, 1.39, 1.6})
       for (double defocus_um : {0.0, -40.0}) {
         const RadialSeries<double> series = radial_series(ball);
-        const RadialImage<double> image(series, na, defocus_um, 50), longer(series, na, defocus_um, 50, Pupil::focal_plane, 2 * image.nodes());
+        const RadialImage<double> image(series, na, defocus_um, 50),
+            longer(series, na, defocus_um, 50, Pupil::focal_plane, 2 * image.nodes());
         for (double rho_um : {0.0, 0.7, 12.0, 50.0}) {
           const RadialAmplitudes<double> f = image(rho_um), g = longer(rho_um);
           // Rounding: the integrand reaches x^2 / 2 (1e5 for the biggest), most of it in a narrow peak of width 1 / x.
@@ -276,16 +287,19 @@ TEST(RadialSeries, QuadratureIsLongEnough) {
       }
 }
 
-/// The image at one place from the angular spectrum: a rule over the disc of accepted directions, in sin theta = NA/n sin t so that
-/// the end is smooth even at 90 degrees; the azimuth's trapezoids are exact once they outnumber the waves around the rim.
-std::array<Cplx, 2> image_of_spectrum(const RadialSeries<double>& series, double na, double defocus_um, double x, double y, Pupil pupil) {
+/// The image at one place from the angular spectrum: a rule over the disc of accepted directions, in sin theta = NA/n
+/// sin t so that the end is smooth even at 90 degrees; the azimuth's trapezoids are exact once they outnumber the waves
+/// around the rim.
+std::array<Cplx, 2> image_of_spectrum(const RadialSeries<double>& series, double na, double defocus_um, double x,
+                                      double y, Pupil pupil) {
   const int azimuths = 160;
   std::vector<double> t, w;
   legendre_nodes(80, t, w);
   std::array<Cplx, 2> field{};
   for (std::size_t i = 0; i < t.size(); ++i) {
     const double angle = kPi / 4 * (1 + t[i]), kappa = na * std::sin(angle);
-    const double weight = kPi / 4 * w[i] * na * na * std::sin(angle) * std::cos(angle) * series.k0 * series.k0 / azimuths / (2 * kPi);
+    const double weight =
+        kPi / 4 * w[i] * na * na * std::sin(angle) * std::cos(angle) * series.k0 * series.k0 / azimuths / (2 * kPi);
     for (int j = 0; j < azimuths; ++j) {
       const double phi = 2 * kPi * (j + 0.3) / azimuths, kx = kappa * std::cos(phi), ky = kappa * std::sin(phi);
       const Mat2<double> f = scattered_spectrum(series, {0, 0}, {kx, ky}, defocus_um, pupil);
@@ -304,7 +318,8 @@ TEST(RadialSeries, ImageIsTheSumOfItsSpectrum) {
       const RadialSeries<double> series = radial_series(ball);
       const double na = 0.8, defocus_um = 1.3;
       const RadialImage<double> image(series, na, defocus_um, 4.0, pupil);
-      for (const auto& [rho_um, phi] : {std::pair(0.0, 0.0), std::pair(0.9, 0.4), std::pair(2.2, 2.0), std::pair(4.0, -1.0)}) {
+      for (const auto& [rho_um, phi] :
+           {std::pair(0.0, 0.0), std::pair(0.9, 0.4), std::pair(2.2, 2.0), std::pair(4.0, -1.0)}) {
         const RadialAmplitudes<double> f = image(rho_um);
         const std::array<Cplx, 2> sum =
             image_of_spectrum(series, na, defocus_um, rho_um * std::cos(phi), rho_um * std::sin(phi), pupil);
@@ -314,12 +329,15 @@ TEST(RadialSeries, ImageIsTheSumOfItsSpectrum) {
     }
 }
 
-// ---- the spectrum for tilted light -------------------------------------------------------------------------------------
+// ---- the spectrum for tilted light ---------------------------------------------------------------------------------
 
-/// Born's approximation of the scattered spectrum (first order in the contrasts): polarization (eps - eps_host) E_in in every point,
-///   F e = i k0^2 / (2 k cos) exp(i ..) [transverse part of] integral (eps - eps_host) e exp(i (k_in - k_out) . r) d^3r,
+/// Born's approximation of the scattered spectrum (first order in the contrasts): polarization (eps - eps_host) E_in in
+/// every point,
+///   F e = i k0^2 / (2 k cos) exp(i ..) [transverse part of] integral (eps - eps_host) e exp(i (k_in - k_out) . r)
+///   d^3r,
 /// with the integrals over a sphere of exp = 4 pi j0 and of r r exp = 4 pi (j1 / x - q q j2), left to a rule in r.
-Mat2<double> born_spectrum(const Ball& ball, const std::array<double, 2>& kappa_in, const std::array<double, 2>& kappa_out, double defocus_um) {
+Mat2<double> born_spectrum(const Ball& ball, const std::array<double, 2>& kappa_in,
+                           const std::array<double, 2>& kappa_out, double defocus_um) {
   const double n = ball.n_host, k = ball.k0 * n;
   const auto direction = [n](const std::array<double, 2>& kappa) {
     const double x = kappa[0] / n, y = kappa[1] / n;
@@ -356,40 +374,48 @@ Mat2<double> born_spectrum(const Ball& ball, const std::array<double, 2>& kappa_
 
 double size_of(const Mat2<double>& m) { return std::sqrt(norm(m.a) + norm(m.b) + norm(m.c) + norm(m.d)); }
 
-// The error of the first order, relative, is of the first order in the contrast: it falls with it by the same factor. This holds the
-// coefficients, all phases and signs, the polarizations at any tilt and the focus to an independent formula.
+// The error of the first order, relative, is of the first order in the contrast: it falls with it by the same factor.
+// This holds the coefficients, all phases and signs, the polarizations at any tilt and the focus to an independent
+// formula.
 TEST(RadialSeries, WeakContrastIsBorns) {
   const std::array<std::array<double, 2>, 4> out{{{0.3, -0.5}, {-0.2, 0.1}, {0.0, 1.1}, {0.41, 0.2}}};
-  for (const std::array<double, 2>& in : {std::array<double, 2>{0, 0}, std::array<double, 2>{0.4, 0.2}, std::array<double, 2>{-0.9, 0.6}})
+  for (const std::array<double, 2>& in :
+       {std::array<double, 2>{0, 0}, std::array<double, 2>{0.4, 0.2}, std::array<double, 2>{-0.9, 0.6}})
     for (const auto& kappa : out) {
       std::array<double, 2> error{};
       for (int i = 0; i < 2; ++i) {
         const double weak = i == 0 ? 1e-4 : 1e-5;
         const Ball ball{{{0.6, 1.5 - 0.7 * weak, 1.5 + 2 * weak}, {1.2, 1.5 + weak, 1.5 - weak}}, 1.5, k0_of(0.59)};
-        const Mat2<double> exact = scattered_spectrum(radial_series(ball), in, kappa, 0.8), born = born_spectrum(ball, in, kappa, 0.8);
+        const Mat2<double> exact = scattered_spectrum(radial_series(ball), in, kappa, 0.8),
+                           born = born_spectrum(ball, in, kappa, 0.8);
         error[static_cast<std::size_t>(i)] = size_of(exact - born) / size_of(born);
       }
-      // First order: about k0 R times the contrast. The quotient is 10 up to the next order and, at 1e-5, to the rounding of
-      // coefficients that are themselves 1e-4.
+      // First order: about k0 R times the contrast. The quotient is 10 up to the next order and, at 1e-5, to the
+      // rounding of coefficients that are themselves 1e-4.
       EXPECT_LT(error[0], 5e-2);
       EXPECT_NEAR(error[0] / error[1], 10, 0.5) << in[0] << ' ' << kappa[0];
     }
 }
 
-// Reciprocity: exchanging source and receiver transposes the flux-normalised spectrum, directions reversed. Here also the mirror
-// z -> -z of the ball is used, which turns the reversed pair into a forward one (the focus is then on the other side: kept at 0).
+// Reciprocity: exchanging source and receiver transposes the flux-normalised spectrum, directions reversed. Here also
+// the mirror z -> -z of the ball is used, which turns the reversed pair into a forward one (the focus is then on the
+// other side: kept at 0).
 TEST(RadialSeries, SpectrumIsReciprocal) {
   const RadialSeries<double> series = radial_series(kDroplet);
   const std::array<double, 2> one{0.5, -0.3}, two{-0.2, 0.7};
-  const auto cosine = [](const std::array<double, 2>& kappa) { return std::sqrt(1 - (kappa[0] * kappa[0] + kappa[1] * kappa[1]) / (1.43 * 1.43)); };
+  const auto cosine = [](const std::array<double, 2>& kappa) {
+    return std::sqrt(1 - (kappa[0] * kappa[0] + kappa[1] * kappa[1]) / (1.43 * 1.43));
+  };
   const Mat2<double> there = scattered_spectrum(series, one, two, 0, Pupil::unrolled);
   const Mat2<double> back = scattered_spectrum(series, {-two[0], -two[1]}, {-one[0], -one[1]}, 0, Pupil::unrolled);
   // Exact but for rounding; the spectrum is in um^2, of order 1 to 10.
   const double f = cosine(two), g = cosine(one), tolerance = 1e-13 * (1 + size_of(there) * f);
-  EXPECT_LT(size_of({f * there.a - g * back.a, f * there.b - g * back.c, f * there.c - g * back.b, f * there.d - g * back.d}), tolerance);
+  EXPECT_LT(
+      size_of({f * there.a - g * back.a, f * there.b - g * back.c, f * there.c - g * back.b, f * there.d - g * back.d}),
+      tolerance);
 }
 
-// ---- derivatives -------------------------------------------------------------------------------------------------------
+// ---- derivatives ---------------------------------------------------------------------------------------------------
 
 /// Everything that may vary, for a shell around a core: n_o, n_e, n_host, wavelength, both radii, defocus, rho, n_core.
 using Inputs = std::array<double, 9>;
@@ -405,8 +431,8 @@ std::array<S, 6> outputs(const std::array<S, 9>& v, bool shell) {
   return {f.a0.re, f.a0.im, f.a2.re, f.a2.im, extinction_efficiency(series), scattering_efficiency(series)};
 }
 
-// Richardson's extrapolation of central differences: the error left is of the order (h p / 4)^6 of the slope for phases of p = 50
-// rad per unit of the input, below 1e-9, and rounding / h = 1e-13 / 1e-4.
+// Richardson's extrapolation of central differences: the error left is of the order (h p / 4)^6 of the slope for phases
+// of p = 50 rad per unit of the input, below 1e-9, and rounding / h = 1e-13 / 1e-4.
 TEST(RadialSeries, DerivativesAreDifferences) {
   const Inputs at{1.52, 1.70, 1.45, 0.59, 1.1, 2.3, 0.9, 1.3, 1.47};
   for (const bool shell : {false, true})
@@ -429,28 +455,34 @@ TEST(RadialSeries, DerivativesAreDifferences) {
       double size = 1;
       for (const double d : d4) size = std::max(size, std::abs(d));
       for (std::size_t i = 0; i < dual.size(); ++i) {
-        const double first = (4 * d2[i] - d1[i]) / 3, second = (4 * d4[i] - d2[i]) / 3, limit = (16 * second - first) / 15;
-        EXPECT_NEAR(dual[i].d[0], limit, 1e-8 * size) << "input " << input << " output " << i << (shell ? " shell" : " ball");
+        const double first = (4 * d2[i] - d1[i]) / 3, second = (4 * d4[i] - d2[i]) / 3,
+                     limit = (16 * second - first) / 15;
+        EXPECT_NEAR(dual[i].d[0], limit, 1e-8 * size)
+            << "input " << input << " output " << i << (shell ? " shell" : " ball");
       }
       EXPECT_NEAR(dual[2].value, outputs(at, shell)[2], 1e-13);
     }
 }
 
-// Derivatives come through where the number itself is a limit: no thickness yet, no birefringence yet, middle of the image.
+// Derivatives come through where the number itself is a limit: no thickness yet, no birefringence yet, middle of the
+// image.
 TEST(RadialSeries, DerivativesSurviveDegenerateInputs) {
   using D = Dual<double, 2>;
   D thickness(0.0), birefringence(0.0);
   thickness.d[0] = birefringence.d[1] = 1;
   const auto field = [](auto thickness_um, auto birefringence, double rho_um) {
     using S = decltype(thickness_um);
-    RadialBall<S> ball{{{S(1.4), S(1.5), 1.5 + birefringence}, {1.4 + thickness_um, S(1.6), S(1.6)}}, S(1.45), S(k0_of(0.59))};
+    RadialBall<S> ball{
+        {{S(1.4), S(1.5), 1.5 + birefringence}, {1.4 + thickness_um, S(1.6), S(1.6)}}, S(1.45), S(k0_of(0.59))};
     return RadialImage<S>(radial_series(ball, 60), 0.8, S(0.3), 3.0)(S(rho_um));
   };
   for (const double rho_um : {0.0, 1.0}) {
     const RadialAmplitudes<D> f = field(thickness, birefringence, rho_um);
-    // One-sided in the thickness (second order), central in the birefringence: errors h^2 x (third derivatives of about 1e3).
+    // One-sided in the thickness (second order), central in the birefringence: errors h^2 x (third derivatives of about
+    // 1e3).
     const double h = 1e-5, e = 1e-5;
-    const RadialAmplitudes<double> f0 = field(0.0, 0.0, rho_um), f1 = field(h, 0.0, rho_um), f2 = field(2 * h, 0.0, rho_um);
+    const RadialAmplitudes<double> f0 = field(0.0, 0.0, rho_um), f1 = field(h, 0.0, rho_um),
+                                   f2 = field(2 * h, 0.0, rho_um);
     const RadialAmplitudes<double> up = field(0.0, e, rho_um), down = field(0.0, -e, rho_um);
     EXPECT_NEAR(f.a0.re.d[0], (4 * f1.a0.re - f2.a0.re - 3 * f0.a0.re) / (2 * h), 1e-6);
     EXPECT_NEAR(f.a2.im.d[0], (4 * f1.a2.im - f2.a2.im - 3 * f0.a2.im) / (2 * h), 1e-6);
@@ -459,9 +491,10 @@ TEST(RadialSeries, DerivativesSurviveDegenerateInputs) {
   }
 }
 
-// ---- a big ball --------------------------------------------------------------------------------------------------------
+// ---- a big ball ----------------------------------------------------------------------------------------------------
 
-// 60 um across, sizes up to 556: everything finite, and the scattered field in the picture carries no more flux than was scattered.
+// 60 um across, sizes up to 556: everything finite, and the scattered field in the picture carries no more flux than
+// was scattered.
 TEST(RadialSeries, BigBallsAreFinite) {
   for (const Ball& ball : {kBig, kBigShell}) {
     const RadialSeries<double> series = radial_series(ball);

@@ -36,8 +36,9 @@ TEST(StressedDisc, CentreInClosedForm) {
   EXPECT_NEAR(s.shear, 0, 1e-15);
 }
 
-// Without body forces, of N = sxx - syy, S = 2 sxy and the mean m = (sxx + syy)/2 the equilibrium is m_x = -(N_x + S_y)/2,
-// m_y = (N_y - S_x)/2. Both are differentiated once more: m exists, and it is harmonic (compatibility in plane stress).
+// Without body forces, of N = sxx - syy, S = 2 sxy and the mean m = (sxx + syy)/2 the equilibrium is m_x = -(N_x +
+// S_y)/2, m_y = (N_y - S_x)/2. Both are differentiated once more: m exists, and it is harmonic (compatibility in plane
+// stress).
 TEST(StressedDisc, EquilibriumAndCompatibility) {
   const double h = 1e-3;
   for (const auto& [x, y] : {std::pair{0.1, 0.2}, {-0.5, 0.3}, {0.7, -0.4}, {0.05, 0.6}, {-0.3, -0.7}}) {
@@ -48,7 +49,8 @@ TEST(StressedDisc, EquilibriumAndCompatibility) {
     const auto n = [](const StressPair<double>& s) { return s.normal; };
     const auto s = [](const StressPair<double>& p) { return p.shear; };
     const double size = std::abs(xx(n)) + std::abs(yy(n)) + std::abs(xy(s));
-    // Second differences err by h^2/12 of the fourth derivative, here up to 100 times the second (distance 0.4 from the load).
+    // Second differences err by h^2/12 of the fourth derivative, here up to 100 times the second (distance 0.4 from the
+    // load).
     EXPECT_NEAR(xy(n) + 0.5 * (yy(s) - xx(s)), 0, 2e-5 * size);
     EXPECT_NEAR(0.5 * (yy(n) - xx(n)) - xy(s), 0, 2e-5 * size);
   }
@@ -63,7 +65,8 @@ TEST(StressedDisc, RimIsFreeOfTraction) {
     const int steps = 4000;
     for (int i = 0; i < steps; ++i) {  // midpoints
       const double r = (i + 0.5) / steps, x = r * c, y = r * s;
-      const StressPair<double> e = diametral_stress(x + h, y), w = diametral_stress(x - h, y), n = diametral_stress(x, y + h), b = diametral_stress(x, y - h);
+      const StressPair<double> e = diametral_stress(x + h, y), w = diametral_stress(x - h, y),
+                               n = diametral_stress(x, y + h), b = diametral_stress(x, y - h);
       const double mx = -0.5 * ((e.normal - w.normal) + (n.shear - b.shear)) / (2 * h);
       const double my = 0.5 * ((n.normal - b.normal) - (e.shear - w.shear)) / (2 * h);
       mean += (mx * c + my * s) / steps;
@@ -101,8 +104,8 @@ DiscScene scene_of(const testing::IndependentDisc& d, int size, double analyzer_
   return r;
 }
 
-// Pixel means away from the edge and the forces, where fringes pass by at up to 4 rad a pixel: of these the 32 x 32 midpoints of
-// the reference are good to 4^2/(24 * 32^2) of the amplitude, 7e-4.
+// Pixel means away from the edge and the forces, where fringes pass by at up to 4 rad a pixel: of these the 32 x 32
+// midpoints of the reference are good to 4^2/(24 * 32^2) of the amplitude, 7e-4.
 TEST(StressedDisc, ImagesOfBothPolariscopesAreTheTextbooks) {
   for (bool circular : {false, true})
     for (double azimuth : {90.0, 62.0}) {
@@ -122,7 +125,8 @@ TEST(StressedDisc, ImagesOfBothPolariscopesAreTheTextbooks) {
       for (int row = 0; row < 64; row += 2)
         for (int column = 0; column < 64; column += 2) {
           const double east = column - d.center_x_px, north = d.center_y_px - row, r = std::hypot(east, north);
-          const double along = (east * std::cos(load) + north * std::sin(load)), to_force = std::sqrt(std::max(0.0, r * r + radius * radius - 2 * std::abs(along) * radius));
+          const double along = (east * std::cos(load) + north * std::sin(load)),
+                       to_force = std::sqrt(std::max(0.0, r * r + radius * radius - 2 * std::abs(along) * radius));
           if (r > radius + 1.5) {
             EXPECT_NEAR(image(column, row), 0, 1e-12);
             continue;
@@ -143,12 +147,14 @@ TEST(StressedDisc, ParallelPolarizersAreTheComplementInCircularLight) {
   const DiscScene dark = scene_of(d, 32, 90), bright = scene_of(d, 32, 0);
   const Theta theta = dark.t.table.values();
   const RenderPlan p = plan(dark.scene, theta);
-  const Image a = render(dark.scene, p, theta).intensity, b = render(bright.scene, p, bright.t.table.values()).intensity;
+  const Image a = render(dark.scene, p, theta).intensity,
+              b = render(bright.scene, p, bright.t.table.values()).intensity;
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a.values()[i] + b.values()[i], 1, 1e-12);
 }
 
-// Jones matrices multiplied out plate by plate: polarizer, quarter-wave plate at +45 degrees, retarder, the other plate, analyser at
-// any angle. On one retarder of known slow axis: the disc's centre, whose slow axis is the x of the load's frame.
+// Jones matrices multiplied out plate by plate: polarizer, quarter-wave plate at +45 degrees, retarder, the other
+// plate, analyser at any angle. On one retarder of known slow axis: the disc's centre, whose slow axis is the x of the
+// load's frame.
 TEST(StressedDisc, AnyAnalyserBehindTheQuarterWavePlates) {
   using C = std::complex<double>;
   const auto plate = [](double slow_rad, double retardance) {
@@ -156,7 +162,9 @@ TEST(StressedDisc, AnyAnalyserBehindTheQuarterWavePlates) {
     const C i(0, std::sin(retardance / 2)), w = std::cos(retardance / 2);
     return std::array<C, 4>{w + i * c, i * s, i * s, w - i * c};
   };
-  const auto times = [](const std::array<C, 4>& m, std::array<C, 2> v) { return std::array<C, 2>{m[0] * v[0] + m[1] * v[1], m[2] * v[0] + m[3] * v[1]}; };
+  const auto times = [](const std::array<C, 4>& m, std::array<C, 2> v) {
+    return std::array<C, 2>{m[0] * v[0] + m[1] * v[1], m[2] * v[0] + m[3] * v[1]};
+  };
   for (double analyzer_deg : {0.0, 25.0, 65.0, 110.0, 150.0})
     for (double load : {100.0, 340.0}) {
       testing::IndependentDisc d;
@@ -174,12 +182,14 @@ TEST(StressedDisc, AnyAnalyserBehindTheQuarterWavePlates) {
       e = times(plate(p + kPi / 4, kPi / 2), e);
       e = times(plate((50 - 90) * kPi / 180, delta), e);
       e = times(plate(p - kPi / 4, kPi / 2), e);
-      EXPECT_NEAR(got, std::norm(std::cos(a) * e[0] + std::sin(a) * e[1]), 1e-6) << analyzer_deg << " " << load;  // over one um of 6 mm
+      EXPECT_NEAR(got, std::norm(std::cos(a) * e[0] + std::sin(a) * e[1]), 1e-6)
+          << analyzer_deg << " " << load;  // over one um of 6 mm
     }
 }
 
-// A retardance goes as 1/wavelength: a line of Gaussian shape in 1/wavelength of relative width s is a Gaussian of loads of the
-// same relative width. 81 trapezoids out to 6 widths of a Gaussian are exact to rounding (its spectrum ends long before theirs).
+// A retardance goes as 1/wavelength: a line of Gaussian shape in 1/wavelength of relative width s is a Gaussian of
+// loads of the same relative width. 81 trapezoids out to 6 widths of a Gaussian are exact to rounding (its spectrum
+// ends long before theirs).
 TEST(StressedDisc, BandwidthIsTheMeanOverTheLine) {
   for (bool circular : {false, true})
     for (double analyzer_deg : {110.0, 65.0}) {
@@ -226,7 +236,8 @@ TEST(StressedDisc, UnevenLightIsAFactor) {
   StressedDisc& disc = std::get<StressedDisc>(uneven.scene.sample);
   disc.illumination = {uneven.t.fixed("x", 40), uneven.t.fixed("y", -10), uneven.t.fixed("xx", 300)};
   const RenderPlan p = plan(even.scene, even.t.table.values());
-  const Image a = render(even.scene, p, even.t.table.values()).intensity, b = render(uneven.scene, p, uneven.t.table.values()).intensity;
+  const Image a = render(even.scene, p, even.t.table.values()).intensity,
+              b = render(uneven.scene, p, uneven.t.table.values()).intensity;
   for (int row = 0; row < 32; ++row)
     for (int column = 0; column < 32; ++column) {
       const double x = (column - 15.5) * 10 / d.radius_um, y = (15.5 - row) * 10 / d.radius_um;

@@ -62,7 +62,8 @@ TEST(Ball, EccentricShellIsNormalToBothSpheres) {
   for (double polar : {0.3, 1.2, 2.6})
     for (double azimuth : {0.0, 1.9, 4.0}) {
       const Vec3<double> u{std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)};
-      const Vec3<double> outer = field.at(u), inner = field.at(Vec3<double>{0.1 + 0.7 * u.x, -0.15 + 0.7 * u.y, 0.12 + 0.7 * u.z});
+      const Vec3<double> outer = field.at(u),
+                         inner = field.at(Vec3<double>{0.1 + 0.7 * u.x, -0.15 + 0.7 * u.y, 0.12 + 0.7 * u.z});
       for (const Vec3<double>& n : {outer, inner}) EXPECT_NEAR(n.x * u.x + n.y * u.y + n.z * u.z, 1, 1e-12);
     }
 }
@@ -75,7 +76,8 @@ TEST(Ball, ConcentricShellRetardanceAgreesWithTheTable) {
     const double core = table.number(row, "R_in_um");
     if (!(core > 0)) continue;
     ++rows;
-    const double radius = table.number(row, "R_out_um"), b = table.number(row, "b_over_R") * radius, n_o = table.number(row, "no"), n_e = table.number(row, "ne");
+    const double radius = table.number(row, "R_out_um"), b = table.number(row, "b_over_R") * radius,
+                 n_o = table.number(row, "no"), n_e = table.number(row, "ne");
     const double from = b < core ? std::sqrt(core * core - b * b) : 0, half = std::sqrt(radius * radius - b * b);
     const ShellLaw<double> law{b, from, half - from, n_o * n_o, n_e * n_e};
     double sum = 0;
@@ -89,8 +91,8 @@ TEST(Ball, ConcentricShellRetardanceAgreesWithTheTable) {
   EXPECT_GE(rows, 10);
 }
 
-// The same hedgehog as a droplet in no field along +x, which is not symmetric to the program, and as one that is. Each is held to
-// 1e-4; pixel means take different points where fringes are fine, 1e-3 near the rim.
+// The same hedgehog as a droplet in no field along +x, which is not symmetric to the program, and as one that is. Each
+// is held to 1e-4; pixel means take different points where fringes are fine, 1e-3 near the rim.
 TEST(Ball, HedgehogIsTheSameFromAllSides) {
   Ball one, other;
   AxialDirector none;
@@ -114,7 +116,8 @@ TEST(Ball, EccentricShellTendsToTheConcentricOne) {
   ShellDirector centred, shifted;
   centred.wall_um = other.b.fixed("wall_um", 1.5);
   shifted.wall_um = one.b.fixed("wall_um", 1.5);
-  for (int i = 0; i < 3; ++i) shifted.offset_um[static_cast<std::size_t>(i)] = one.b.fixed("offset" + std::to_string(i), 1e-7);
+  for (int i = 0; i < 3; ++i)
+    shifted.offset_um[static_cast<std::size_t>(i)] = one.b.fixed("offset" + std::to_string(i), 1e-7);
   Droplet a, b;
   a.director = shifted, b.director = centred;
   const Image first = one.image(a), second = other.image(b);
@@ -122,14 +125,16 @@ TEST(Ball, EccentricShellTendsToTheConcentricOne) {
   for (int r = 0; r < 64; ++r)
     for (int c = 0; c < 64; ++c) {
       const double rho = std::hypot(c - 31.5, r - 31.5) * 0.19;
-      // Not the pixels of the core's edge (its image at 3.5 um times 1.52/1.50), whose kink each averages by its own points.
-      if (rho > 0.6 && std::abs(rho - 3.5) > 0.4 && rho < 4.3) worst = std::max(worst, std::abs(first(c, r) - second(c, r)));
+      // Not the pixels of the core's edge (its image at 3.5 um times 1.52/1.50), whose kink each averages by its own
+      // points.
+      if (rho > 0.6 && std::abs(rho - 3.5) > 0.4 && rho < 4.3)
+        worst = std::max(worst, std::abs(first(c, r) - second(c, r)));
     }
   EXPECT_LT(worst, 5e-4);
 }
 
-// Poles far away: a ball of uniform axis. In a host of its ordinary index nothing is refracted, and tangential E alone gives
-// I = sin^2(2 azimuth) sin^2(k0 dn S), S = sqrt(R^2 - rho^2).
+// Poles far away: a ball of uniform axis. In a host of its ordinary index nothing is refracted, and tangential E alone
+// gives I = sin^2(2 azimuth) sin^2(k0 dn S), S = sqrt(R^2 - rho^2).
 TEST(Ball, BipolarWithDistantPolesIsAUniformBall) {
   Ball ball(1.52);
   ball.scene.ceiling = Ceiling::e_only;

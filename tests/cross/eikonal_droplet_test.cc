@@ -51,9 +51,10 @@ DropletOptics<S> in_field(double n_o, double n_e, double n_host, const S& e, con
 
 double degrees(double rad) { return rad * 180 / std::numbers::pi; }
 
-// ---- tables of closed forms and integrations made elsewhere (tests/data/physics/README.md) --------------------------------------
+// ---- tables of closed forms and integrations made elsewhere (tests/data/physics/README.md) -------------------------
 
-// Where the ray leaves and its optical path, by Runge-Kutta that met the closed form's angle within 2e-5 degrees: 3.5e-7 of the radius, n_e times that of the path.
+// Where the ray leaves and its optical path, by Runge-Kutta that met the closed form's angle within 2e-5
+// degrees: 3.5e-7 of the radius, n_e times that of the path.
 TEST(EikonalDroplet, RaysLeaveWhereIndependentOnesDo) {
   const ReferenceTable table(data_path("physics/hedgehog_eray.csv"));
   for (std::size_t row = 0; row < table.size(); ++row) {
@@ -75,14 +76,16 @@ double chord_retardance(double n_o, double n_e, double b) {
   constexpr int kPieces = 2000;
   double total = 0;
   for (int i = 0; i <= kPieces; ++i) {
-    const double u = most * i / kPieces, s2 = 1 / (std::cosh(u) * std::cosh(u));  // sin^2 of the angle between ray and axis
+    // sin^2 of the angle between ray and axis
+    const double u = most * i / kPieces, s2 = 1 / (std::cosh(u) * std::cosh(u));
     const double f = (n_o * n_e / std::sqrt(n_e * n_e + (n_o * n_o - n_e * n_e) * s2) - n_o) * b * std::cosh(u);
     total += f * (i == 0 || i == kPieces ? 1 : i % 2 ? 4 : 2);
   }
   return 2 * total * most / kPieces / 3;
 }
 
-// Seen on the exit surface: the ray's phase there over that of the ordinary wave, less what a straight chord through that place retards. Printed with six digits.
+// Seen on the exit surface: the ray's phase there over that of the ordinary wave, less what a straight chord through
+// that place retards. Printed with six digits.
 TEST(EikonalDroplet, RaysOnTheExitSurfaceDifferFromChordsAsIndependentOnes) {
   const ReferenceTable table(data_path("physics/hedgehog_eray_vs_chord.csv"));
   for (std::size_t row = 0; row < table.size(); ++row) {
@@ -92,11 +95,14 @@ TEST(EikonalDroplet, RaysOnTheExitSurfaceDifferFromChordsAsIndependentOnes) {
     EXPECT_NEAR(ray.exit_z, -table.number(row, "exit_y_over_R"), 1.5e-6) << b;
     EXPECT_NEAR(ray.exit_rho - b, table.number(row, "lateral_shift_over_R"), 1.5e-6) << b;
     const double ahead = n_o * (ray.path - ray.exit_z - std::sqrt(1 - b * b));
-    EXPECT_NEAR(ahead - chord_retardance(n_o, n_e, ray.exit_rho), table.number(row, "path_error_straight_chord_over_R"), 1.5e-6) << b;
+    EXPECT_NEAR(ahead - chord_retardance(n_o, n_e, ray.exit_rho), table.number(row, "path_error_straight_chord_over_R"),
+                1.5e-6)
+        << b;
   }
 }
 
-// Seen in the mid plane. Printed with six digits; near the rim the chord's retardance changes fast with the place, which is rounded, too.
+// Seen in the mid plane. Printed with six digits; near the rim the chord's retardance changes fast with the place,
+// which is rounded, too.
 TEST(EikonalDroplet, RaysInTheMidPlaneDifferFromChordsAsIndependentOnes) {
   const ReferenceTable table(data_path("physics/hedgehog_eray_midplane.csv"));
   for (std::size_t row = 0; row < table.size(); ++row) {
@@ -109,14 +115,15 @@ TEST(EikonalDroplet, RaysInTheMidPlaneDifferFromChordsAsIndependentOnes) {
     const EikonalRay<double> ray = EikonalFan<double>(o, true, 0).at(seen);
     ASSERT_GT(ray.amplitude, 0) << b;
     EXPECT_NEAR(degrees(std::asin(ray.sin_turn)), degrees(exact.turn_rad), 1e-7) << b;
-    const double chord = chord_retardance(n_o, n_e, seen), difference = ray.phase_rad - EikonalFan<double>(o, false, 0).at(seen).phase_rad - chord;
+    const double chord = chord_retardance(n_o, n_e, seen),
+                 difference = ray.phase_rad - EikonalFan<double>(o, false, 0).at(seen).phase_rad - chord;
     EXPECT_NEAR(chord, table.number(row, "chord_retardance_over_R"), 1.5e-6) << b;
     EXPECT_NEAR(difference, table.number(row, "path_error_straight_chord_over_R"), 1.5e-6) << b;
     EXPECT_NEAR(difference / chord, table.number(row, "relative_error"), 1.5e-6 + 1.5e-6 / chord) << b;
   }
 }
 
-// ---- fans against rays by the Hamiltonian alone ----------------------------------------------------------------------------------
+// ---- fans against rays by the Hamiltonian alone --------------------------------------------------------------------
 
 IndependentRays independent(double n_o, double n_e, double n_host, bool extraordinary) {
   IndependentRays rays;
@@ -128,7 +135,8 @@ IndependentRays independent(double n_o, double n_e, double n_host, bool extraord
   return rays;
 }
 /// Of the fan at the place where the independent ray is seen. `path` and `amplitude`: allowed differences.
-void expect_the_same(const EikonalFan<double>& fan, const IndependentRays& rays, double b, double path, double amplitude) {
+void expect_the_same(const EikonalFan<double>& fan, const IndependentRays& rays, double b, double path,
+                     double amplitude) {
   const auto ray = rays.trace(b);
   ASSERT_TRUE(ray) << b;
   const EikonalRay<double> here = fan.at(ray->image_radius);
@@ -137,7 +145,8 @@ void expect_the_same(const EikonalFan<double>& fan, const IndependentRays& rays,
   EXPECT_NEAR(here.amplitude, rays.amplitude(b), amplitude) << b;
 }
 
-// A core of lower, of the host's and of higher index; rays through it and beside it, both modes. Runge-Kutta steps of 1e-3 leave 1e-9.
+// A core of lower, of the host's and of higher index; rays through it and beside it, both modes. Runge-Kutta steps of
+// 1e-3 leave 1e-9.
 TEST(EikonalDroplet, FansOfShellsAreThoseOfTheHamiltonian) {
   for (const double core_index : {1.40, 1.45, 1.60})
     for (const bool extraordinary : {true, false}) {
@@ -151,20 +160,22 @@ TEST(EikonalDroplet, FansOfShellsAreThoseOfTheHamiltonian) {
     }
 }
 
-// The liquid crystal of the equilibrium that the fan reads, too. Steps to 1e-8 and polynomials to 1e-6 are what the fan claims; the elements' kinks make of
-// that 1e-5 in the width of ray tubes. Closer to the axis tubes are widened.
+// The liquid crystal of the equilibrium that the fan reads, too. Steps to 1e-8 and polynomials to 1e-6 are what the fan
+// claims; the elements' kinks make of that 1e-5 in the width of ray tubes. Closer to the axis tubes are widened.
 TEST(EikonalDroplet, FansOfDropletsInAFieldAreThoseOfTheHamiltonian) {
   struct Case {
     double e, ring, host;
     std::vector<double> b;
   };
-  for (const Case& c : {Case{5, 0, 1.52, {0.2, 0.3, 0.5, 0.7, 0.85, 0.95}}, Case{5, 0, 1.43, {0.2, 0.4, 0.7, 0.9}}, Case{6, 0.5, 1.52, {0.1, 0.4, 0.7, 0.85}}}) {
+  for (const Case& c : {Case{5, 0, 1.52, {0.2, 0.3, 0.5, 0.7, 0.85, 0.95}}, Case{5, 0, 1.43, {0.2, 0.4, 0.7, 0.9}},
+                        Case{6, 0.5, 1.52, {0.1, 0.4, 0.7, 0.85}}}) {
     SCOPED_TRACE(::testing::Message() << "e " << c.e << ", ring " << c.ring << ", host " << c.host);
     const EikonalFan<double> fan(in_field<double>(1.52, 1.74, c.host, c.e, c.ring, c.ring > 0), true, 0);
     IndependentRays rays = independent(1.52, 1.74, c.host, true);
     const auto equilibrium = known_axial_equilibrium(c.e, c.ring, false);
     rays.director = [&](const IndependentRays::Vector& r) {
-      const double rho = std::hypot(r[0], r[1]) + 1e-12, theta = equilibrium->theta(rho, std::abs(r[2]) + 1e-12), s = std::sin(theta) / rho;
+      const double rho = std::hypot(r[0], r[1]) + 1e-12, theta = equilibrium->theta(rho, std::abs(r[2]) + 1e-12),
+                   s = std::sin(theta) / rho;
       return IndependentRays::Vector{s * r[0], s * r[1], std::cos(theta) * (r[2] < 0 ? -1 : 1)};
     };
     for (const double b : c.b) expect_the_same(fan, rays, b, 1e-6, 2e-4);
@@ -173,7 +184,8 @@ TEST(EikonalDroplet, FansOfDropletsInAFieldAreThoseOfTheHamiltonian) {
 
 // Integrated in a field of no strength, the rays are those of the cone.
 TEST(EikonalDroplet, WithoutFieldIntegratedRaysAreTheClosedForm) {
-  const EikonalFan<double> closed(droplet<double>(1.52, 1.74, 1.45), true, 0), integrated(in_field<double>(1.52, 1.74, 1.45, 0, 0, false), true, 0);
+  const EikonalFan<double> closed(droplet<double>(1.52, 1.74, 1.45), true, 0),
+      integrated(in_field<double>(1.52, 1.74, 1.45, 0, 0, false), true, 0);
   EXPECT_GT(closed.rays(), 0);
   for (const double rho : {0.01, 0.05, 0.2, 0.5, 0.8, 0.95}) {
     const EikonalRay<double> a = closed.at(rho), b = integrated.at(rho);
@@ -183,11 +195,12 @@ TEST(EikonalDroplet, WithoutFieldIntegratedRaysAreTheClosedForm) {
   }
 }
 
-// ---- limits ----------------------------------------------------------------------------------------------------------------------
+// ---- limits --------------------------------------------------------------------------------------------------------
 
 TEST(EikonalDroplet, AShellWithAVanishingCoreIsTheHedgehog) {
   for (const bool extraordinary : {true, false}) {
-    const EikonalFan<double> hedgehog(droplet<double>(1.52, 1.74, 1.45), extraordinary, 0), core(shell<double>(1.52, 1.74, 1.45, 1e-4, 1.3), extraordinary, 0);
+    const EikonalFan<double> hedgehog(droplet<double>(1.52, 1.74, 1.45), extraordinary, 0),
+        core(shell<double>(1.52, 1.74, 1.45, 1e-4, 1.3), extraordinary, 0);
     for (const double rho : {0.001, 0.01, 0.3, 0.6, 0.9}) {
       const EikonalRay<double> a = hedgehog.at(rho), b = core.at(rho);
       EXPECT_NEAR(a.phase_rad, b.phase_rad, 1e-9) << rho;
@@ -246,14 +259,15 @@ TEST(EikonalDroplet, RaysThatDoNotArriveAreDark) {
   for (double rho = 0; rho < 1.2; rho += 1e-3) EXPECT_TRUE(std::isfinite(ring.at(rho).amplitude)) << rho;
 }
 
-// ---- derivatives -----------------------------------------------------------------------------------------------------------------
+// ---- derivatives ---------------------------------------------------------------------------------------------------
 
 /// Central differences over h and h/2, extrapolated.
 template <class F>
 std::array<double, 3> by_differences(const F& f, double h) {
   const auto central = [&](double step) {
     const EikonalRay<double> up = f(step), down = f(-step);
-    return std::array{(up.phase_rad - down.phase_rad) / (2 * step), (up.amplitude - down.amplitude) / (2 * step), (up.sin_turn - down.sin_turn) / (2 * step)};
+    return std::array{(up.phase_rad - down.phase_rad) / (2 * step), (up.amplitude - down.amplitude) / (2 * step),
+                      (up.sin_turn - down.sin_turn) / (2 * step)};
   };
   const auto coarse = central(h), fine = central(h / 2);
   std::array<double, 3> result;
@@ -275,17 +289,21 @@ DropletOptics<S> moved(const Make& make, const Numbers& x, int index, double by)
   return o;
 }
 template <class Make>
-void expect_gradients(const Make& make, const Numbers& x, const std::vector<int>& indices, const std::vector<double>& places, double h, double allowed) {
+void expect_gradients(const Make& make, const Numbers& x, const std::vector<int>& indices,
+                      const std::vector<double>& places, double h, double allowed) {
   for (const int index : indices)
     for (const bool extraordinary : {true, false})
       for (const double rho : places) {
         const EikonalFan<Dual1> fan(moved<Dual1>(make, x, index, 0), extraordinary, 0);
         const EikonalRay<Dual1> ray = fan.at(Dual1(rho));
-        const auto differences = by_differences([&](double by) { return EikonalFan<double>(moved<double>(make, x, index, by), extraordinary, 0).at(rho); }, h);
+        const auto differences = by_differences(
+            [&](double by) { return EikonalFan<double>(moved<double>(make, x, index, by), extraordinary, 0).at(rho); },
+            h);
         const double slopes[3] = {lane(ray.phase_rad.d[0], 0), lane(ray.amplitude.d[0], 0), lane(ray.sin_turn.d[0], 0)};
         ASSERT_GT(lane(plain(ray.amplitude), 0), 0) << rho;
         for (std::size_t k = 0; k < 3; ++k)
-          EXPECT_NEAR(slopes[k], differences[k], allowed * (1 + std::abs(differences[k]))) << "number " << index << ", function " << k << ", place " << rho << (extraordinary ? ", p" : ", s");
+          EXPECT_NEAR(slopes[k], differences[k], allowed * (1 + std::abs(differences[k])))
+              << "number " << index << ", function " << k << ", place " << rho << (extraordinary ? ", p" : ", s");
       }
 }
 
@@ -301,7 +319,8 @@ TEST(EikonalDroplet, DerivativesOfClosedFormsAreThoseOfDifferences) {
   expect_gradients(wall, {5, 1.53, 1.71, 1.45, 3.5, 1.4}, {0, 1, 2, 3, 4, 5}, {0.3, 2.0, 3.0, 4.4, 4.7}, 1e-3, 1e-6);
 }
 
-// Steps and kinks between elements leave 1e-8 of a value and 1e-5 of a tube, which differences over 0.01 make a hundred times larger.
+// Steps and kinks between elements leave 1e-8 of a value and 1e-5 of a tube, which differences over 0.01 make a hundred
+// times larger.
 TEST(EikonalDroplet, DerivativesOfIntegratedRaysAreThoseOfDifferences) {
   const auto field = [](auto& s) {
     using S = std::decay_t<decltype(s[0])>;
@@ -311,7 +330,7 @@ TEST(EikonalDroplet, DerivativesOfIntegratedRaysAreThoseOfDifferences) {
   expect_gradients(field, {5, 1.52, 1.74, 1.52, 6, 0.5}, {2, 4, 5}, {1.2, 3.8}, 1e-2, 2e-3);
 }
 
-// ---- pictures --------------------------------------------------------------------------------------------------------------------
+// ---- pictures ------------------------------------------------------------------------------------------------------
 
 /// An E12 droplet in a host of its ordinary index, 128 x 128 pixels, with the birefringence free or known.
 struct Job {
@@ -347,10 +366,12 @@ FitResult fit_of(double diameter_um, Rays rays, int size) {
   std::vector<double> counts;
   for (double i : image.values()) counts.push_back(100 + 3000 * i);
   Job job(diameter_um, rays, true, size);
-  Picture m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000), job.b.linear("offset", 100), {4, 0.5});
+  Picture m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000),
+                            job.b.linear("offset", 100), {4, 0.5});
   for (int r = 0; r < size; ++r)
     for (int c = 0; c < size; ++c) {
-      const double radius = std::hypot(c - (0.5 * size - 0.6), r - (0.5 * size - 0.2)) * job.scene.view.pixel_size_um / (diameter_um / 2);
+      const double radius =
+          std::hypot(c - (0.5 * size - 0.6), r - (0.5 * size - 0.2)) * job.scene.view.pixel_size_um / (diameter_um / 2);
       if (radius < 0.1 || radius > 0.7) m.mask(c, r) = 0;
     }
   FitJob fit_job;
@@ -358,14 +379,17 @@ FitResult fit_of(double diameter_um, Rays rays, int size) {
   fit_job.measurements = {m};
   return fit(fit_job);
 }
-ParameterEstimate fitted(double diameter_um, Rays rays) { return *find_estimate(fit_of(diameter_um, rays, 128), "birefringence"); }
+ParameterEstimate fitted(double diameter_um, Rays rays) {
+  return *find_estimate(fit_of(diameter_um, rays, 128), "birefringence");
+}
 
 // physics.md of the design: chord fits come out about 0.2 dn too low, relative, whatever the size: -4 % for E12.
 TEST(EikonalDroplet, StraightChordsFittedToCurvedRaysGiveFourPercentTooLittleAtAnySize) {
   for (double diameter_um : {9.3, 30.0}) {
     const ParameterEstimate chord = fitted(diameter_um, Rays::straight), curved = fitted(diameter_um, Rays::eikonal);
     EXPECT_NEAR(chord.value / 0.22 - 1, -0.04, 0.012) << diameter_um;
-    // The residual gives away a part of it only: the error bar holds it because the fit compares with curved rays, and little else.
+    // The residual gives away a part of it only: the error bar holds it because the fit compares with curved rays, and
+    // little else.
     EXPECT_LT(chord.interval95_low, 0.22) << diameter_um;
     EXPECT_GT(chord.interval95_high, 0.22) << diameter_um;
     EXPECT_NEAR(chord.stderr_, std::abs(chord.value - 0.22), 0.1 * chord.stderr_) << diameter_um;
@@ -373,14 +397,15 @@ TEST(EikonalDroplet, StraightChordsFittedToCurvedRaysGiveFourPercentTooLittleAtA
   }
 }
 
-// A fit of straight chords says where curved rays would put the birefringence: on all pixels of a small image, on a part of a
-// large one (680 x 680, of which 140,000 pixels are used).
+// A fit of straight chords says where curved rays would put the birefringence: on all pixels of a small image, on a
+// part of a large one (680 x 680, of which 140,000 pixels are used).
 TEST(EikonalDroplet, AFitOfChordsForetellsTheBirefringenceOfCurvedRays) {
   for (const int size : {128, 680}) {
     const FitResult result = fit_of(9.3, Rays::straight, size);
     double foretold = 0;
     for (const std::string& warning : result.warnings)
-      if (const std::size_t at = warning.find("would put birefringence at "); at != std::string::npos) foretold = std::stod(warning.substr(at + 27));
+      if (const std::size_t at = warning.find("would put birefringence at "); at != std::string::npos)
+        foretold = std::stod(warning.substr(at + 27));
     EXPECT_NEAR(foretold, 0.22, 0.0005) << size;
     EXPECT_LT(find_estimate(result, "birefringence")->value, 0.217) << size;
   }
@@ -393,7 +418,8 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
       Job job(10, rays, free, 96);
       AxialDirector axial;
       if (wall)
-        std::get<Droplet>(job.scene.sample).director = ShellDirector{job.b.fixed("wall_um", 2), {}, job.b.fixed("core_index", 1.45)};
+        std::get<Droplet>(job.scene.sample).director =
+            ShellDirector{job.b.fixed("wall_um", 2), {}, job.b.fixed("core_index", 1.45)};
       else
         axial.reduced_field = job.b.fixed("reduced_field", 3), std::get<Droplet>(job.scene.sample).director = axial;
       return job;
@@ -404,7 +430,8 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
     const Image picture = render(truth.scene, plan(truth.scene, theta), theta, {}, 1).intensity;
     for (const double i : picture.values()) counts.push_back(100 + 3000 * i);
     Job job = job_of(Rays::straight, true);
-    Picture m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000), job.b.linear("offset", 100), {4, 0.5});
+    Picture m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000),
+                              job.b.linear("offset", 100), {4, 0.5});
     for (int r = 0; r < 96; ++r)
       for (int c = 0; c < 96; ++c)
         if (std::hypot(c - 47.4, r - 47.8) * job.scene.view.pixel_size_um > 4) m.mask(c, r) = 0;
@@ -417,7 +444,9 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
     EXPECT_NEAR(estimate.value, 0.22, 5e-4) << wall;
     EXPECT_LT(std::abs(estimate.value - 0.22), 4 * estimate.stderr_) << wall;
     const auto& reasons = result.micrographs[0].plan.reasons;
-    EXPECT_TRUE(std::any_of(reasons.begin(), reasons.end(), [](const std::string& r) { return r.find("curved rays were chosen") != std::string::npos; })) << wall;
+    EXPECT_TRUE(std::any_of(reasons.begin(), reasons.end(), [](const std::string& r) {
+      return r.find("curved rays were chosen") != std::string::npos;
+    })) << wall;
   }
 }
 
@@ -425,10 +454,12 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
 struct Seen {
   TableBuilder b;
   Scene scene;
-  Seen(double host, double wall_um, double field, double ring, double na, double analyzer_deg, double core_index = 1.45) {
+  Seen(double host, double wall_um, double field, double ring, double na, double analyzer_deg,
+       double core_index = 1.45) {
     Droplet d;
     d.diameter_um = b.fitted("diameter_um", 9, 8, 10);
-    if (wall_um > 0) d.director = ShellDirector{b.fitted("wall_um", wall_um, 0.1, 4), {}, b.fixed("core_index", core_index)};
+    if (wall_um > 0)
+      d.director = ShellDirector{b.fitted("wall_um", wall_um, 0.1, 4), {}, b.fixed("core_index", core_index)};
     if (field > 0) {
       AxialDirector axial;
       axial.reduced_field = b.fitted("reduced_field", field, 1, 20);
@@ -454,18 +485,25 @@ struct Seen {
   }
 };
 
-// Tables between the places where light begins or ends, read everywhere, against a ray of either mode for every point; within an eighth of a pixel of such a place
-// the picture passes from one side to the other.
+// Tables between the places where light begins or ends, read everywhere, against a ray of either mode for every point;
+// within an eighth of a pixel of such a place the picture passes from one side to the other.
 TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
   struct Case {
     double host, wall, core_index, field, ring, allowed;
   };
-  // Closed forms: a thousandth of the accuracy asked. In a field elements of the director have kinks between them, and beside a ring nothing is smooth for long.
-  for (const auto& [host, wall, core_index, field, ring, allowed] : {Case{1.52, 0, 0, 0, 0, 1e-7}, {1.43, 0, 0, 0, 0, 1e-7}, {1.45, 1.3, 1.45, 0, 0, 1e-7}, {1.45, 1.3, 1.60, 0, 0, 1e-7},
-                                                                     {1.45, 1.3, 1.80, 0, 0, 1e-7}, {1.52, 0, 0, 3, 0, 1e-5}, {1.52, 0, 0, 8, 0.85, 1e-3}})
+  // Closed forms: a thousandth of the accuracy asked. In a field elements of the director have kinks between them, and
+  // beside a ring nothing is smooth for long.
+  for (const auto& [host, wall, core_index, field, ring, allowed] : {Case{1.52, 0, 0, 0, 0, 1e-7},
+                                                                     {1.43, 0, 0, 0, 0, 1e-7},
+                                                                     {1.45, 1.3, 1.45, 0, 0, 1e-7},
+                                                                     {1.45, 1.3, 1.60, 0, 0, 1e-7},
+                                                                     {1.45, 1.3, 1.80, 0, 0, 1e-7},
+                                                                     {1.52, 0, 0, 3, 0, 1e-5},
+                                                                     {1.52, 0, 0, 8, 0.85, 1e-3}})
     for (const double na : {0.0, 0.35, 0.8})
       for (const double analyzer_deg : {90.0, 70.0}) {
-        SCOPED_TRACE(::testing::Message() << "host " << host << ", wall " << wall << ", core " << core_index << ", field " << field << ", NA " << na << ", analyser " << analyzer_deg);
+        SCOPED_TRACE(::testing::Message() << "host " << host << ", wall " << wall << ", core " << core_index
+                                          << ", field " << field << ", NA " << na << ", analyser " << analyzer_deg);
         const Seen s(host, wall, field, ring, na, analyzer_deg, core_index);
         const Theta theta = s.b.table.values();
         const RenderPlan chosen = plan(s.scene, theta);
@@ -486,9 +524,11 @@ TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
           const std::complex<double> a = std::polar(p.amplitude, p.phase_rad - r.phase_rad), d = r.amplitude;
           // From x to the analyser's direction by way of the radial and the azimuthal one.
           const double c = std::cos(azimuth), n = std::sin(azimuth), alpha = std::acos(between) - azimuth;
-          const double expected = std::norm(a * c * std::cos(alpha) - d * n * std::sin(alpha)) + (rho > o.radius_um ? between * between : 0);
+          const double expected = std::norm(a * c * std::cos(alpha) - d * n * std::sin(alpha)) +
+                                  (rho > o.radius_um ? between * between : 0);
           const double column = 47.2 + rho * c / px, row = 48.1 - rho * n / px;
-          const double beside_it = model->has_passing_light() ? model->passing(column, row) : 0;  // a pixel's mean; pixels that the rim meets are left out
+          // a pixel's mean; pixels that the rim meets are left out
+          const double beside_it = model->has_passing_light() ? model->passing(column, row) : 0;
           worst = std::max(worst, std::abs(model->intensity(column, row) + beside_it - expected));
         }
         EXPECT_LT(worst, allowed);
@@ -497,8 +537,9 @@ TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
       }
 }
 
-// What enters, less what surfaces reflect and the aperture stops, is in the picture: half of it in either polarization, rays of the extraordinary mode that are seen
-// beyond the ordinary one's rim, too. Rays by themselves, over the angle of incidence; pixels of 1/36 of the radius leave 1e-3.
+// What enters, less what surfaces reflect and the aperture stops, is in the picture: half of it in either polarization,
+// rays of the extraordinary mode that are seen beyond the ordinary one's rim, too. Rays by themselves, over the angle
+// of incidence; pixels of 1/36 of the radius leave 1e-3.
 TEST(EikonalDroplet, LightThatEntersIsInThePicture) {
   for (const double host : {1.52, 1.43})
     for (const double na : {0.0, 0.35, 0.8}) {
@@ -522,14 +563,17 @@ TEST(EikonalDroplet, LightThatEntersIsInThePicture) {
         for (int i = 0; i < kRays; ++i) {
           const double psi = (i + 0.5) / kRays * std::numbers::pi / 2;
           const MeridionalRay<double> ray = meridional_ray(d, extraordinary, psi);
-          if (ray.arrives && ray.impact / std::cos(ray.turn_rad) > 0 && (na == 0 || host * std::abs(std::sin(ray.turn_rad)) <= na)) expected += ray.flux * std::sin(psi) * std::cos(psi) * std::numbers::pi / 2 / kRays;
+          if (ray.arrives && ray.impact / std::cos(ray.turn_rad) > 0 &&
+              (na == 0 || host * std::abs(std::sin(ray.turn_rad)) <= na))
+            expected += ray.flux * std::sin(psi) * std::cos(psi) * std::numbers::pi / 2 / kRays;
         }
       EXPECT_NEAR(light * 0.125 * 0.125 / (std::numbers::pi * 4.5 * 4.5), expected, 1e-3) << host << ", " << na;
     }
 }
 
-// The aperture, the rims, the core's edge and a ring's shadow move with the parameters, and pixels know it: differences of pictures, over squares of 8 x 8 pixels, of which
-// single ones feel the points where they are sampled. Beside a ring fringes are finer than these; an aperture keeps most of that light out.
+// The aperture, the rims, the core's edge and a ring's shadow move with the parameters, and pixels know it: differences
+// of pictures, over squares of 8 x 8 pixels, of which single ones feel the points where they are sampled. Beside a ring
+// fringes are finer than these; an aperture keeps most of that light out.
 TEST(EikonalDroplet, DerivativesKnowWhereLightBeginsAndEnds) {
   struct Case {
     double host, wall, core_index, field, ring;
@@ -537,7 +581,12 @@ TEST(EikonalDroplet, DerivativesKnowWhereLightBeginsAndEnds) {
     double allowed;
   };
   for (const auto& [host, wall, core_index, field, ring, apertures, allowed] :
-       {Case{1.50, 0, 0, 0, 0, {0, 0.35}, 0.03}, {1.43, 0, 0, 0, 0, {0, 0.35}, 0.03}, {1.45, 1.3, 1.45, 0, 0, {0, 0.45}, 0.05}, {1.45, 1.3, 1.60, 0, 0, {0, 0.45}, 0.05}, {1.50, 0, 0, 3, 0, {0, 0.35}, 0.03}, {1.50, 0, 0, 8, 0.85, {0.35}, 0.06}})
+       {Case{1.50, 0, 0, 0, 0, {0, 0.35}, 0.03},
+        {1.43, 0, 0, 0, 0, {0, 0.35}, 0.03},
+        {1.45, 1.3, 1.45, 0, 0, {0, 0.45}, 0.05},
+        {1.45, 1.3, 1.60, 0, 0, {0, 0.45}, 0.05},
+        {1.50, 0, 0, 3, 0, {0, 0.35}, 0.03},
+        {1.50, 0, 0, 8, 0.85, {0.35}, 0.06}})
     for (const double na : apertures) {
       const Seen s(host, wall, field, ring, na, 70, core_index);
       Theta theta = s.b.table.values();
@@ -561,8 +610,10 @@ TEST(EikonalDroplet, DerivativesKnowWhereLightBeginsAndEnds) {
           here += slope.values()[i], by_differences += (up.values()[i] - down.values()[i]) / (2 * h);
         }
         double difference = 0, size = 0;
-        for (const auto& [place, slopes] : squares) difference += square(slopes.first - slopes.second), size += square(slopes.second);
-        EXPECT_LT(std::sqrt(difference / size), allowed) << s.b.table[index].name << ", host " << host << ", wall " << wall << ", field " << field << ", NA " << na;
+        for (const auto& [place, slopes] : squares)
+          difference += square(slopes.first - slopes.second), size += square(slopes.second);
+        EXPECT_LT(std::sqrt(difference / size), allowed)
+            << s.b.table[index].name << ", host " << host << ", wall " << wall << ", field " << field << ", NA " << na;
       }
     }
 }
@@ -572,7 +623,8 @@ double error_of(const Scene& asked, const Theta& theta, Rays rays) {
   Scene waves = asked, scene = asked;
   waves.ceiling = Ceiling::wave;
   scene.rays = rays;
-  const Image exact = render(waves, plan(waves, theta), theta).intensity, image = render(scene, plan(scene, theta), theta).intensity;
+  const Image exact = render(waves, plan(waves, theta), theta).intensity,
+              image = render(scene, plan(scene, theta), theta).intensity;
   double difference = 0, size = 0;
   for (std::size_t i = 0; i < exact.values().size(); ++i) {
     difference += square(image.values()[i] - exact.values()[i]);
@@ -590,8 +642,12 @@ TEST(EikonalDroplet, CurvedRaysAreNearerToTheExactPictureOfAShell) {
         ball.wall_um = 0.3 * radius;
         const study::BallScene scene(ball);
         const Theta theta = scene.table.values();
-        const double straight = error_of(scene.scene, theta, Rays::straight), curved = error_of(scene.scene, theta, Rays::eikonal);
-        std::printf("shell of %g um, wall %g um, birefringence %g, in %g: relative RMS error of straight rays %.2f, of curved rays %.2f\n", radius, ball.wall_um, birefringence, host, straight, curved);
+        const double straight = error_of(scene.scene, theta, Rays::straight),
+                     curved = error_of(scene.scene, theta, Rays::eikonal);
+        std::printf(
+            "shell of %g um, wall %g um, birefringence %g, in %g: relative RMS error of straight rays %.2f, of curved "
+            "rays %.2f\n",
+            radius, ball.wall_um, birefringence, host, straight, curved);
         EXPECT_LT(curved, straight);
       }
 }
@@ -606,14 +662,20 @@ TEST(EikonalDroplet, CurvedRaysAreNearerToThePropagatedPictureOfADropletInAField
       axial.reduced_field = b.table.add_constant("reduced_field", e);
       std::get<Droplet>(b.scene.sample).director = axial;
       const Theta theta = b.table.values();
-      const double straight = error_of(b.scene, theta, Rays::straight), curved = error_of(b.scene, theta, Rays::eikonal);
-      std::printf("droplet of %g um, reduced field %g, birefringence 0.22: relative RMS error of straight rays %.2f, of curved rays %.2f\n", radius, e, straight, curved);
+      const double straight = error_of(b.scene, theta, Rays::straight),
+                   curved = error_of(b.scene, theta, Rays::eikonal);
+      std::printf(
+          "droplet of %g um, reduced field %g, birefringence 0.22: relative RMS error of straight rays %.2f, of curved "
+          "rays %.2f\n",
+          radius, e, straight, curved);
       EXPECT_LT(curved, straight);
     }
 }
 
-/// A picture's derivatives within `reach_um` of the centre: at the rim it ends with a step, which points see on either side of.
-void expect_picture_gradients(const Scene& scene, const ParameterTable& table, const std::vector<int>& active, double reach_um, double h, double allowed) {
+/// A picture's derivatives within `reach_um` of the centre: at the rim it ends with a step, which points see on either
+/// side of.
+void expect_picture_gradients(const Scene& scene, const ParameterTable& table, const std::vector<int>& active,
+                              double reach_um, double h, double allowed) {
   const Theta theta = table.values();
   const RenderPlan planned = plan(scene, theta);
   const Rendering rendering = render(scene, planned, theta, active, 1);
@@ -630,8 +692,10 @@ void expect_picture_gradients(const Scene& scene, const ParameterTable& table, c
     const std::vector<double> coarse = central(h), fine = central(h / 2);
     double worst = 0, size = 0;
     for (std::size_t i = 0; i < fine.size(); ++i) {
-      const double x = static_cast<double>(i % static_cast<std::size_t>(scene.view.width)) - theta[static_cast<std::size_t>(scene.view.center_x_px.index)];
-      const double y = static_cast<double>(i / static_cast<std::size_t>(scene.view.width)) - theta[static_cast<std::size_t>(scene.view.center_y_px.index)];
+      const double x = static_cast<double>(i % static_cast<std::size_t>(scene.view.width)) -
+                       theta[static_cast<std::size_t>(scene.view.center_x_px.index)];
+      const double y = static_cast<double>(i / static_cast<std::size_t>(scene.view.width)) -
+                       theta[static_cast<std::size_t>(scene.view.center_y_px.index)];
       if (std::hypot(x, y) * scene.view.pixel_size_um > reach_um) continue;
       worst += square(rendering.derivatives[j].values()[i] - (4 * fine[i] - coarse[i]) / 3);
       size += square(fine[i]);
@@ -647,7 +711,10 @@ TEST(EikonalDroplet, PicturesHaveTheirDerivatives) {
   AxialDirector axial;
   axial.reduced_field = job.b.fitted("reduced_field", 4, 0, 20);
   d.director = axial;
-  expect_picture_gradients(job.scene, job.b.table, {job.birefringence.index, axial.reduced_field.index, d.diameter_um.index, job.scene.view.center_x_px.index}, 4.5, 2e-3, 2e-3);
+  expect_picture_gradients(
+      job.scene, job.b.table,
+      {job.birefringence.index, axial.reduced_field.index, d.diameter_um.index, job.scene.view.center_x_px.index}, 4.5,
+      2e-3, 2e-3);
 }
 
 // Panels of a fan meet: near image radii at which neighbours once left a gap of a millionth, where it was dark.
@@ -655,9 +722,11 @@ TEST(EikonalDroplet, PanelsOfAFanLeaveNoGap) {
   struct Seam {
     double e, ring, rho;
   };
-  for (const Seam& c : {Seam{6, 0.5, 0.4894114}, {20, 0, 0.8729129}, {2, 0.2, 0.2036611}, {2, 0.2, 0.5227348}, {8, 0.9, 0.9243815}}) {
+  for (const Seam& c :
+       {Seam{6, 0.5, 0.4894114}, {20, 0, 0.8729129}, {2, 0.2, 0.2036611}, {2, 0.2, 0.5227348}, {8, 0.9, 0.9243815}}) {
     const EikonalFan<double> fan(in_field<double>(1.52, 1.74, 1.52, c.e, c.ring, c.ring > 0), true, 0);
-    for (int k = -300; k <= 300; ++k) EXPECT_GT(fan.at(c.rho + 1e-8 * k).amplitude, 0.1) << c.e << " " << c.ring << " " << c.rho + 1e-8 * k;
+    for (int k = -300; k <= 300; ++k)
+      EXPECT_GT(fan.at(c.rho + 1e-8 * k).amplitude, 0.1) << c.e << " " << c.ring << " " << c.rho + 1e-8 * k;
   }
 }
 

@@ -25,7 +25,8 @@ double relative_rms(const std::string& file, bool flux) {
       double expected = 0;
       if (b < radius) {
         const double half = std::sqrt(radius * radius - b * b);
-        LawColumn<double, RadialLaw<double>> column(RadialLaw<double>{Chord<double>(b, half, radius), n_o * n_o, n_e * n_e});
+        LawColumn<double, RadialLaw<double>> column(
+            RadialLaw<double>{Chord<double>(b, half, radius), n_o * n_o, n_e * n_e});
         column.planar = true;
         const Su2<double> u = Diagonal<double>().retarder(column, {k0, 0, 0, Continuity::e_and_h}, uniform_mesh(32));
         const double sin2 = b * b / (radius * radius);  // angle of axis and ray where the ray enters
@@ -71,8 +72,8 @@ Scene scene_of_beam_propagation(TableBuilder& b, Rays rays, int size, double dia
   return scene;
 }
 
-/// Diameter, birefringence and gain of the beam-propagation image (wide-angle, 200 slices, NA 0.8, focused on the mid plane), by one ray
-/// model. Its own errors are 1 to 5 % of Maxwell's; 2 % stands for the noise.
+/// Diameter, birefringence and gain of the beam-propagation image (wide-angle, 200 slices, NA 0.8, focused on the mid
+/// plane), by one ray model. Its own errors are 1 to 5 % of Maxwell's; 2 % stands for the noise.
 FitResult fit_of_beam_propagation(Rays rays, bool choose = false) {
   const Image image = read_pfm(data_path("peers/images/droplet_n152_bpm_nz200_centreNA0.8_I45.pfm"));
   TableBuilder b;
@@ -93,12 +94,14 @@ double distance_from_beam_propagation(Rays rays) {
   const Theta theta = b.table.values();
   const Image ours = render(scene, plan(scene, theta), theta, {}, 1).intensity;
   double sum = 0, size = 0;
-  for (std::size_t i = 0; i < image.size(); ++i) sum += std::pow(ours.values()[i] - image.values()[i], 2), size += std::pow(image.values()[i], 2);
+  for (std::size_t i = 0; i < image.size(); ++i)
+    sum += std::pow(ours.values()[i] - image.values()[i], 2), size += std::pow(image.values()[i], 2);
   return std::sqrt(sum / size);
 }
 
 TEST(PeerHedgehog, CurvedRaysAreFourTimesNearerToBeamPropagation) {
-  const double straight = distance_from_beam_propagation(Rays::straight), curved = distance_from_beam_propagation(Rays::eikonal);
+  const double straight = distance_from_beam_propagation(Rays::straight),
+               curved = distance_from_beam_propagation(Rays::eikonal);
   EXPECT_NEAR(straight, 0.36, 0.03);  // their README
   EXPECT_LT(curved, straight / 3.5);
 }
@@ -106,10 +109,13 @@ TEST(PeerHedgehog, CurvedRaysAreFourTimesNearerToBeamPropagation) {
 // What straight rays get wrong on a droplet of 23 wavelengths is their straightness more than their being rays.
 TEST(PeerHedgehog, CurvedRaysFindWhatBeamPropagationWasGiven) {
   const FitResult straight = fit_of_beam_propagation(Rays::straight), curved = fit_of_beam_propagation(Rays::eikonal);
-  const auto off = [](const FitResult& r, const char* name, double truth) { return find_estimate(r, name)->value / truth - 1; };
+  const auto off = [](const FitResult& r, const char* name, double truth) {
+    return find_estimate(r, name)->value / truth - 1;
+  };
   for (const auto& [name, r] : {std::pair{"straight", &straight}, {"curved", &curved}})
-    std::printf("  %s rays: diameter %.3f um, birefringence %.4f, gain %.3f, reduced chi-square %.2f\n", name, find_estimate(*r, "diameter_um")->value,
-                find_estimate(*r, "birefringence")->value, find_estimate(*r, "gain")->value, r->reduced_chi_square);
+    std::printf("  %s rays: diameter %.3f um, birefringence %.4f, gain %.3f, reduced chi-square %.2f\n", name,
+                find_estimate(*r, "diameter_um")->value, find_estimate(*r, "birefringence")->value,
+                find_estimate(*r, "gain")->value, r->reduced_chi_square);
   EXPECT_LT(off(straight, "birefringence", 0.22), -0.05);
   // Diffraction remains, and 1 to 5 % of the image's own errors.
   EXPECT_NEAR(off(curved, "birefringence", 0.22), 0, 0.005);
@@ -117,13 +123,16 @@ TEST(PeerHedgehog, CurvedRaysFindWhatBeamPropagationWasGiven) {
   EXPECT_NEAR(off(curved, "gain", 1), 0, 0.02);
   EXPECT_LT(curved.chi_square, 0.25 * straight.chi_square);
   // The straight fit says so.
-  EXPECT_TRUE(std::any_of(straight.warnings.begin(), straight.warnings.end(), [](const std::string& w) { return w.find("Curved") != std::string::npos; }));
+  EXPECT_TRUE(std::any_of(straight.warnings.begin(), straight.warnings.end(),
+                          [](const std::string& w) { return w.find("Curved") != std::string::npos; }));
 }
 
 // `rays: auto`: curved rays are taken where they describe the image better, and left where they do not.
 TEST(PeerHedgehog, AFitGoesOverToCurvedRaysOnlyWhereTheyAreNoWorse) {
-  const FitResult chosen = fit_of_beam_propagation(Rays::straight, true), curved = fit_of_beam_propagation(Rays::eikonal);
-  EXPECT_NEAR(find_estimate(chosen, "birefringence")->value, find_estimate(curved, "birefringence")->value, 0.01 * curved.parameters[0].stderr_);
+  const FitResult chosen = fit_of_beam_propagation(Rays::straight, true),
+                  curved = fit_of_beam_propagation(Rays::eikonal);
+  EXPECT_NEAR(find_estimate(chosen, "birefringence")->value, find_estimate(curved, "birefringence")->value,
+              0.01 * curved.parameters[0].stderr_);
   TableBuilder b;
   const Scene scene = scene_of_beam_propagation(b, Rays::straight, 128, 9, 0.22);
   FitJob job;
@@ -135,7 +144,8 @@ TEST(PeerHedgehog, AFitGoesOverToCurvedRaysOnlyWhereTheyAreNoWorse) {
   job.options.choose_rays = true;
   const FitResult straight = fit(job);
   EXPECT_NEAR(find_estimate(straight, "birefringence")->value, 0.22, 1e-4);
-  EXPECT_FALSE(std::any_of(straight.warnings.begin(), straight.warnings.end(), [](const std::string& w) { return w.find("Curved") != std::string::npos; }));
+  EXPECT_FALSE(std::any_of(straight.warnings.begin(), straight.warnings.end(),
+                           [](const std::string& w) { return w.find("Curved") != std::string::npos; }));
 }
 
 }  // namespace

@@ -51,8 +51,9 @@ TEST(PeerStacks, LayeredStacksAgreeToRounding) {
     if (method != "2x2" && method != "2x2_1") continue;
     PeerCase peer = peer_case(table.text(row, "case"));
     const int layers = static_cast<int>(table.number(row, "layers"));
-    const PlanarOptics<double> o = optics_of(layered(*peer.column, layers), peer.wavelength_um, table.number(row, "n_out"),
-                                             method == "2x2" ? Continuity::e_only : Continuity::e_and_h);
+    const PlanarOptics<double> o =
+        optics_of(layered(*peer.column, layers), peer.wavelength_um, table.number(row, "n_out"),
+                  method == "2x2" ? Continuity::e_only : Continuity::e_and_h);
     const Direction2 d = direction(table, row);
     const Mesh mesh = uniform_mesh(1, o.column->breaks);
     for (const char* name : {"magnus4", "layers_midpoint"}) {
@@ -131,7 +132,8 @@ TEST(PeerStacks, ContinuousStacksWithEAndHAreTheLimitOfTheLayeredOnes) {
     const double n_out = table.number(row, "n_out");
     const Direction2 d = direction(table, row);
     const auto stack = [&](int n) {
-      const PlanarOptics<double> o = optics_of(layered(*peer.column, n), peer.wavelength_um, n_out, Continuity::e_and_h);
+      const PlanarOptics<double> o =
+          optics_of(layered(*peer.column, n), peer.wavelength_um, n_out, Continuity::e_and_h);
       return planar_jones<double>(o, LayersMidpoint<double>(), uniform_mesh(1, o.column->breaks), d.tx, d.ty);
     };
     const Mat2<double> l1 = stack(1024), l2 = stack(2048), l4 = stack(4096);

@@ -1,6 +1,7 @@
-// One-way wave optics by split steps (wave/split_step.h) against closed forms, the exact series of a radial ball, the march of Maxwell's
-// equations, two Maxwell solvers and another program's beam propagation, and its laws: order of convergence, flux, derivatives, threads.
-// All figures are printed; errors of pictures are relative RMS, crossed polarizers at 45 degrees.
+// One-way wave optics by split steps (wave/split_step.h) against closed forms, the exact series of a radial ball, the
+// march of Maxwell's equations, two Maxwell solvers and another program's beam propagation, and its laws: order of
+// convergence, flux, derivatives, threads. All figures are printed; errors of pictures are relative RMS, crossed
+// polarizers at 45 degrees.
 
 #include "wave/split_step.h"
 
@@ -34,19 +35,24 @@ constexpr double kPi = std::numbers::pi, kK0 = 2 * kPi / 0.59, kRoot = 0.7071067
 template <int N>
 using DualPack = Dual<Pack, N>;
 
-// ---- the operator of transverse wavevectors ------------------------------------------------------------------------------
+// ---- the operator of transverse wavevectors ------------------------------------------------------------------------
 
 /// The same medium everywhere.
 struct Uniform final : WaveMedium<Pack> {
   OpticalPoint<Pack> point;
   Uniform(const std::array<double, 3>& axis, double n_o, double n_e)
-      : point{{Pack(axis[0]), Pack(axis[1]), Pack(axis[2])}, Pack(n_o * n_o), Pack(n_e * n_e), Pack(0.0), Pack(0.0), Pack(0.0)} {}
+      : point{{Pack(axis[0]), Pack(axis[1]), Pack(axis[2])},
+              Pack(n_o * n_o),
+              Pack(n_e * n_e),
+              Pack(0.0),
+              Pack(0.0),
+              Pack(0.0)} {}
   OpticalPoint<Pack> at(const Pack&, const Pack&, double) const override { return point; }
   bool reaches(const Pack&, const Pack&, double) const override { return true; }
 };
 
-/// q of the code for light of wavevector kappa in a uniform medium, as the 2 x 2 matrix that acts on the flux-normalised field: what a slab
-/// so thin that its parts commute adds to 1.
+/// q of the code for light of wavevector kappa in a uniform medium, as the 2 x 2 matrix that acts on the
+/// flux-normalised field: what a slab so thin that its parts commute adds to 1.
 Eigen::Matrix2cd coded_operator(const Uniform& medium, const std::array<double, 2>& kappa, double n_host) {
   const double h = 1e-4;
   const double kx = kK0 * kappa[0], ky = kK0 * kappa[1];
@@ -61,10 +67,12 @@ Eigen::Matrix2cd coded_operator(const Uniform& medium, const std::array<double, 
   Eigen::Matrix2cd in, out;
   for (int c = 0; c < 2; ++c) {
     const std::array<double, 2> e{c == 0 ? 1.0 : 0.0, c == 0 ? 0.0 : 1.0};
-    const auto field = propagate(g, WaveLight<Pack>{Pack(kK0), Pack(n_host), Pack(e[0]), Pack(e[1]), kx, ky}, medium, 1)[0];
+    const auto field =
+        propagate(g, WaveLight<Pack>{Pack(kK0), Pack(n_host), Pack(e[0]), Pack(e[1]), kx, ky}, medium, 1)[0];
     // The incident wave's own flux form, as the header has it.
     const double k = std::hypot(kx, ky), px = k > 0 ? kx / k : 1, py = k > 0 ? ky / k : 0;
-    const double p = std::sqrt(n_host / q) * (px * e[0] + py * e[1]), s = std::sqrt(q / n_host) * (px * e[1] - py * e[0]);
+    const double p = std::sqrt(n_host / q) * (px * e[0] + py * e[1]),
+                 s = std::sqrt(q / n_host) * (px * e[1] - py * e[0]);
     in.col(c) << px * p - py * s, py * p + px * s;
     out.col(c) << in(0, c) + field.a[0][0], in(1, c) + field.a[1][0];
   }
@@ -73,14 +81,15 @@ Eigen::Matrix2cd coded_operator(const Uniform& medium, const std::array<double, 
   return step.log() / Number(0, kK0 * h) + Eigen::Matrix2cd::Identity() * q;
 }
 
-/// The same from Maxwell's equations for plane waves: h = Y e of the two forward waves, flux e* (Y + Y*) e / 2 = a* a, so a = F e with F the root of the
-/// Hermitian part, and F (their q) F^-1.
+/// The same from Maxwell's equations for plane waves: h = Y e of the two forward waves, flux e* (Y + Y*) e / 2 = a* a,
+/// so a = F e with F the root of the Hermitian part, and F (their q) F^-1.
 struct PlaneWaves {
   double q_o, q_e;
   Eigen::Matrix2cd operation;
 };
 PlaneWaves plane_waves(const std::array<double, 3>& n, double n_o, double n_e, const std::array<double, 2>& kappa) {
-  const double o = n_o * n_o, d = n_e * n_e - o, k2 = kappa[0] * kappa[0] + kappa[1] * kappa[1], along = kappa[0] * n[0] + kappa[1] * n[1];
+  const double o = n_o * n_o, d = n_e * n_e - o, k2 = kappa[0] * kappa[0] + kappa[1] * kappa[1],
+               along = kappa[0] * n[0] + kappa[1] * n[1];
   // no^2 k^2 + (ne^2 - no^2)(k.n)^2 = no^2 ne^2.
   const double a = o + d * n[2] * n[2], b = d * n[2] * along, c = o * k2 + d * along * along - o * n_e * n_e;
   PlaneWaves w{std::sqrt(o - k2), (-b + std::sqrt(b * b - a * c)) / a, {}};
@@ -91,7 +100,8 @@ PlaneWaves plane_waves(const std::array<double, 3>& n, double n_o, double n_e, c
     const double z = qs[static_cast<std::size_t>(i)];
     const Eigen::Vector3d k(kappa[0], kappa[1], z);
     // Ordinary: E across k and the axis; extraordinary: E in the plane of both, n_o^2 n - (k.n) k.
-    const Eigen::Vector3d field = i == 0 ? k.cross(axis).eval() : (o * axis - k.dot(axis) * k).eval(), magnetic = k.cross(field);
+    const Eigen::Vector3d field = i == 0 ? k.cross(axis).eval() : (o * axis - k.dot(axis) * k).eval(),
+                          magnetic = k.cross(field);
     e.col(i) << field(0), field(1);
     h.col(i) << magnetic(1), -magnetic(0);
     q(i, i) = z;
@@ -101,7 +111,8 @@ PlaneWaves plane_waves(const std::array<double, 3>& n, double n_o, double n_e, c
   return w;
 }
 
-// Both q, and the 2 x 2 matrix of which they are the eigenvalues: every coefficient of v, sd, sc and D shows in one of them.
+// Both q, and the 2 x 2 matrix of which they are the eigenvalues: every coefficient of v, sd, sc and D shows in one of
+// them.
 TEST(SplitStep, TransverseWavevectorsActToTheSecondOrder) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1, 1), index(1.45, 1.65), difference(0.05, 0.25);
@@ -110,11 +121,14 @@ TEST(SplitStep, TransverseWavevectorsActToTheSecondOrder) {
   double flat = 0, loss = 0;
   const int trials = 400;
   for (int trial = 0; trial < trials; ++trial) {
-    const double nz = unit(random), azimuth = kPi * unit(random), direction = kPi * unit(random), t = std::sqrt(1 - nz * nz);
+    const double nz = unit(random), azimuth = kPi * unit(random), direction = kPi * unit(random),
+                 t = std::sqrt(1 - nz * nz);
     const std::array<double, 3> n{t * std::cos(azimuth), t * std::sin(azimuth), nz};
-    const double n_o = index(random), n_e = n_o + (trial % 3 == 0 ? -0.6 : 1) * difference(random), n_host = index(random);
+    const double n_o = index(random), n_e = n_o + (trial % 3 == 0 ? -0.6 : 1) * difference(random),
+                 n_host = index(random);
     const Uniform medium(n, n_o, n_e);
-    flat = std::max(flat, (coded_operator(medium, {0, 0}, n_host) - plane_waves(n, n_o, n_e, {1e-10, 0}).operation).norm());
+    flat = std::max(flat,
+                    (coded_operator(medium, {0, 0}, n_host) - plane_waves(n, n_o, n_e, {1e-10, 0}).operation).norm());
     for (std::size_t s = 0; s < 3; ++s) {
       const std::array<double, 2> kappa{sizes[s] * std::cos(direction), sizes[s] * std::sin(direction)};
       const Eigen::Matrix2cd coded = coded_operator(medium, kappa, n_host);
@@ -128,22 +142,25 @@ TEST(SplitStep, TransverseWavevectorsActToTheSecondOrder) {
       loss = std::max(loss, (coded - coded.adjoint()).norm());
     }
   }
-  for (std::size_t s = 0; s < 3; ++s) fmt::print("kappa {}: q off by {:.1e}, at worst {:.1e}; matrix {:.1e}\n", sizes[s], sum[s] / trials, worst[s], matrix[s]);
+  for (std::size_t s = 0; s < 3; ++s)
+    fmt::print("kappa {}: q off by {:.1e}, at worst {:.1e}; matrix {:.1e}\n", sizes[s], sum[s] / trials, worst[s],
+               matrix[s]);
   fmt::print("kappa 0: {:.1e}; not Hermitian: {:.1e}\n", flat, loss);
-  // Rounding of 1e-16 and a few, over k0 h = 1e-3; the directions of the two waves are ill defined where n_e(direction) = n_o.
+  // Rounding of 1e-16 and a few, over k0 h = 1e-3; the directions of the two waves are ill defined where n_e(direction)
+  // = n_o.
   EXPECT_LT(flat, 1e-8);
   EXPECT_LT(loss, 1e-9);
   for (std::size_t s = 0; s < 3; ++s) {
     const double third = sizes[s] * sizes[s] * sizes[s];
-    // Third order with the coefficients seen (0.004, 0.013, 0.020) and half as much again. A coefficient of the second order wrong by 0.01
-    // costs 1e-4 at kappa 0.1, ten times the bound.
+    // Third order with the coefficients seen (0.004, 0.013, 0.020) and half as much again. A coefficient of the second
+    // order wrong by 0.01 costs 1e-4 at kappa 0.1, ten times the bound.
     EXPECT_LT(sum[s] / trials, 0.006 * third);
     EXPECT_LT(worst[s], 0.02 * third);
     EXPECT_LT(matrix[s], 0.03 * third);
   }
 }
 
-// ---- pictures ------------------------------------------------------------------------------------------------------------
+// ---- pictures ------------------------------------------------------------------------------------------------------
 
 struct Ball {
   double radius_um, n_host, n_o = 1.52, n_e = 1.74, core_um = 0;  // a core of the host's index
@@ -160,12 +177,15 @@ SphereOptics<S> optics(const Ball& b) {
 /// Production's.
 WaveGrid grid_of(const Ball& b, double na) { return sphere_grid(optics<double>(b), kK0, na); }
 /// Polarizer at 45 degrees, or the azimuth given.
-WaveLight<Pack> light(double n_host, double polarizer = kPi / 4) { return {Pack(kK0), Pack(n_host), Pack(std::cos(polarizer)), Pack(std::sin(polarizer))}; }
+WaveLight<Pack> light(double n_host, double polarizer = kPi / 4) {
+  return {Pack(kK0), Pack(n_host), Pack(std::cos(polarizer)), Pack(std::sin(polarizer))};
+}
 
 /// Pixels of 0.1 um, analyser crossed, out to `half` from the centre.
 constexpr double kPixel = 0.1;
 int pixels(double half_um) { return 2 * static_cast<int>(std::ceil(half_um / kPixel)); }
-Image picture(const WaveGrid& g, const std::vector<WaveField>& field, const WaveLight<Pack>& l, double na, double focus_um, double half_um, bool aplanatic) {
+Image picture(const WaveGrid& g, const std::vector<WaveField>& field, const WaveLight<Pack>& l, double na,
+              double focus_um, double half_um, bool aplanatic) {
   const int n = pixels(half_um);
   WaveMicroscope<Pack> m;
   m.objective_na = na, m.aplanatic = aplanatic, m.focus_um = Pack(focus_um);
@@ -176,13 +196,15 @@ Image picture(const WaveGrid& g, const std::vector<WaveField>& field, const Wave
   form_image(g, plan_imaging(g, kK0, na, half_um + kPixel, half_um + kPixel), l, m, field, 1, {&image});
   return image;
 }
-/// The same of the exact series: four points of each pixel, good to 1e-4 of the finest wave that an objective of 0.8 passes.
+/// The same of the exact series: four points of each pixel, good to 1e-4 of the finest wave that an objective of 0.8
+/// passes.
 Image exact_picture(const Ball& b, double na, double focus_um, double half_um, bool aplanatic) {
   RadialBall<double> ball{{}, b.n_host, kK0};
   if (b.core_um > 0) ball.layers.push_back({b.core_um, b.n_host, b.n_host});
   ball.layers.push_back({b.radius_um, b.n_o, b.n_e});
   const double step = 0.01, reach = 1.5 * half_um;
-  const RadialImage<double> field(radial_series(ball), na, focus_um, reach, aplanatic ? Pupil::aplanatic : Pupil::focal_plane);
+  const RadialImage<double> field(radial_series(ball), na, focus_um, reach,
+                                  aplanatic ? Pupil::aplanatic : Pupil::focal_plane);
   std::vector<double> table;
   for (double rho = 0; rho < reach; rho += step) table.push_back(norm(field(rho).a2));
   std::vector<double> node, weight;
@@ -193,7 +215,8 @@ Image exact_picture(const Ball& b, double na, double focus_um, double half_um, b
     for (int column = 0; column < n; ++column)
       for (const double u : node)
         for (const double v : node) {
-          const double x = (column - 0.5 * (n - 1) + 0.5 * u) * kPixel, y = (0.5 * (n - 1) - row + 0.5 * v) * kPixel, at = std::hypot(x, y) / step;
+          const double x = (column - 0.5 * (n - 1) + 0.5 * u) * kPixel, y = (0.5 * (n - 1) - row + 0.5 * v) * kPixel,
+                       at = std::hypot(x, y) / step;
           const std::size_t i = static_cast<std::size_t>(at);
           const double f = at - static_cast<double>(i), cos_2phi = (x * x - y * y) / (x * x + y * y);
           image(column, row) += 0.25 * ((1 - f) * table.at(i) + f * table.at(i + 1)) * cos_2phi * cos_2phi;
@@ -206,15 +229,18 @@ double series_error(const Ball& b, double na, double focus_um = 0, bool aplanati
   const WaveGrid g = grid_of(b, na);
   const WaveLight<Pack> l = light(b.n_host);
   const double half = b.radius_um + 3;
-  const Image image = picture(g, propagate(g, l, SphereMedium<Pack>(optics(b), g.step_um), 1), l, na, focus_um, half, aplanatic);
+  const Image image =
+      picture(g, propagate(g, l, SphereMedium<Pack>(optics(b), g.step_um), 1), l, na, focus_um, half, aplanatic);
   const double error = relative_rms(image.values(), exact_picture(b, na, focus_um, half, aplanatic).values());
-  fmt::print("R {} core {} {}/{} in {} NA {} focus {}{}: {:.4f}  ({} x {} x {}, {:.3f} um, slabs {:.3f} um)\n", b.radius_um, b.core_um, b.n_o, b.n_e, b.n_host, na, focus_um,
-             aplanatic ? " aplanatic" : "", error, g.nx, g.ny, g.slabs, g.step_um, (g.exit_um - g.entry_um) / g.slabs);
+  fmt::print("R {} core {} {}/{} in {} NA {} focus {}{}: {:.4f}  ({} x {} x {}, {:.3f} um, slabs {:.3f} um)\n",
+             b.radius_um, b.core_um, b.n_o, b.n_e, b.n_host, na, focus_um, aplanatic ? " aplanatic" : "", error, g.nx,
+             g.ny, g.slabs, g.step_um, (g.exit_um - g.entry_um) / g.slabs);
   return error;
 }
 
-// Wanted: 0.025 at NA 0.4, 0.06 at NA 0.8. What a finer grid does not take away (Converges, below, and half the step and slab here): 0.006 to 0.02, and
-// 0.02 to 0.05; light that is reflected or, third order, steep. It is 0.03 and 0.06 for 2.5 um in 1.43, where there is most surface for the volume.
+// Wanted: 0.025 at NA 0.4, 0.06 at NA 0.8. What a finer grid does not take away (Converges, below, and half the step
+// and slab here): 0.006 to 0.02, and 0.02 to 0.05; light that is reflected or, third order, steep. It is 0.03 and 0.06
+// for 2.5 um in 1.43, where there is most surface for the volume.
 void expect_close(const Ball& b, double more = 1) {
   EXPECT_LT(series_error(b, 0.4), 0.025 * more);
   EXPECT_LT(series_error(b, 0.8), 0.06 * more);
@@ -247,7 +273,8 @@ TEST(SplitStep, DefocusAndAplanaticObjective) {
       EXPECT_LT(series_error({4.5, n_host}, na, 0, true), na < 0.5 ? 0.025 : 0.06);
     }
 }
-// Light that runs along a wall stays steep, and what is left out is larger, the more so where surfaces turn it: as measured, and a fifth or more on top.
+// Light that runs along a wall stays steep, and what is left out is larger, the more so where surfaces turn it: as
+// measured, and a fifth or more on top.
 TEST(SplitStep, Shells) {
   expect_close({5, 1.534, 1.534, 1.707, 3.5}, 1.2);
   expect_close({5, 1.42, 1.534, 1.707, 3.5}, 2.9);
@@ -257,34 +284,45 @@ TEST(LongSplitStep, LargeShells) {
   expect_close({15, 1.42, 1.534, 1.707, 12}, 1.8);
 }
 
-// ---- convergence ---------------------------------------------------------------------------------------------------------
+// ---- convergence ---------------------------------------------------------------------------------------------------
 
 /// Root mean square of the difference of two fields on the same points, over that of the second.
 double distance(const WaveField& a, const WaveField& b) {
   double sum = 0, all = 0;
   for (std::size_t c = 0; c < 2; ++c)
-    for (std::size_t i = 0; i < b.a[c].size(); ++i) sum += std::norm(a.a[c].at(i) - b.a[c][i]), all += std::norm(b.a[c][i]);
+    for (std::size_t i = 0; i < b.a[c].size(); ++i)
+      sum += std::norm(a.a[c].at(i) - b.a[c][i]), all += std::norm(b.a[c][i]);
   return std::sqrt(sum / all);
 }
 
-/// A ball of permittivities mixed by volume in its ramp, director a function of z: mixed the same way for the march below.
+/// A ball of permittivities mixed by volume in its ramp, director a function of z: mixed the same way for the march
+/// below.
 struct LayeredBall final : WaveMedium<Pack> {
   double radius_um, n_o, n_e, n_host, ramp_um;
   std::function<std::array<double, 3>(double)> director;
-  LayeredBall(double radius, double o, double e, double host, double ramp, std::function<std::array<double, 3>(double)> n)
+  LayeredBall(double radius, double o, double e, double host, double ramp,
+              std::function<std::array<double, 3>(double)> n)
       : radius_um(radius), n_o(o), n_e(e), n_host(host), ramp_um(ramp), director(std::move(n)) {}
   OpticalPoint<Pack> at(const Pack& x, const Pack& y, double z) const override {
     const Pack share = min_of(max_of(0.5 + (radius_um - sqrt(x * x + y * y + z * z)) / ramp_um, Pack(0.0)), Pack(1.0));
     const double h = n_host * n_host;
     const auto n = director(z);
-    return {{Pack(n[0]), Pack(n[1]), Pack(n[2])}, h + share * (n_o * n_o - h), h + share * (n_e * n_e - h), Pack(0.0), Pack(0.0), Pack(0.0)};
+    return {{Pack(n[0]), Pack(n[1]), Pack(n[2])},
+            h + share * (n_o * n_o - h),
+            h + share * (n_e * n_e - h),
+            Pack(0.0),
+            Pack(0.0),
+            Pack(0.0)};
   }
-  bool reaches(const Pack& x, const Pack& y, double z) const override { return smallest(x * x + y * y) + z * z < square(radius_um + 0.5 * ramp_um); }
+  bool reaches(const Pack& x, const Pack& y, double z) const override {
+    return smallest(x * x + y * y) + z * z < square(radius_um + 0.5 * ramp_um);
+  }
   std::array<double, 6> operator()(double x, double y, double z) const {
     const double share = std::clamp(0.5 + (radius_um - std::hypot(x, y, z)) / ramp_um, 0.0, 1.0), h = n_host * n_host;
     const auto n = director(z);
     const double o = h + share * (n_o * n_o - h), d = share * (n_e * n_e - n_o * n_o);
-    return {o + d * n[0] * n[0], o + d * n[1] * n[1], o + d * n[2] * n[2], d * n[0] * n[1], d * n[0] * n[2], d * n[1] * n[2]};
+    return {o + d * n[0] * n[0], o + d * n[1] * n[1], o + d * n[2] * n[2],
+            d * n[0] * n[1],     d * n[0] * n[2],     d * n[1] * n[2]};
   }
 };
 /// Along x at z = 0, a turn every 4 um, right-handed.
@@ -293,9 +331,15 @@ std::array<double, 3> twisted(double z) { return {std::cos(kPi * z / 2), std::si
 /// Smooth and without symmetry, periodic in 8 um.
 struct Smooth final : WaveMedium<Pack> {
   OpticalPoint<Pack> at(const Pack& x, const Pack& y, double z) const override {
-    const Pack u = kPi / 4 * x, v = kPi / 4 * y, polar = 1.1 + 0.2 * sin(u) + 0.15 * cos(v + Pack(0.5 * z)), azimuth = 0.5 + 0.4 * z + 0.2 * sin(u + v);
+    const Pack u = kPi / 4 * x, v = kPi / 4 * y, polar = 1.1 + 0.2 * sin(u) + 0.15 * cos(v + Pack(0.5 * z)),
+               azimuth = 0.5 + 0.4 * z + 0.2 * sin(u + v);
     const Pack n = 1.5 + 0.01 * cos(u - v) * std::sin(z);
-    return {{sin(polar) * cos(azimuth), sin(polar) * sin(azimuth), cos(polar)}, n * n, Pack(1.6 * 1.6), Pack(0.0), Pack(0.0), Pack(0.0)};
+    return {{sin(polar) * cos(azimuth), sin(polar) * sin(azimuth), cos(polar)},
+            n * n,
+            Pack(1.6 * 1.6),
+            Pack(0.0),
+            Pack(0.0),
+            Pack(0.0)};
   }
   bool reaches(const Pack&, const Pack&, double) const override { return true; }
 };
@@ -316,7 +360,8 @@ TEST(SplitStep, ErrorFallsWithTheSquareOfTheSlab) {
   const auto at = [](int slabs) { return propagate(smooth_grid(slabs), light(1.5), Smooth(), 1)[0]; };
   const WaveField fine = at(256);
   const double e12 = distance(at(12), fine), e24 = distance(at(24), fine), e48 = distance(at(48), fine);
-  fmt::print("slabs 12, 24, 48 against 256: {:.2e} {:.2e} {:.2e}, orders {:.2f} {:.2f}\n", e12, e24, e48, std::log2(e12 / e24), std::log2(e24 / e48));
+  fmt::print("slabs 12, 24, 48 against 256: {:.2e} {:.2e} {:.2e}, orders {:.2f} {:.2f}\n", e12, e24, e48,
+             std::log2(e12 / e24), std::log2(e24 / e48));
   // The finest's own error is a thirtieth of that of 48: 0.04 of the order. The next term is of the fourth.
   EXPECT_NEAR(std::log2(e12 / e24), 2, 0.2);
   EXPECT_NEAR(std::log2(e24 / e48), 2.04, 0.1);
@@ -329,7 +374,8 @@ TEST(SplitStep, OddSlabs) {
   EXPECT_NEAR(e25 / e24, (24.0 * 24) / (25 * 25), 0.02);
 }
 
-// The screens of a director that twists by 34 degrees in a slab are of fourth order in the layer: half the layers' thickness, a sixteenth.
+// The screens of a director that twists by 34 degrees in a slab are of fourth order in the layer: half the layers'
+// thickness, a sixteenth.
 TEST(SplitStep, LayersFollowATwist) {
   const LayeredBall ball(2.5, 1.52, 1.74, 1.52, 0.4, twisted);
   WaveGrid g = grid_of({2.5, 1.52}, 0.8);
@@ -339,7 +385,8 @@ TEST(SplitStep, LayersFollowATwist) {
   };
   const WaveField fine = at(32);
   const double e2 = distance(at(2), fine), e4 = distance(at(4), fine), e8 = distance(at(8), fine);
-  fmt::print("layers 2, 4, 8 of {:.2f} um slabs against 32: {:.1e} {:.1e} {:.1e}\n", (g.exit_um - g.entry_um) / g.slabs, e2, e4, e8);
+  fmt::print("layers 2, 4, 8 of {:.2f} um slabs against 32: {:.1e} {:.1e} {:.1e}\n", (g.exit_um - g.entry_um) / g.slabs,
+             e2, e4, e8);
   // Mostly the surface's ramp, which is a quarter of a slab. Production has 4.
   EXPECT_LT(e4, 0.003);
   EXPECT_LT(e8, e4);
@@ -349,12 +396,14 @@ TEST(SplitStep, LayersFollowATwist) {
 struct Helix final : WaveMedium<Pack> {
   OpticalPoint<Pack> at(const Pack&, const Pack&, double z) const override {
     const auto n = twisted(z);
-    return {{Pack(n[0]), Pack(n[1]), Pack(n[2])}, Pack(1.52 * 1.52), Pack(1.74 * 1.74), Pack(0.0), Pack(0.0), Pack(0.0)};
+    return {
+        {Pack(n[0]), Pack(n[1]), Pack(n[2])}, Pack(1.52 * 1.52), Pack(1.74 * 1.74), Pack(0.0), Pack(0.0), Pack(0.0)};
   }
   bool reaches(const Pack&, const Pack&, double) const override { return true; }
 };
-// Along a helix Maxwell's equations have exact solutions: u constant in the turning frame, times exp(i K z), where with t = 2 pi / pitch
-// (K^2 + t^2 - k0^2 n_o^2)(K^2 + t^2 - k0^2 n_e^2) = 4 t^2 K^2 (H. de Vries, Acta Cryst. 4, 219 (1951)). One turn multiplies these by exp(i K pitch).
+// Along a helix Maxwell's equations have exact solutions: u constant in the turning frame, times exp(i K z), where with
+// t = 2 pi / pitch (K^2 + t^2 - k0^2 n_o^2)(K^2 + t^2 - k0^2 n_e^2) = 4 t^2 K^2 (H. de Vries, Acta Cryst. 4, 219
+// (1951)). One turn multiplies these by exp(i K pitch).
 TEST(SplitStep, HelixHasItsExactModes) {
   const double pitch = 4, t = 2 * kPi / pitch, o = square(kK0 * 1.52) - t * t, e = square(kK0 * 1.74) - t * t;
   const double half = 0.5 * (o + e) + 2 * t * t, apart = std::sqrt(half * half - o * e);
@@ -374,9 +423,13 @@ TEST(SplitStep, HelixHasItsExactModes) {
     }
     const Eigen::Vector2cd values = (turn * std::polar(1.0, kK0 * 1.6 * pitch)).eigenvalues();
     std::array<double, 2> off{};
-    for (std::size_t m = 0; m < 2; ++m) off[m] = std::min(std::abs(std::arg(values(0) * std::polar(1.0, -k[m] * pitch))), std::abs(std::arg(values(1) * std::polar(1.0, -k[m] * pitch))));
-    fmt::print("helix, {} slabs of {} um: phases after a turn off by {:.1e} and {:.1e}\n", slabs, pitch / slabs, off[0], off[1]);
-    // Their difference is 15.7; without the rotation that dY/dz leaves it is 0.023 off. Left over: the next order of (t / (n k0))^2 = 0.008, of 70 radians.
+    for (std::size_t m = 0; m < 2; ++m)
+      off[m] = std::min(std::abs(std::arg(values(0) * std::polar(1.0, -k[m] * pitch))),
+                        std::abs(std::arg(values(1) * std::polar(1.0, -k[m] * pitch))));
+    fmt::print("helix, {} slabs of {} um: phases after a turn off by {:.1e} and {:.1e}\n", slabs, pitch / slabs, off[0],
+               off[1]);
+    // Their difference is 15.7; without the rotation that dY/dz leaves it is 0.023 off. Left over: the next order of (t
+    // / (n k0))^2 = 0.008, of 70 radians.
     EXPECT_LT(std::max(off[0], off[1]), 0.002);
   }
 }
@@ -391,8 +444,9 @@ TEST(SplitStep, Converges) {
     g.slabs = static_cast<int>(std::ceil((g.exit_um - g.entry_um) / slab_um));
     const WaveLight<Pack> l = light(b.n_host);
     const double half = b.radius_um + 2;
-    const double e = relative_rms(picture(g, propagate(g, l, SphereMedium<Pack>(optics(b), step_um), 1), l, 0.8, 0, half, false).values(),
-                                  exact_picture(b, 0.8, 0, half, false).values());
+    const double e = relative_rms(
+        picture(g, propagate(g, l, SphereMedium<Pack>(optics(b), step_um), 1), l, 0.8, 0, half, false).values(),
+        exact_picture(b, 0.8, 0, half, false).values());
     fmt::print("step {}, margin {}, slabs {}: {:.4f}\n", step_um, margin_um, slab_um, e);
     return e;
   };
@@ -409,29 +463,36 @@ TEST(SplitStep, Converges) {
   EXPECT_GT(error(0.2, 4, 0.8), 1.5 * before);
 }
 
-// ---- directors without symmetry: the march of Maxwell's equations ----------------------------------------------------------
+// ---- directors without symmetry: the march of Maxwell's equations --------------------------------------------------
 
-/// Transverse E at the exit, as imaging without knowledge of fluxes wants it: e_s = (n / q)^(1/2) a_s, e_p = (q / n)^(1/2) a_p, and the phase of the light.
+/// Transverse E at the exit, as imaging without knowledge of fluxes wants it: e_s = (n / q)^(1/2) a_s, e_p = (q /
+/// n)^(1/2) a_p, and the phase of the light.
 std::array<Plane, 2> tangential(const WaveGrid& g, double n_host, const WaveField& field) {
   const Fft2 fft(g.nx, g.ny);
   std::array<Plane, 2> e{field.a[0], field.a[1]};
   for (Plane& plane : e) fft.forward(plane);
-  const auto wave = [&](int i, int n) { return n == 1 ? 0 : 2 * kPi * (2 * i < n ? i : i - n) / (n * g.step_um * kK0); };
+  const auto wave = [&](int i, int n) {
+    return n == 1 ? 0 : 2 * kPi * (2 * i < n ? i : i - n) / (n * g.step_um * kK0);
+  };
   const Number phase = std::polar(1.0 / static_cast<double>(fft.size()), kK0 * n_host * g.exit_um);
   for (int j = 0; j < g.ny; ++j)
     for (int i = 0; i < g.nx; ++i) {
-      const double x = wave(i, g.nx), y = wave(j, g.ny), k = std::hypot(x, y), c = k > 0 ? x / k : 1, s = k > 0 ? y / k : 0;
+      const double x = wave(i, g.nx), y = wave(j, g.ny), k = std::hypot(x, y), c = k > 0 ? x / k : 1,
+                   s = k > 0 ? y / k : 0;
       Number &ex = e[0][static_cast<std::size_t>(j * g.nx + i)], &ey = e[1][static_cast<std::size_t>(j * g.nx + i)];
       const double q = k < n_host ? std::sqrt(n_host * n_host - k * k) : n_host;  // cut: nothing is there
-      const Number p = phase * std::sqrt(q / n_host) * (c * ex + s * ey), t = phase * std::sqrt(n_host / q) * (c * ey - s * ex);
+      const Number p = phase * std::sqrt(q / n_host) * (c * ex + s * ey),
+                   t = phase * std::sqrt(n_host / q) * (c * ey - s * ex);
       ex = c * p - s * t, ey = s * p + c * t;
     }
   for (Plane& plane : e) fft.inverse(plane);
   return e;
 }
 
-/// Errors of the pictures at NA 0.4 and 0.8 against the march on the same points; polarizer along x, focus on the centre.
-std::array<double, 2> march_errors(const char* what, double n_host, const WaveGrid& g, const WaveMedium<Pack>& medium, const DielectricAt& dielectric, int slabs) {
+/// Errors of the pictures at NA 0.4 and 0.8 against the march on the same points; polarizer along x, focus on the
+/// centre.
+std::array<double, 2> march_errors(const char* what, double n_host, const WaveGrid& g, const WaveMedium<Pack>& medium,
+                                   const DielectricAt& dielectric, int slabs) {
   const double box = g.nx * g.step_um, z = g.exit_um;
   const WaveField field = propagate(g, light(n_host, 0), medium, 2)[0];
   const auto e = tangential(g, n_host, field);
@@ -439,16 +500,18 @@ std::array<double, 2> march_errors(const char* what, double n_host, const WaveGr
   std::array<double, 2> errors{};
   for (std::size_t c = 0; c < 2; ++c) {
     const Imaging imaging{kK0, n_host, c == 0 ? 0.4 : 0.8, z, 0, {0, 0}, {1, 0}};
-    errors[c] = relative_rms(imaging(e[0], e[1], g.nx, g.ny, box, box).crossed(0), imaging(m.ex, m.ey, g.nx, g.ny, box, box).crossed(0));
+    errors[c] = relative_rms(imaging(e[0], e[1], g.nx, g.ny, box, box).crossed(0),
+                             imaging(m.ex, m.ey, g.nx, g.ny, box, box).crossed(0));
   }
   fmt::print("{} in {}: {:.4f} (NA 0.4), {:.4f} (NA 0.8) from the march\n", what, n_host, errors[0], errors[1]);
   return errors;
 }
 
-// The order of wavevector and coefficients shows here (a symmetrised one is off by 0.05 to 0.09, a screen of averages by 0.2 where the director twists).
-// Wanted: 0.035, the march's own error and what a one-way wave leaves out being half each; 0.045 where a lower index outside sends light to the far side
-// of the pupil, as for the radial balls above.
-void expect_like_march(const char* what, double n_host, const WaveGrid& g, const WaveMedium<Pack>& medium, const DielectricAt& dielectric, int slabs) {
+// The order of wavevector and coefficients shows here (a symmetrised one is off by 0.05 to 0.09, a screen of averages
+// by 0.2 where the director twists). Wanted: 0.035, the march's own error and what a one-way wave leaves out being half
+// each; 0.045 where a lower index outside sends light to the far side of the pupil, as for the radial balls above.
+void expect_like_march(const char* what, double n_host, const WaveGrid& g, const WaveMedium<Pack>& medium,
+                       const DielectricAt& dielectric, int slabs) {
   const auto errors = march_errors(what, n_host, g, medium, dielectric, slabs);
   EXPECT_LT(errors[0], 0.035);
   EXPECT_LT(errors[1], n_host < 1.5 ? 0.045 : 0.035);
@@ -473,7 +536,8 @@ TEST(SplitStep, BipolarBalls) {
     // Along circles through both poles +-a u: the tangent at r is (a^2 + r^2) u - 2 (u.r) r.
     const auto director = [u](double x, double y, double z) {
       const double w = (u[0] * x + u[1] * y + u[2] * z) / 4.5, along = 1 + (x * x + y * y + z * z) / (4.5 * 4.5);
-      std::array<double, 3> n{along * u[0] - 2 * w * x / 4.5, along * u[1] - 2 * w * y / 4.5, along * u[2] - 2 * w * z / 4.5};
+      std::array<double, 3> n{along * u[0] - 2 * w * x / 4.5, along * u[1] - 2 * w * y / 4.5,
+                              along * u[2] - 2 * w * z / 4.5};
       const double length = std::hypot(n[0], n[1], n[2]);
       for (double& c : n) c /= length;
       return n;
@@ -493,9 +557,10 @@ TEST(LongSplitStep, TwistedBalls) {
   for (const double n_host : {1.52, 1.43}) twisted_ball(4.5, n_host, 96);
 }
 
-// ---- tilted light ----------------------------------------------------------------------------------------------------------
+// ---- tilted light --------------------------------------------------------------------------------------------------
 
-/// Relative RMS of the scattered waves inside NA 0.8 against the exact series, for light tilted by kappa, in flux units.
+/// Relative RMS of the scattered waves inside NA 0.8 against the exact series, for light tilted by kappa, in flux
+/// units.
 double tilted_error(const Ball& b, const std::array<double, 2>& kappa, const std::array<double, 2>& e) {
   const WaveGrid g = grid_of(b, 0.8);
   WaveLight<Pack> l = light(b.n_host);
@@ -505,8 +570,10 @@ double tilted_error(const Ball& b, const std::array<double, 2>& kappa, const std
   const Fft2 fft(g.nx, g.ny);
   for (Plane& plane : field.a) fft.forward(plane);
   const auto q = [&](double x, double y) { return std::sqrt(b.n_host * b.n_host - x * x - y * y); };
-  const double q_in = q(kappa[0], kappa[1]), k = std::hypot(kappa[0], kappa[1]), c = k > 0 ? kappa[0] / k : 1, s = k > 0 ? kappa[1] / k : 0;
-  const double p = std::sqrt(b.n_host / q_in) * (c * e[0] + s * e[1]), t = std::sqrt(q_in / b.n_host) * (c * e[1] - s * e[0]);
+  const double q_in = q(kappa[0], kappa[1]), k = std::hypot(kappa[0], kappa[1]), c = k > 0 ? kappa[0] / k : 1,
+               s = k > 0 ? kappa[1] / k : 0;
+  const double p = std::sqrt(b.n_host / q_in) * (c * e[0] + s * e[1]),
+               t = std::sqrt(q_in / b.n_host) * (c * e[1] - s * e[0]);
   const std::array<double, 2> in{c * p - s * t, s * p + c * t};
   RadialBall<double> ball{{{b.radius_um, b.n_o, b.n_e}}, b.n_host, kK0};
   const RadialSeries<double> series = radial_series(ball);
@@ -514,9 +581,11 @@ double tilted_error(const Ball& b, const std::array<double, 2>& kappa, const std
   double sum = 0, all = 0;
   for (int j = 0; j < g.ny; ++j)
     for (int i = 0; i < g.nx; ++i) {
-      const double dx = unit * (2 * i < g.nx ? i : i - g.nx), dy = unit * (2 * j < g.ny ? j : j - g.ny), x = kappa[0] + dx, y = kappa[1] + dy;
+      const double dx = unit * (2 * i < g.nx ? i : i - g.nx), dy = unit * (2 * j < g.ny ? j : j - g.ny),
+                   x = kappa[0] + dx, y = kappa[1] + dy;
       if (std::hypot(x, y) > 0.8) continue;
-      const Number to_centre = std::polar(g.step_um * g.step_um, kK0 * ((dx + dy) * first + (q_in - q(x, y)) * g.exit_um));
+      const Number to_centre =
+          std::polar(g.step_um * g.step_um, kK0 * ((dx + dy) * first + (q_in - q(x, y)) * g.exit_um));
       const Mat2<double> f = scattered_spectrum(series, kappa, {x, y}, 0, Pupil::aplanatic);
       const auto exact = [&](std::size_t row) {
         const Complex<double> z = row == 0 ? in[0] * f.a + in[1] * f.b : in[0] * f.c + in[1] * f.d;
@@ -528,43 +597,57 @@ double tilted_error(const Ball& b, const std::array<double, 2>& kappa, const std
       }
     }
   const double error = std::sqrt(sum / all);
-  fmt::print("R {} in {}, kappa ({}, {}): {:.4f} of the scattered field\n", b.radius_um, b.n_host, kappa[0], kappa[1], error);
+  fmt::print("R {} in {}, kappa ({}, {}): {:.4f} of the scattered field\n", b.radius_um, b.n_host, kappa[0], kappa[1],
+             error);
   return error;
 }
-// The field itself, forward light included, of which a picture between crossed polarizers shows half: 0.03 to 0.046 untilted, 0.04 to 0.059 at 0.4, where
-// waves at the pupil's far edge are 1.2 from the light in kappa. A wrong sign of the tilt, or fluxes left out, cost 0.2 and more.
+// The field itself, forward light included, of which a picture between crossed polarizers shows half: 0.03 to 0.046
+// untilted, 0.04 to 0.059 at 0.4, where waves at the pupil's far edge are 1.2 from the light in kappa. A wrong sign of
+// the tilt, or fluxes left out, cost 0.2 and more.
 TEST(SplitStep, TiltedLight) {
   for (const Ball& b : {Ball{2.5, 1.52}, Ball{2.5, 1.43}, Ball{4.5, 1.52}, Ball{4.5, 1.43}})
     for (const double kappa : {0.0, 0.2, 0.4}) {
-      const double error = std::max(tilted_error(b, {kappa, 0}, {1, 0}), tilted_error(b, {0.6 * kappa, 0.8 * kappa}, {0.8, -0.6}));
+      const double error =
+          std::max(tilted_error(b, {kappa, 0}, {1, 0}), tilted_error(b, {0.6 * kappa, 0.8 * kappa}, {0.8, -0.6}));
       EXPECT_LT(error, 0.052 + 0.03 * kappa);
     }
 }
 
-// ---- the radial cylinder: two Maxwell solvers ---------------------------------------------------------------------------
+// ---- the radial cylinder: two Maxwell solvers ----------------------------------------------------------------------
 
 struct Cylinder final : WaveMedium<Pack> {
   double radius_um, n_o, n_e, n_host, ramp_um;
-  Cylinder(double radius, double o, double e, double host, double ramp) : radius_um(radius), n_o(o), n_e(e), n_host(host), ramp_um(ramp) {}
+  Cylinder(double radius, double o, double e, double host, double ramp)
+      : radius_um(radius), n_o(o), n_e(e), n_host(host), ramp_um(ramp) {}
   OpticalPoint<Pack> at(const Pack& x, const Pack&, double z) const override {
     const Pack r = sqrt(x * x + z * z), share = min_of(max_of(0.5 + (radius_um - r) / ramp_um, Pack(0.0)), Pack(1.0));
     const double h = n_host * n_host;
     // Thin sheets: harmonic mean across, mean along.
-    return {{x / r, Pack(0.0), Pack(z) / r}, h + share * (n_o * n_o - h), 1.0 / (1 / h + share * (1 / (n_e * n_e) - 1 / h)), Pack(0.0), Pack(0.0), Pack(0.0)};
+    return {{x / r, Pack(0.0), Pack(z) / r},
+            h + share * (n_o * n_o - h),
+            1.0 / (1 / h + share * (1 / (n_e * n_e) - 1 / h)),
+            Pack(0.0),
+            Pack(0.0),
+            Pack(0.0)};
   }
-  bool reaches(const Pack& x, const Pack&, double z) const override { return smallest(x * x) + z * z < square(radius_um + 0.5 * ramp_um); }
+  bool reaches(const Pack& x, const Pack&, double z) const override {
+    return smallest(x * x) + z * z < square(radius_um + 0.5 * ramp_um);
+  }
 };
 
 /// |t_x - t_y|^2 / 4 at 160 points over the period, by its orders one by one.
-std::vector<double> row_image(const std::vector<double>& x_um, const std::vector<Number>& difference, double period_um, double n, double aperture, double distance_um) {
+std::vector<double> row_image(const std::vector<double>& x_um, const std::vector<Number>& difference, double period_um,
+                              double n, double aperture, double distance_um) {
   std::vector<Number> sum(160);
   const int orders = static_cast<int>(aperture * kK0 * period_um / (2 * kPi));
   for (int m = -orders; m <= orders; ++m) {
     const double k = 2 * kPi * m / period_um, q = std::sqrt(n * n - k * k / (kK0 * kK0));
     Number amplitude = 0;
-    for (std::size_t i = 0; i < x_um.size(); ++i) amplitude += difference[i] * std::polar(1.0 / static_cast<double>(x_um.size()), -k * x_um[i]);
+    for (std::size_t i = 0; i < x_um.size(); ++i)
+      amplitude += difference[i] * std::polar(1.0 / static_cast<double>(x_um.size()), -k * x_um[i]);
     amplitude *= std::polar(1.0, kK0 * q * distance_um);
-    for (std::size_t i = 0; i < 160; ++i) sum[i] += amplitude * std::polar(1.0, k * (static_cast<double>(i) + 0.5) * period_um / 160);
+    for (std::size_t i = 0; i < 160; ++i)
+      sum[i] += amplitude * std::polar(1.0, k * (static_cast<double>(i) + 0.5) * period_um / 160);
   }
   std::vector<double> image;
   for (const Number& d : sum) image.push_back(0.25 * std::norm(d));
@@ -580,7 +663,8 @@ TEST(SplitStep, RadialCylindersAgreeWithMaxwellSolvers) {
     for (std::size_t row = 0; row < table.size(); ++row) {
       if (std::abs(table.number(row, "x_um")) > period / 2) continue;  // meep80 repeats its first and last sample
       x.push_back(table.number(row, "x_um"));
-      difference.emplace_back(table.number(row, "tx_re") - table.number(row, "ty_re"), table.number(row, "tx_im") - table.number(row, "ty_im"));
+      difference.emplace_back(table.number(row, "tx_re") - table.number(row, "ty_re"),
+                              table.number(row, "tx_im") - table.number(row, "ty_im"));
     }
     return row_image(x, difference, period, n, aperture, distance);
   };
@@ -595,7 +679,8 @@ TEST(SplitStep, RadialCylindersAgreeWithMaxwellSolvers) {
     const Cylinder cylinder(2, 1.52, 1.74, n, g.step_um);
     WaveLight<Pack> along_x = light(n, 0), along_y = light(n, kPi / 2);
     along_y.ex = Pack(0.0);
-    const auto fx = tangential(g, n, propagate(g, along_x, cylinder, 1)[0]), fy = tangential(g, n, propagate(g, along_y, cylinder, 1)[0]);
+    const auto fx = tangential(g, n, propagate(g, along_x, cylinder, 1)[0]),
+               fy = tangential(g, n, propagate(g, along_y, cylinder, 1)[0]);
     std::vector<double> x;
     std::vector<Number> difference;
     double still = 0;
@@ -605,16 +690,17 @@ TEST(SplitStep, RadialCylindersAgreeWithMaxwellSolvers) {
       difference.push_back((fx[0][p] - fy[1][p]) * std::polar(1.0, -kK0 * n * exit));
       still = std::max({still, std::abs(fy[1][p]), std::abs(fx[1][p])});
     }
-    // E along y sees n_o = n_host: nothing happens, but that the diffraction of n_ref is not that of the host in the fourth order; to rounding, for light that
-    // stays straight.
+    // E along y sees n_o = n_host: nothing happens, but that the diffraction of n_ref is not that of the host in the
+    // fourth order; to rounding, for light that stays straight.
     EXPECT_LT(still, 1e-12);
     for (const double distance : {0.0, -exit})
       for (const double aperture : {0.4, 0.8}) {
         const auto ours = row_image(x, difference, period, n, aperture, distance);
         const auto meep = table_image("meep80", aperture, distance), tmm = table_image("tmm2d", aperture, distance);
         const double a = relative_rms(ours, meep), b = relative_rms(ours, tmm), between = relative_rms(tmm, meep);
-        fmt::print("{} points, {} slabs, {} NA {}: from meep80 {:.3f}, from tmm2d {:.3f}; these from each other {:.3f}\n", points, g.slabs,
-                   distance == 0 ? "exit  " : "centre", aperture, a, b, between);
+        fmt::print(
+            "{} points, {} slabs, {} NA {}: from meep80 {:.3f}, from tmm2d {:.3f}; these from each other {:.3f}\n",
+            points, g.slabs, distance == 0 ? "exit  " : "centre", aperture, a, b, between);
         // The two differ by 0.009 to 0.040 from each other, so each may be wrong by that.
         EXPECT_LT(a, 0.03);
         EXPECT_LT(b, between + 0.02);
@@ -622,24 +708,26 @@ TEST(SplitStep, RadialCylindersAgreeWithMaxwellSolvers) {
   }
 }
 
-// ---- another program's beam propagation -------------------------------------------------------------------------------------
+// ---- another program's beam propagation ----------------------------------------------------------------------------
 
-// 0.083 in the middle plane between the series and that picture (128 points, 200 slices) is the latter's error; ours is no further from it than that and
-// our own distance from the series together.
+// 0.083 in the middle plane between the series and that picture (128 points, 200 slices) is the latter's error; ours is
+// no further from it than that and our own distance from the series together.
 TEST(SplitStep, AnotherBeamPropagation) {
   const Image theirs = read_pfm(data_path("peers/images/droplet_n152_bpm_nz200_centreNA0.8_I45.pfm"));
   const Ball b{4.5, 1.52};
   const WaveGrid g = grid_of(b, 0.8);
   const WaveLight<Pack> l = light(b.n_host);
-  const Image ours = picture(g, propagate(g, l, SphereMedium<Pack>(optics(b), g.step_um), 1), l, 0.8, 0, 6.4, false), exact = exact_picture(b, 0.8, 0, 6.4, false);
+  const Image ours = picture(g, propagate(g, l, SphereMedium<Pack>(optics(b), g.step_um), 1), l, 0.8, 0, 6.4, false),
+              exact = exact_picture(b, 0.8, 0, 6.4, false);
   ASSERT_EQ(theirs.width(), ours.width());
-  const double series = relative_rms(exact.values(), theirs.values()), split = relative_rms(ours.values(), theirs.values()), own = relative_rms(ours.values(), exact.values());
+  const double series = relative_rms(exact.values(), theirs.values()),
+               split = relative_rms(ours.values(), theirs.values()), own = relative_rms(ours.values(), exact.values());
   fmt::print("from bpm: series {:.4f}, split step {:.4f}; these from each other {:.4f}\n", series, split, own);
   EXPECT_NEAR(series, 0.084, 0.003);
   EXPECT_LT(split, series + own);
 }
 
-// ---- flux ------------------------------------------------------------------------------------------------------------------
+// ---- flux ----------------------------------------------------------------------------------------------------------
 
 /// Flux of the whole field at the exit over that of the incident wave.
 double transmitted(const WaveGrid& g, const WaveLight<Pack>& l, const WaveMedium<Pack>& medium) {
@@ -663,8 +751,11 @@ TEST(SplitStep, FluxIsKept) {
       open.frame_um = 0;
       exact.frame_um = 0, exact.order = 6;
       const SphereMedium<Pack> medium(optics(b), production.step_um);
-      const double all = transmitted(production, light(n_host), medium), no_frame = transmitted(open, light(n_host), medium), no_taylor = transmitted(exact, light(n_host), medium);
-      fmt::print("R 4.5 in {}, NA {}: lost {:.1e}, of which frame {:.1e}, Taylor series {:.1e}, cut {:.1e}\n", n_host, na, 1 - all, no_frame - all, no_taylor - no_frame, 1 - no_taylor);
+      const double all = transmitted(production, light(n_host), medium),
+                   no_frame = transmitted(open, light(n_host), medium),
+                   no_taylor = transmitted(exact, light(n_host), medium);
+      fmt::print("R 4.5 in {}, NA {}: lost {:.1e}, of which frame {:.1e}, Taylor series {:.1e}, cut {:.1e}\n", n_host,
+                 na, 1 - all, no_frame - all, no_taylor - no_frame, 1 - no_taylor);
       // Two terms of the series gain some of what the cut and the frame take.
       EXPECT_NEAR(no_frame, no_taylor, 5e-3);
       EXPECT_GT(1 - no_taylor, 0);
@@ -673,11 +764,28 @@ TEST(SplitStep, FluxIsKept) {
     }
 }
 
-// ---- derivatives -----------------------------------------------------------------------------------------------------------
+// ---- derivatives ---------------------------------------------------------------------------------------------------
 
 /// Everything a fit may change.
-enum Parameter { kOrdinary, kExtraordinary, kRadius, kHost, kWavenumber, kPolarizer, kFocus, kCentreX, kCentreY, kCore, kOffsetX, kOffsetZ, kCoreIndex, kCount };
-const std::array<const char*, kCount> kNames{"n_o", "n_e", "radius", "n_host", "k0", "polarizer", "focus", "centre x", "centre y", "core radius", "core offset x", "core offset z", "core index"};
+enum Parameter {
+  kOrdinary,
+  kExtraordinary,
+  kRadius,
+  kHost,
+  kWavenumber,
+  kPolarizer,
+  kFocus,
+  kCentreX,
+  kCentreY,
+  kCore,
+  kOffsetX,
+  kOffsetZ,
+  kCoreIndex,
+  kCount
+};
+const std::array<const char*, kCount> kNames{"n_o",           "n_e",           "radius",    "n_host",   "k0",
+                                             "polarizer",     "focus",         "centre x",  "centre y", "core radius",
+                                             "core offset x", "core offset z", "core index"};
 const std::array<double, kCount> kValues{1.534, 1.707, 2.03, 1.5, kK0, 0.5, 0.3, 19.3, 20.6, 1.21, 0.12, 0.15, 1.47};
 
 /// Images of an eccentric shell at these parameters, derivatives included; grid and sampling are fixed.
@@ -704,7 +812,8 @@ std::vector<Image> shell_images(const std::array<S, kCount>& p, int threads = 1)
   std::vector<Image> images(1 + ScalarTraits<S>::derivatives);
   std::vector<Image*> to;
   for (Image& image : images) to.push_back(&image);
-  form_image(g, plan_imaging(g, kK0, 0.6, 3.2, 3.2), l, m, propagate(g, l, SphereMedium<S>(o, g.step_um), threads), threads, to);
+  form_image(g, plan_imaging(g, kK0, 0.6, 3.2, 3.2), l, m, propagate(g, l, SphereMedium<S>(o, g.step_um), threads),
+             threads, to);
   return images;
 }
 Image value_image(const std::array<double, kCount>& at) {
@@ -721,9 +830,10 @@ std::vector<Image> dual_images(const std::array<int, N>& which, int threads = 1)
   return shell_images<DualPack<N>>(p, threads);
 }
 
-// The scheme is differentiated exactly, so differences of its own values are the judge. Ramps (of surfaces, of the pupil's edge) are cubic: what passes an
-// end of its ramp within the difference has a kink in the second derivative, and the difference must be short for its fourth order to hold. At 2e-6
-// relative, rounding of 1e-15 is 1e-9 of it: 1e-9 to 6e-9 seen.
+// The scheme is differentiated exactly, so differences of its own values are the judge. Ramps (of surfaces, of the
+// pupil's edge) are cubic: what passes an end of its ramp within the difference has a kink in the second derivative,
+// and the difference must be short for its fourth order to hold. At 2e-6 relative, rounding of 1e-15 is 1e-9 of it:
+// 1e-9 to 6e-9 seen.
 TEST(SplitStep, DerivativesAreThoseOfTheScheme) {
   const Image value = value_image(kValues);
   for (int first = 0; first < kCount; first += 4) {
@@ -739,7 +849,8 @@ TEST(SplitStep, DerivativesAreThoseOfTheScheme) {
         auto low = kValues, high = kValues;
         low[i] -= h, high[i] += h;
         const Image a = value_image(low), b = value_image(high);
-        for (std::size_t k = 0; k < a.values().size(); ++k) slopes[static_cast<std::size_t>(halved)].push_back((b.values()[k] - a.values()[k]) / (2 * h));
+        for (std::size_t k = 0; k < a.values().size(); ++k)
+          slopes[static_cast<std::size_t>(halved)].push_back((b.values()[k] - a.values()[k]) / (2 * h));
       }
       std::vector<double> slope;
       for (std::size_t k = 0; k < slopes[0].size(); ++k) slope.push_back((4 * slopes[1][k] - slopes[0][k]) / 3);
@@ -759,7 +870,8 @@ TEST(SplitStep, AllWidthsOfDerivativesAgree) {
   EXPECT_LT(relative_rms(one[1].values(), four[3].values()), 1e-12);
 }
 TEST(SplitStep, SameBitsForAnyNumberOfThreads) {
-  const auto one = dual_images<2>({kRadius, kWavenumber}, 1), two = dual_images<2>({kRadius, kWavenumber}, 2), five = dual_images<2>({kRadius, kWavenumber}, 5);
+  const auto one = dual_images<2>({kRadius, kWavenumber}, 1), two = dual_images<2>({kRadius, kWavenumber}, 2),
+             five = dual_images<2>({kRadius, kWavenumber}, 5);
   for (std::size_t i = 0; i < one.size(); ++i) {
     EXPECT_EQ(one[i].values(), two[i].values());
     EXPECT_EQ(one[i].values(), five[i].values());

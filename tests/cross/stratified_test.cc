@@ -16,7 +16,8 @@ using namespace testing;
 
 std::unique_ptr<Column<double>> stratified_case(const std::string& name) {
   constexpr double no = 1.522, ne = 1.739;
-  if (name.starts_with("homog_tilt30_phi20")) return column_of<double>(TiltTwistLaw{30 * kDeg, 0, 0, 20 * kDeg, 0, no, ne, 5});
+  if (name.starts_with("homog_tilt30_phi20"))
+    return column_of<double>(TiltTwistLaw{30 * kDeg, 0, 0, 20 * kDeg, 0, no, ne, 5});
   if (name == "TN90_off_d5") return column_of<double>(TiltTwistLaw{0, 0, 0, 0, 90 * kDeg, no, ne, 5});
   if (name == "TN90_tilt_sin60_d5") return column_of<double>(TiltTwistLaw{0, 0, 60 * kDeg, 0, 90 * kDeg, no, ne, 5});
   if (name == "HAN_linear_phi45_d5") return column_of<double>(TiltTwistLaw{0, 90 * kDeg, 0, 45 * kDeg, 0, no, ne, 5});
@@ -77,11 +78,13 @@ TEST(Stratified, FullBerremanDiffersByReflectionsOnly) {
     ASSERT_TRUE(column) << name;
     const double theta = table.number(row, "theta_deg") * kDeg, azimuth = table.number(row, "azimuth_deg") * kDeg;
     const double host = table.number(row, "n_surround");
-    const PlanarOptics<double> o = optics_of(std::move(column), table.number(row, "lambda_um"), host, Continuity::e_and_h);
+    const PlanarOptics<double> o =
+        optics_of(std::move(column), table.number(row, "lambda_um"), host, Continuity::e_and_h);
     const double t = std::tan(theta), kappa = host * std::sin(theta);
     const Ray<double> ray{o.k0, kappa * std::cos(azimuth), kappa * std::sin(azimuth), o.continuity};
     const SpJones j = sp_jones(planar_jones<double>(o, Magnus4<double>(), adapted_mesh(*o.column, ray, 1e-7),
-                                                    t * std::cos(azimuth), t * std::sin(azimuth)), azimuth);
+                                                    t * std::cos(azimuth), t * std::sin(azimuth)),
+                               azimuth);
     const auto z = [&](const std::string& entry) {
       return std::complex<double>(table.number(row, "re_" + entry), table.number(row, "im_" + entry));
     };
@@ -126,11 +129,12 @@ TEST(HeatedPlate, ConoscopicPhaseAgrees) {
   const double a = 1 / (2 * std::sqrt(2.0));
   for (std::size_t row = 0; row < table.size(); ++row) {
     const bool first = table.text(row, "director").starts_with("A");
-    const Vec3<double> axis = first ? Vec3<double>{-a, a, -std::sqrt(3.0) / 2}
-                                    : Vec3<double>{-a, std::sqrt(2.0) / 2, -std::sqrt(6.0) / 4};
+    const Vec3<double> axis =
+        first ? Vec3<double>{-a, a, -std::sqrt(3.0) / 2} : Vec3<double>{-a, std::sqrt(2.0) / 2, -std::sqrt(6.0) / 4};
     const HeatedLaw<double> law{axis, {table.number(row, "Fo"), 278, 368, 278, true}, 800};
     const LawColumn<double, HeatedLaw<double>> column(law);
-    const double kappa = std::sin(table.number(row, "theta_inc_deg") * kDeg), az = table.number(row, "azimuth_deg") * kDeg;
+    const double kappa = std::sin(table.number(row, "theta_inc_deg") * kDeg),
+                 az = table.number(row, "azimuth_deg") * kDeg;
     const double k0 = 2 * std::numbers::pi / 0.64;
     // The phase difference of the two modes: eigenvalues of the diagonal method's transfer, followed from a thin slice
     // (fraction 1/4096 of the wavenumber) so that no 2 pi is lost.
@@ -148,17 +152,20 @@ TEST(HeatedPlate, ConoscopicPhaseAgrees) {
   }
 }
 
-// Both faces stepped from a temperature between theirs, by eigenfunctions: u = x + sum 2/(n pi) [(-1)^n + u_i (1 - (-1)^n)] exp(-n^2 pi^2 Fo)
-// sin(n pi x), u_i = (T_i - T_c)/(T_h - T_c) (Carslaw & Jaeger 3.4). 60 terms are exact to rounding for Fo > 0.01.
+// Both faces stepped from a temperature between theirs, by eigenfunctions: u = x + sum 2/(n pi) [(-1)^n + u_i (1 -
+// (-1)^n)] exp(-n^2 pi^2 Fo) sin(n pi x), u_i = (T_i - T_c)/(T_h - T_c) (Carslaw & Jaeger 3.4). 60 terms are exact to
+// rounding for Fo > 0.01.
 TEST(HeatedPlate, StepsOfBothFacesSuperpose) {
-  for (const auto& [cold, hot, initial] : {std::array{280.0, 360.0, 300.0}, {350.0, 290.0, 320.0}, {360.0, 360.0, 280.0}})
+  for (const auto& [cold, hot, initial] :
+       {std::array{280.0, 360.0, 300.0}, {350.0, 290.0, 320.0}, {360.0, 360.0, 280.0}})
     for (double fourier : {0.02, 0.09, 0.11, 0.6}) {
       const HeatProfile<double> profile{fourier, cold, hot, initial, false};
       for (double x : {0.03, 0.3, 0.5, 0.9}) {
         double t = cold + (hot - cold) * x;
         for (int n = 1; n <= 60; ++n) {
           const double sign = n % 2 ? -1 : 1;
-          t += 2 / (n * M_PI) * (sign * (hot - cold) + (initial - cold) * (1 - sign)) * std::exp(-n * n * M_PI * M_PI * fourier) * std::sin(n * M_PI * x);
+          t += 2 / (n * M_PI) * (sign * (hot - cold) + (initial - cold) * (1 - sign)) *
+               std::exp(-n * n * M_PI * M_PI * fourier) * std::sin(n * M_PI * x);
         }
         EXPECT_NEAR(profile.at(x), t, 1e-9) << "Fo " << fourier << " x " << x;
       }
@@ -197,8 +204,8 @@ TEST(HeatedPlate, TimeAndDiffusivityMakeTheFourierNumber) {
   for (std::size_t i = 0; i < by_time.size(); ++i) EXPECT_NEAR(by_time.values()[i], by_number.values()[i], 1e-9);
 }
 
-// The plate of the source paper's figure 7: degrees of incidence from fringe to fringe in the middle of the picture, from the slope of
-// the phase (design note: 0.337 to 0.403, printed with three digits, +19 %).
+// The plate of the source paper's figure 7: degrees of incidence from fringe to fringe in the middle of the picture,
+// from the slope of the phase (design note: 0.337 to 0.403, printed with three digits, +19 %).
 TEST(HeatedPlate, FringesSpreadWhileThePlateWarms) {
   const Vec3<double> axis{-0.35355339, 0.35355339, -0.8660254};
   const auto phase = [&](double fourier, double kx, double ky) {
@@ -208,17 +215,20 @@ TEST(HeatedPlate, FringesSpreadWhileThePlateWarms) {
     for (int i = 0; i < kNodes; ++i) {
       const OpticalPoint<double> p = law.at((i + 0.5) / kNodes);
       const double eo = p.ordinary, de = p.extraordinary - eo, ak = axis.x * kx + axis.y * ky, kk = kx * kx + ky * ky;
-      const double a = eo + de * axis.z * axis.z, half_b = de * axis.z * ak, c = eo * kk + de * ak * ak - eo * p.extraordinary;
+      const double a = eo + de * axis.z * axis.z, half_b = de * axis.z * ak,
+                   c = eo * kk + de * ak * ak - eo * p.extraordinary;
       sum += ((std::sqrt(half_b * half_b - a * c) - half_b) / a - std::sqrt(eo - kk)) * 800.0 / kNodes;
     }
     return 2 * M_PI / 0.64 * sum;
   };
   const auto spacing_deg = [&](double fourier) {
     const double h = 1e-4;
-    const double gx = (phase(fourier, h, 0) - phase(fourier, -h, 0)) / (2 * h), gy = (phase(fourier, 0, h) - phase(fourier, 0, -h)) / (2 * h);
+    const double gx = (phase(fourier, h, 0) - phase(fourier, -h, 0)) / (2 * h),
+                 gy = (phase(fourier, 0, h) - phase(fourier, 0, -h)) / (2 * h);
     return 360 / std::hypot(gx, gy);  // d kappa = d incidence in the middle
   };
-  for (double fourier : {0.002, 0.01, 0.03, 0.1, 1.0}) std::printf("  Fo %-5g %.3f degrees\n", fourier, spacing_deg(fourier));
+  for (double fourier : {0.002, 0.01, 0.03, 0.1, 1.0})
+    std::printf("  Fo %-5g %.3f degrees\n", fourier, spacing_deg(fourier));
   EXPECT_NEAR(spacing_deg(0.002), 0.337, 0.002);
   EXPECT_NEAR(spacing_deg(1.0), 0.403, 0.002);
   EXPECT_NEAR(spacing_deg(1.0) / spacing_deg(0.002), 1.19, 0.01);

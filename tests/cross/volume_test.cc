@@ -63,15 +63,18 @@ std::shared_ptr<VolumeGrid> grid_of(const IndependentVolume& v) {
 }
 
 /// n_eff - n_o of a ray at this square of the sine of its angle with the axis.
-double seen(double n_o, double n_e, double sin_sq) { return n_o * n_e / std::sqrt(n_o * n_o * sin_sq + n_e * n_e * (1 - sin_sq)) - n_o; }
+double seen(double n_o, double n_e, double sin_sq) {
+  return n_o * n_e / std::sqrt(n_o * n_o * sin_sq + n_e * n_e * (1 - sin_sq)) - n_o;
+}
 
-// One axis everywhere is one retarder: sin^2(2 azimuth) sin^2(phase / 2), whatever the order at the nodes is called. Half the order
-// has half the birefringence.
+// One axis everywhere is one retarder: sin^2(2 azimuth) sin^2(phase / 2), whatever the order at the nodes is called.
+// Half the order has half the birefringence.
 TEST(Volume, UniformBoxIsOneRetarder) {
   const double azimuth = 0.6, tilt = 0.35;
   for (double order : {1.0, 0.5}) {
     const auto grid = grid_of(7, 6, 9, 0.9, [&](int, int, int) {
-      return director_tensor(std::cos(tilt) * std::cos(azimuth), std::cos(tilt) * std::sin(azimuth), std::sin(tilt), order);
+      return director_tensor(std::cos(tilt) * std::cos(azimuth), std::cos(tilt) * std::sin(azimuth), std::sin(tilt),
+                             order);
     });
     Sampled s = sampled(grid, 0.11, 12, 0.25);
     s.t.table[s.scene.view.rotation_deg].value = 12;
@@ -96,9 +99,10 @@ TEST(Volume, BesideTheBoxTheFieldIsOpen) {
   for (int i = 17; i <= 22; ++i) EXPECT_NEAR(image(i, 17), image(19, 19), 1e-12) << i;
 }
 
-// Ninety degrees of twist between crossed polarizers (Gooch & Tarry, J. Phys. D 8, 1575 (1975)), which is exact for a transport
-// that keeps E alone. Between two layers the interpolated axis turns a little unevenly, the same before and behind the middle:
-// the error of a layer is of fifth order in its twist, of the cell of fourth; 2^4 from one grid to the next, above 10 asked.
+// Ninety degrees of twist between crossed polarizers (Gooch & Tarry, J. Phys. D 8, 1575 (1975)), which is exact for a
+// transport that keeps E alone. Between two layers the interpolated axis turns a little unevenly, the same before and
+// behind the middle: the error of a layer is of fifth order in its twist, of the cell of fourth; 2^4 from one grid to
+// the next, above 10 asked.
 TEST(Volume, TwistedBoxIsGoochAndTarrys) {
   double before = 0;
   for (int cells : {8, 16, 32}) {
@@ -113,7 +117,8 @@ TEST(Volume, TwistedBoxIsGoochAndTarrys) {
     s.t.table[s.scene.microscope.polarizer_deg].value = 0.3 * 180 / kPi;
     s.t.table[s.scene.microscope.analyzer_deg].value = 0.3 * 180 / kPi + 90;
     const RenderPlan p = plan(s.scene, s.theta());
-    const double u = 2 * depth * 0.09 / 0.59, expected = 1 - std::pow(std::sin(0.5 * kPi * std::sqrt(1 + u * u)), 2) / (1 + u * u);
+    const double u = 2 * depth * 0.09 / 0.59,
+                 expected = 1 - std::pow(std::sin(0.5 * kPi * std::sqrt(1 + u * u)), 2) / (1 + u * u);
     const double error = std::abs(render(s.scene, p, s.theta()).intensity(1, 1) - expected);
     if (before > 0) {
       EXPECT_LT(error, before / 10) << cells;
@@ -123,7 +128,8 @@ TEST(Volume, TwistedBoxIsGoochAndTarrys) {
   EXPECT_LT(before, 1e-6);
 }
 
-/// Root mean square of the difference in crossed intensity, over rays between two distances from the middle, to the radial field's.
+/// Root mean square of the difference in crossed intensity, over rays between two distances from the middle, to the
+/// radial field's.
 double ball_error(int n, bool masked, double from_um, double to_um) {
   const double radius = 4, half_side = 4.3, dn = 0.12;
   IndependentVolume v = radial_ball(n, masked ? radius : 100, half_side);
@@ -142,15 +148,16 @@ double ball_error(int n, bool masked, double from_um, double to_um) {
       phase += 2 * kPi / 0.59 * seen(1.52, 1.52 + dn, b * b / (b * b + z * z)) * half / 1000;
     }
     const double exact = std::pow(std::sin(2 * azimuth) * std::sin(phase / 2), 2);
-    const Mat2<double> j = volume_jones(o, 1 + b * std::cos(azimuth) / 0.1, 1 - b * std::sin(azimuth) / 0.1, method, mesh);
+    const Mat2<double> j =
+        volume_jones(o, 1 + b * std::cos(azimuth) / 0.1, 1 - b * std::sin(azimuth) / 0.1, method, mesh);
     sum += square(norm(j.c) - exact);
     ++count;
   }
   return std::sqrt(sum / count);
 }
 
-// The radial field sampled on n^3 nodes. Without a mask the interpolation's error is of second order in the spacing; with one the
-// surface is smeared over a cell: first order, at both ends of every ray.
+// The radial field sampled on n^3 nodes. Without a mask the interpolation's error is of second order in the spacing;
+// with one the surface is smeared over a cell: first order, at both ends of every ray.
 TEST(Volume, RadialBallTendsToTheClosedForm) {
   double inside[3], masked[3];
   const int n[3] = {16, 32, 64};
@@ -168,15 +175,17 @@ TEST(Volume, RadialBallTendsToTheClosedForm) {
   EXPECT_GT(order(masked[0], masked[2]) / 2, 0.8);
 }
 
-// The same field by eigenvectors in closed form and complex matrices of thin slices, with any polarizers and turned in the image. It
-// leaves out what keeping H continuous adds, as e_only does. 400 slices a cell in turn: midpoints, of second order.
+// The same field by eigenvectors in closed form and complex matrices of thin slices, with any polarizers and turned in
+// the image. It leaves out what keeping H continuous adds, as e_only does. 400 slices a cell in turn: midpoints, of
+// second order.
 TEST(Volume, AgreesWithThinSlices) {
   IndependentVolume v;
   v.nx = 5, v.ny = 4, v.nz = 6;
   v.spacing_um = 0.8;
   for (int i = 0; i < v.nx * v.ny * v.nz; ++i) {
     const double tilt = 0.5 * std::sin(0.9 * i), azimuth = 0.4 * std::cos(1.3 * i) + 0.03 * i;
-    v.director.push_back({static_cast<float>(std::cos(tilt) * std::cos(azimuth)), static_cast<float>(std::cos(tilt) * std::sin(azimuth)), static_cast<float>(std::sin(tilt))});
+    v.director.push_back({static_cast<float>(std::cos(tilt) * std::cos(azimuth)),
+                          static_cast<float>(std::cos(tilt) * std::sin(azimuth)), static_cast<float>(std::sin(tilt))});
     v.inside.push_back(i % 7 != 3);
   }
   v.birefringence = 0.15;
@@ -185,8 +194,11 @@ TEST(Volume, AgreesWithThinSlices) {
   v.slices = 400;
   Sampled s = sampled(grid_of(v), 0.15, 21, 0.1);
   s.scene.ceiling = Ceiling::e_only;
-  for (const auto& [ref, value] : {std::pair{s.scene.microscope.polarizer_deg, 17.0}, {s.scene.microscope.analyzer_deg, 71.0}, {s.scene.view.rotation_deg, 25.0},
-                                   {s.scene.view.center_x_px, 10.3}, {s.scene.view.center_y_px, 9.1}})
+  for (const auto& [ref, value] : {std::pair{s.scene.microscope.polarizer_deg, 17.0},
+                                   {s.scene.microscope.analyzer_deg, 71.0},
+                                   {s.scene.view.rotation_deg, 25.0},
+                                   {s.scene.view.center_x_px, 10.3},
+                                   {s.scene.view.center_y_px, 9.1}})
     s.t.table[ref].value = value;
   RenderPlan p = plan(s.scene, s.theta());
   p.method = "magnus4";
@@ -195,13 +207,14 @@ TEST(Volume, AgreesWithThinSlices) {
   const Values<Pack> value(theta, {});
   const auto model = make_volume_model<Pack>(s.scene, p, value);
   for (int i = 0; i < 60; ++i) {
-    const double column = 4 + 12 * std::fmod(0.7548776662466927 * i, 1.0), row = 4 + 10 * std::fmod(0.5698402909980532 * i, 1.0);
+    const double column = 4 + 12 * std::fmod(0.7548776662466927 * i, 1.0),
+                 row = 4 + 10 * std::fmod(0.5698402909980532 * i, 1.0);
     // Near a crossing of eigenvalues the axis of the model is a little smoother than the exact one.
     EXPECT_NEAR(lane(model->intensity(Pack(column), Pack(row)), 0), v.point(column, row), 2e-5) << column << " " << row;
   }
 }
 
-// ---- waves -----------------------------------------------------------------------------------------------------------
+// ---- waves ---------------------------------------------------------------------------------------------------------
 
 /// Its picture by waves at NA 0.5, pixels out to 1 um beyond a sphere of that radius.
 Sampled sampled_waves(std::shared_ptr<const VolumeGrid> grid, double radius_um, double host) {
@@ -212,7 +225,8 @@ Sampled sampled_waves(std::shared_ptr<const VolumeGrid> grid, double radius_um, 
   return s;
 }
 /// The same with a droplet of that radius in place of the box.
-double error_against_droplet(const Sampled& sampled_scene, const RenderPlan& p, double radius_um, const std::function<void(Sampled&, Droplet&)>& direct) {
+double error_against_droplet(const Sampled& sampled_scene, const RenderPlan& p, double radius_um,
+                             const std::function<void(Sampled&, Droplet&)>& direct) {
   const Theta theta = sampled_scene.theta();
   const Image image = render(sampled_scene.scene, p, theta).intensity;
   Sampled exact = sampled_scene;
@@ -223,9 +237,10 @@ double error_against_droplet(const Sampled& sampled_scene, const RenderPlan& p, 
   return picture_error(image, render(exact.scene, plan(exact.scene, with_diameter), with_diameter).intensity);
 }
 
-// A radial ball on 64^3 nodes, host outside, by its exact series. Propagation is within 0.01 to 0.02 of the picture's RMS (tests/cross/split_step_test.cc). The
-// surface lies half-way between nodes 0.07 um apart where it should lie anywhere between them: an error of 0.02 um rms, of both signs over a few
-// hundred cells, so of a thousandth of a micrometre on average; where a ring is half as wide as a wavelength, another 0.01.
+// A radial ball on 64^3 nodes, host outside, by its exact series. Propagation is within 0.01 to 0.02 of the picture's
+// RMS (tests/cross/split_step_test.cc). The surface lies half-way between nodes 0.07 um apart where it should lie
+// anywhere between them: an error of 0.02 um rms, of both signs over a few hundred cells, so of a thousandth of a
+// micrometre on average; where a ring is half as wide as a wavelength, another 0.01.
 TEST(Volume, RadialBallByWavesIsItsSeries) {
   for (const double host : {1.47, 1.52, 1.6}) {
     const Sampled s = sampled_waves(grid_of(radial_ball(64, 2, 2.3)), 2, host);
@@ -236,8 +251,9 @@ TEST(Volume, RadialBallByWavesIsItsSeries) {
   }
 }
 
-// A field without symmetry, turned in the image: a bipolar droplet whose poles point 30 degrees towards the light's end. Both by propagation, so what
-// differs is the sampling; poles on the wrong side in x, y or z cost half of the picture or more.
+// A field without symmetry, turned in the image: a bipolar droplet whose poles point 30 degrees towards the light's
+// end. Both by propagation, so what differs is the sampling; poles on the wrong side in x, y or z cost half of the
+// picture or more.
 TEST(Volume, TurnedBipolarBallByWavesIsTheDroplet) {
   const double radius = 2, tilt = 30 * kPi / 180, half_side = 2.3;
   const BipolarField<double> field{{std::cos(tilt), 0.0, std::sin(tilt)}, 1.0};
@@ -261,7 +277,8 @@ TEST(Volume, TurnedBipolarBallByWavesIsTheDroplet) {
     });
   };
   const double same = bipolar(30), mirrored = bipolar(-30);
-  std::printf("bipolar on 64^3 nodes: %.4f of the picture's RMS from the droplet, %.4f from its mirror image\n", same, mirrored);
+  std::printf("bipolar on 64^3 nodes: %.4f of the picture's RMS from the droplet, %.4f from its mirror image\n", same,
+              mirrored);
   EXPECT_LT(same, 0.03);  // as the radial ball's
   EXPECT_LT(same, p.numerical_error + p.model_error);
   EXPECT_GT(mirrored, 5 * same);
@@ -306,7 +323,8 @@ TEST(Volume, WavesAreRefusedWhereSomethingIsMissing) {
   EXPECT_TRUE(refused("GB"));
 }
 
-// The planner's promise: means over pixels within the accuracy asked, where a fine sampling tells them (kinks at cell faces, too).
+// The planner's promise: means over pixels within the accuracy asked, where a fine sampling tells them (kinks at cell
+// faces, too).
 TEST(Volume, PixelMeansHoldTheAccuracy) {
   IndependentVolume v = radial_ball(24, 100, 4);
   Sampled s = sampled(grid_of(v), 0.12, 24, 0.3);
@@ -320,9 +338,10 @@ TEST(Volume, PixelMeansHoldTheAccuracy) {
   double worst = 0;
   for (int r = 0; r < 24; ++r)
     for (int c = 0; c < 24; ++c)
-      if (std::hypot(c - 11.5, r - 11.5) > 3) worst = std::max(worst, std::abs(image(c, r) - reference(c, r)));  // a defect is no place for a promise
+      // a defect is no place for a promise
+      if (std::hypot(c - 11.5, r - 11.5) > 3) worst = std::max(worst, std::abs(image(c, r) - reference(c, r)));
   EXPECT_LT(worst, 3 * s.scene.intensity_accuracy);  // measured on a few pixels of each ring
-  EXPECT_FALSE(p.left_out.empty());  // straight rays
+  EXPECT_FALSE(p.left_out.empty());                  // straight rays
 }
 
 }  // namespace

@@ -456,7 +456,8 @@ TEST(WeiNorman, ShorterSeriesErrByNoMoreThanTheirEstimate) {
           if (!report.valid || !full.valid) continue;
           ++judged;
           const double error = distance(transfer_with(form, *column, c.ray, mesh), exact) / size(exact);
-          SCOPED_TRACE(std::string(name) + (base.centred ? " exp " : " paper ") + std::to_string(layers) + " layers, order " + std::to_string(order));
+          SCOPED_TRACE(std::string(name) + (base.centred ? " exp " : " paper ") + std::to_string(layers) +
+                       " layers, order " + std::to_string(order));
           EXPECT_LE(error, report.truncation + full.truncation + 1e-11);  // phases of 1e4 rad are known to 1e-12
           if (error > 1e-9) sharpest = std::min(sharpest, report.truncation / error);
         }

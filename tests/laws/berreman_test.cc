@@ -28,9 +28,11 @@ TEST(Berreman, FluxIsConservedWithoutAbsorption) {
     const Ray<double> ray = ray_of(kx, ky);
     const double n = 1.0;
     const Mesh mesh = uniform_mesh(64);
-    const Mat2<double> t = Berreman<double>().transmission(column, ray, mesh, n), r = Berreman<double>().reflection(column, ray, mesh, n);
+    const Mat2<double> t = Berreman<double>().transmission(column, ray, mesh, n),
+                       r = Berreman<double>().reflection(column, ray, mesh, n);
     const Matrix2<double> y = isotropic_admittance<double>(n * n, std::sqrt(n * n - kx * kx - ky * ky), kx, ky);
-    for (const auto& [ex, ey] : {std::pair<Complex<double>, Complex<double>>{{1, 0}, {0, 0}}, {{0, 0}, {1, 0}}, {{0.6, 0}, {0, 0.8}}}) {
+    for (const auto& [ex, ey] :
+         {std::pair<Complex<double>, Complex<double>>{{1, 0}, {0, 0}}, {{0, 0}, {1, 0}}, {{0.6, 0}, {0, 0.8}}}) {
       const double in = flux(y, ex, ey), out = flux(y, t.a * ex + t.b * ey, t.c * ex + t.d * ey),
                    back = flux(y, r.a * ex + r.b * ey, r.c * ex + r.d * ey);
       EXPECT_NEAR((out + back) / in, 1, 1e-12);

@@ -1,5 +1,5 @@
-// The director of cells in a field: against tables of an independent quadrature and collocation (tests/data/physics), closed
-// forms with Boost's elliptic functions, thresholds, order and derivatives.
+// The director of cells in a field: against tables of an independent quadrature and collocation (tests/data/physics),
+// closed forms with Boost's elliptic functions, thresholds, order and derivatives.
 
 #include <gtest/gtest.h>
 
@@ -23,7 +23,8 @@ double at(const DirectorMesh& mesh, const std::vector<double>& nodes, double u) 
   double sum = 0;
   for (int power = mesh.degree(); power >= 0; --power) {
     double c = 0;
-    for (int j = 0; j <= mesh.degree(); ++j) c += mesh.monomial(power, j) * nodes[static_cast<std::size_t>(e * mesh.degree() + j)];
+    for (int j = 0; j <= mesh.degree(); ++j)
+      c += mesh.monomial(power, j) * nodes[static_cast<std::size_t>(e * mesh.degree() + j)];
     sum = sum * x + c;
   }
   return sum;
@@ -67,16 +68,17 @@ double retardance_ratio(const DirectorSolution& s, double n_o, double n_e) {
   for (int e = 0; e < mesh.elements(); ++e)
     for (int k = 0; k <= mesh.degree(); ++k) {
       const double t = s.tilt[static_cast<std::size_t>(e * mesh.degree() + k)], c = std::cos(t), sn = std::sin(t);
-      sum += 0.5 * mesh.width(e) * mesh.weight(k) * (n_o * n_e / std::sqrt(n_e * n_e * sn * sn + n_o * n_o * c * c) - n_o);
+      sum +=
+          0.5 * mesh.width(e) * mesh.weight(k) * (n_o * n_e / std::sqrt(n_e * n_e * sn * sn + n_o * n_o * c * c) - n_o);
     }
   return sum / (n_e - n_o);
 }
 
-// ---- tables of an independent computation --------------------------------------------------------------------------------
+// ---- tables of an independent computation --------------------------------------------------------------------------
 
-// Printed to 12 decimals (m), 9 to 10 digits (1 - m, slope) and 9 decimals (retardance). Deuling's integrals against this
-// boundary-value solver; its own error, from a mesh twice as fine, stays below 6e-9 rad up to five times the threshold: in the
-// middle, where the slope of m = sin^2 t vanishes as the director saturates, below 1e-11 in m.
+// Printed to 12 decimals (m), 9 to 10 digits (1 - m, slope) and 9 decimals (retardance). Deuling's integrals against
+// this boundary-value solver; its own error, from a mesh twice as fine, stays below 6e-9 rad up to five times the
+// threshold: in the middle, where the slope of m = sin^2 t vanishes as the director saturates, below 1e-11 in m.
 TEST(Equilibrium, PlanarCellsAgreeWithDeulingsIntegrals) {
   const ReferenceTable table(data_path("physics/freedericksz_planar.csv"));
   for (std::size_t row = 0; row < table.size(); ++row) {
@@ -88,18 +90,21 @@ TEST(Equilibrium, PlanarCellsAgreeWithDeulingsIntegrals) {
     EXPECT_NEAR(m, table.number(row, "sin2_thetam"), 1.1e-11) << name << " " << v;
     const double rest = table.number(row, "one_minus_sin2_thetam");
     EXPECT_NEAR(std::cos(t) * std::cos(t), rest, 1e-11 + 5e-8 * rest) << name << " " << v;
-    EXPECT_NEAR(retardance_ratio(s, 1.522, 1.739), table.number(row, "retardance_ratio_no1.522_ne1.739"), 1.1e-9) << name << " " << v;
+    EXPECT_NEAR(retardance_ratio(s, 1.522, 1.739), table.number(row, "retardance_ratio_no1.522_ne1.739"), 1.1e-9)
+        << name << " " << v;
     // d m / d v from the implicit-function theorem.
-    CellForces<Dual<double, 1>> d{p.k33, p.k22, p.gamma, p.drive, p.chirality, p.tilt_entry, p.tilt_exit, p.twist, false};
+    CellForces<Dual<double, 1>> d{p.k33,        p.k22,       p.gamma, p.drive, p.chirality,
+                                  p.tilt_entry, p.tilt_exit, p.twist, false};
     d.drive.d[0] = 2 * kPi * kPi * v;
     std::vector<std::array<double, 1>> tilt, azimuth;
     director_tangents<1>(d, cell_mesh(), s, tilt, azimuth);
     std::vector<double> slope;
     for (const auto& x : tilt) slope.push_back(x[0]);
     const double expected = table.number(row, "dsin2_dV");
-    // The table's slope is a difference: at v = 1.001 of the E7-like case Deuling's integral, differentiated with 30 digits, gives
-    // 0.9439682906, this solver the same, the table 0.943968310.
-    EXPECT_NEAR(std::sin(2 * t) * at(cell_mesh(), slope, 0.5), expected, 3e-8 * std::abs(expected) + 2e-9) << name << " " << v;
+    // The table's slope is a difference: at v = 1.001 of the E7-like case Deuling's integral, differentiated with 30
+    // digits, gives 0.9439682906, this solver the same, the table 0.943968310.
+    EXPECT_NEAR(std::sin(2 * t) * at(cell_mesh(), slope, 0.5), expected, 3e-8 * std::abs(expected) + 2e-9)
+        << name << " " << v;
   }
 }
 
@@ -109,7 +114,9 @@ TEST(Equilibrium, PlanarProfilesAgree) {
     const std::string name = table.text(row, "case");
     const double v = table.number(row, "V_over_Vth");
     // 9 decimals; the solver's own error above.
-    EXPECT_NEAR(tilt_at(solve_director(case_of(name, v)), table.number(row, "y_over_d")), table.number(row, "theta_rad"), 6e-9) << name << " " << v;
+    EXPECT_NEAR(tilt_at(solve_director(case_of(name, v)), table.number(row, "y_over_d")),
+                table.number(row, "theta_rad"), 6e-9)
+        << name << " " << v;
   }
 }
 
@@ -118,7 +125,8 @@ TEST(Equilibrium, PretiltedCellsAgreeOnBothSidesOfTheThreshold) {
   const ReferenceTable table(data_path("physics/freedericksz_pretilt.csv"));
   for (std::size_t row = 0; row < table.size(); ++row) {
     const double v = table.number(row, "V_over_Vth"), pretilt = table.number(row, "pretilt_deg");
-    EXPECT_NEAR(tilt_at(solve_director(e7(v, pretilt)), 0.5), table.number(row, "theta_mid_rad"), 1.2e-8) << pretilt << " " << v;
+    EXPECT_NEAR(tilt_at(solve_director(e7(v, pretilt)), 0.5), table.number(row, "theta_mid_rad"), 1.2e-8)
+        << pretilt << " " << v;
   }
 }
 
@@ -138,14 +146,16 @@ TEST(Equilibrium, TwistedNematicProfilesAgree) {
 TEST(Equilibrium, HybridCellsAgree) {
   const ReferenceTable table(data_path("physics/han.csv"));
   for (std::size_t row = 0; row < table.size(); ++row) {
-    CellForces<double> p = table.text(row, "case").starts_with("one") ? one_constant(table.number(row, "V_over_Vth_planar")) : e7(0);
+    CellForces<double> p =
+        table.text(row, "case").starts_with("one") ? one_constant(table.number(row, "V_over_Vth_planar")) : e7(0);
     p.tilt_exit = kPi / 2;
     // 10 decimals
-    EXPECT_NEAR(tilt_at(solve_director(p), table.number(row, "y_over_d")), table.number(row, "theta_rad"), 1.5e-10) << table.text(row, "case");
+    EXPECT_NEAR(tilt_at(solve_director(p), table.number(row, "y_over_d")), table.number(row, "theta_rad"), 1.5e-10)
+        << table.text(row, "case");
   }
 }
 
-// ---- closed forms --------------------------------------------------------------------------------------------------------
+// ---- closed forms --------------------------------------------------------------------------------------------------
 
 // One constant, uniform field: sin t = sqrt(m) sn(2 K zeta), v = 2 K / pi.
 TEST(Equilibrium, OneConstantIsTheEllipticSine) {
@@ -160,14 +170,15 @@ TEST(Equilibrium, OneConstantIsTheEllipticSine) {
   }
 }
 
-// Below the threshold nothing moves without a pretilt; linear in the pretilt otherwise, t = tp cos(pi v (zeta - 1/2)) / cos(pi v / 2),
-// the cubic term being of order (6e-6)^2 / (1 - v).
+// Below the threshold nothing moves without a pretilt; linear in the pretilt otherwise, t = tp cos(pi v (zeta - 1/2)) /
+// cos(pi v / 2), the cubic term being of order (6e-6)^2 / (1 - v).
 TEST(Equilibrium, BelowTheThresholdTheResponseIsLinearInThePretilt) {
   EXPECT_EQ(tilt_at(solve_director(e7(0.99)), 0.5), 0.0);
   for (double v : {0.3, 0.9}) {
     const double pretilt_deg = 1e-6 / kDeg;
     for (double zeta : {0.1, 0.5})
-      EXPECT_NEAR(tilt_at(solve_director(e7(v, pretilt_deg)), zeta) / 1e-6, std::cos(kPi * v * (zeta - 0.5)) / std::cos(kPi * v / 2), 1e-8);
+      EXPECT_NEAR(tilt_at(solve_director(e7(v, pretilt_deg)), zeta) / 1e-6,
+                  std::cos(kPi * v * (zeta - 0.5)) / std::cos(kPi * v / 2), 1e-8);
   }
 }
 
@@ -183,8 +194,8 @@ TEST(Equilibrium, HomeotropicCellsMirrorPlanarOnes) {
   for (double u : {0.05, 0.3, 0.5}) EXPECT_NEAR(tilt_at(a, u), kPi / 2 - tilt_at(b, u), 1e-11);
 }
 
-// Leslie's threshold: eps0 deps Vth^2 / K11 = pi^2 + (k33 - 2 k22) Phi^2 + 4 pi k22 (d/p) Phi. Just above it m grows from
-// zero in proportion to the excess; from two voltages a straight line finds it, its curvature leaving 1e-7.
+// Leslie's threshold: eps0 deps Vth^2 / K11 = pi^2 + (k33 - 2 k22) Phi^2 + 4 pi k22 (d/p) Phi. Just above it m grows
+// from zero in proportion to the excess; from two voltages a straight line finds it, its curvature leaving 1e-7.
 TEST(Equilibrium, TwistedCellsHaveLesliesThreshold) {
   for (double pitch_ratio : {0.0, 0.1, -0.05}) {
     const auto m_at = [&](double drive) {
@@ -194,7 +205,8 @@ TEST(Equilibrium, TwistedCellsHaveLesliesThreshold) {
       return std::pow(std::sin(tilt_at(solve_director(p), 0.5)), 2);
     };
     const CellForces<double> e = twisted_e7(0, 0);
-    const double threshold = kPi * kPi + (e.k33 - 2 * e.k22) * e.twist * e.twist + 4 * kPi * e.k22 * pitch_ratio * e.twist;
+    const double threshold =
+        kPi * kPi + (e.k33 - 2 * e.k22) * e.twist * e.twist + 4 * kPi * e.k22 * pitch_ratio * e.twist;
     EXPECT_LT(m_at(threshold * (1 - 1e-4)), 1e-16);
     const double h = 1e-4 * threshold, near = m_at(threshold + h), far = m_at(threshold + 2 * h);
     EXPECT_NEAR(threshold + h - near * h / (far - near), threshold, 1e-7 * threshold) << pitch_ratio;
@@ -217,7 +229,8 @@ TEST(Equilibrium, FirstIntegralOfTheTwistIsConstant) {
   double low = 1e9, high = -1e9;
   for (int i = 0; i < 97; ++i) {
     const double u = 0.02 + 0.01 * i, h = 1e-5;
-    const double rate = (azimuth_at(s, u + h) - azimuth_at(s, u - h)) / (2 * h), c2 = std::pow(std::cos(tilt_at(s, u)), 2);
+    const double rate = (azimuth_at(s, u + h) - azimuth_at(s, u - h)) / (2 * h),
+                 c2 = std::pow(std::cos(tilt_at(s, u)), 2);
     const double torque = c2 * (p.k22 * c2 + p.k33 * (1 - c2)) * rate - p.k22 * p.chirality * c2;
     low = std::min(low, torque);
     high = std::max(high, torque);
@@ -234,7 +247,7 @@ TEST(Equilibrium, TiltsTheWayThePretiltPoints) {
   }
 }
 
-// ---- the discretisation --------------------------------------------------------------------------------------------------
+// ---- the discretisation --------------------------------------------------------------------------------------------
 
 TEST(Equilibrium, ErrorOfTheProfileFallsWithTheDeclaredOrder) {
   for (int degree : {3, 4}) {
@@ -244,7 +257,8 @@ TEST(Equilibrium, ErrorOfTheProfileFallsWithTheDeclaredOrder) {
       const DirectorMesh mesh(elements, degree);
       const DirectorSolution s = solve_director(p, mesh);
       double worst = 0;
-      for (int i = 0; i <= 400; ++i) worst = std::max(worst, std::abs(at(mesh, s.tilt, i / 400.0) - tilt_at(exact, i / 400.0)));
+      for (int i = 0; i <= 400; ++i)
+        worst = std::max(worst, std::abs(at(mesh, s.tilt, i / 400.0) - tilt_at(exact, i / 400.0)));
       return worst;
     };
     // Of the least order observed over two halvings: 0.3 for what is not yet asymptotic.
@@ -254,18 +268,20 @@ TEST(Equilibrium, ErrorOfTheProfileFallsWithTheDeclaredOrder) {
   }
 }
 
-// The figures that equilibrium.h states of the mesh all cells use, against one of twice as many elements and higher degree.
+// The figures that equilibrium.h states of the mesh all cells use, against one of twice as many elements and higher
+// degree.
 TEST(Equilibrium, MeshOfAllCellsHoldsItsStatedError) {
   const DirectorMesh fine(32, 12);
   for (const auto& [v, most] : {std::pair{3.0, 1e-9}, {10.0, 1e-7}, {20.0, 1e-6}, {50.0, 1e-4}}) {
     const DirectorSolution s = solve_director(e7(v, 1)), exact = solve_director(e7(v, 1), fine);
     double worst = 0;
-    for (int i = 0; i <= 2000; ++i) worst = std::max(worst, std::abs(tilt_at(s, i / 2000.0) - at(fine, exact.tilt, i / 2000.0)));
+    for (int i = 0; i <= 2000; ++i)
+      worst = std::max(worst, std::abs(tilt_at(s, i / 2000.0) - at(fine, exact.tilt, i / 2000.0)));
     EXPECT_LT(worst, most) << v;
   }
 }
 
-// ---- derivatives ---------------------------------------------------------------------------------------------------------
+// ---- derivatives ---------------------------------------------------------------------------------------------------
 
 // Every number of the forces, by Richardson's differences of the solution itself (1e-8 with steps of 1e-4).
 TEST(Equilibrium, TangentsAgreeWithDifferences) {
@@ -278,9 +294,12 @@ TEST(Equilibrium, TangentsAgreeWithDifferences) {
       const auto member = [&](auto& forces) -> auto& {
         using F = std::remove_reference_t<decltype(forces)>;
         (void)sizeof(F);
-        return *std::array{&forces.k33, &forces.k22, &forces.gamma, &forces.drive, &forces.chirality, &forces.tilt_entry, &forces.tilt_exit, &forces.twist}[static_cast<std::size_t>(which)];
+        return *std::array{
+            &forces.k33,       &forces.k22,        &forces.gamma,     &forces.drive,
+            &forces.chirality, &forces.tilt_entry, &forces.tilt_exit, &forces.twist}[static_cast<std::size_t>(which)];
       };
-      CellForces<Dual<double, 1>> d{p.k33, p.k22, p.gamma, p.drive, p.chirality, p.tilt_entry, p.tilt_exit, p.twist, true};
+      CellForces<Dual<double, 1>> d{p.k33,        p.k22,       p.gamma, p.drive, p.chirality,
+                                    p.tilt_entry, p.tilt_exit, p.twist, true};
       member(d).d[0] = 1;
       std::vector<std::array<double, 1>> tilt, azimuth;
       director_tangents<1>(d, cell_mesh(), s, tilt, azimuth);
@@ -293,8 +312,11 @@ TEST(Equilibrium, TangentsAgreeWithDifferences) {
       const DirectorSolution a = moved(h), b = moved(-h), a2 = moved(h / 2), b2 = moved(-h / 2);
       double size = 0, error = 0;
       for (std::size_t i = 0; i < tilt.size(); ++i) {
-        const auto slope = [&](const auto& x, const auto& y, const auto& x2, const auto& y2) { return (8 * (x2[i] - y2[i]) - (x[i] - y[i])) / (6 * h); };
-        const double by_tilt = slope(a.tilt, b.tilt, a2.tilt, b2.tilt), by_azimuth = slope(a.azimuth, b.azimuth, a2.azimuth, b2.azimuth);
+        const auto slope = [&](const auto& x, const auto& y, const auto& x2, const auto& y2) {
+          return (8 * (x2[i] - y2[i]) - (x[i] - y[i])) / (6 * h);
+        };
+        const double by_tilt = slope(a.tilt, b.tilt, a2.tilt, b2.tilt),
+                     by_azimuth = slope(a.azimuth, b.azimuth, a2.azimuth, b2.azimuth);
         size = std::max({size, std::abs(by_tilt), std::abs(by_azimuth)});
         error = std::max({error, std::abs(by_tilt - tilt[i][0]), std::abs(by_azimuth - azimuth[i][0])});
       }
@@ -303,7 +325,7 @@ TEST(Equilibrium, TangentsAgreeWithDifferences) {
   }
 }
 
-// ---- optics of the profile -----------------------------------------------------------------------------------------------
+// ---- optics of the profile -----------------------------------------------------------------------------------------
 
 // Without pretilt the retardance has a kink at the threshold: flat below, falling above with the slope of the amplitude
 // equation, d(G/G0)/dv = -n_e (n_e + n_o) / (2 n_o^2) * 2 / (1 + k + g), k = k33 - 1.
@@ -316,7 +338,7 @@ TEST(Equilibrium, RetardanceHasAKinkAtTheThreshold) {
   EXPECT_NEAR((retardance_ratio(solve_director(e7(1 + h)), n_o, n_e) - 1) / h, slope, 1e-3 * std::abs(slope));
 }
 
-// ---- the unwound helix ---------------------------------------------------------------------------------------------------
+// ---- the unwound helix ---------------------------------------------------------------------------------------------
 
 TEST(Helix, PitchGrowsAsTheFieldUnwindsIt) {
   const ReferenceTable table(data_path("physics/cholesteric_unwinding.csv"));

@@ -30,7 +30,8 @@ void expect_same(const Jet& jet, const D3& dual, double phase_rad, const std::st
   for (int i = 0; i < 3; ++i) size = std::max(size, std::abs(jet.v[i]));
   const double tolerance = 1e-12 * (1 + phase_rad / 100) * std::max(size, 1e-3);
   EXPECT_NEAR(jet.a, dual.value, tolerance) << what;
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(jet.v[i], dual.d[static_cast<std::size_t>(i)], tolerance) << what << " d" << i;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(jet.v[i], dual.d[static_cast<std::size_t>(i)], tolerance) << what << " d" << i;
 }
 
 template <class S>
@@ -53,8 +54,9 @@ std::array<S, 6> radial_sample(double u, bool twisted) {
   const S half = sqrt(radius * radius - impact * impact);
   const Chord<S> chord(impact, half, radius);
   const S eo(1.52 * 1.52), ee = n_e * n_e;
-  const OpticalPoint<S> p = twisted ? TwistedRadialLaw<S>{chord, S(0.1), S(std::sqrt(0.99)), impact * S(0.4), eo, ee}.at(S(u))
-                                    : RadialLaw<S>{chord, eo, ee}.at(S(u));
+  const OpticalPoint<S> p =
+      twisted ? TwistedRadialLaw<S>{chord, S(0.1), S(std::sqrt(0.99)), impact * S(0.4), eo, ee}.at(S(u))
+              : RadialLaw<S>{chord, eo, ee}.at(S(u));
   const Vec3<S> v = su2_generator(p, S(10.6));
   return {p.axis.x, p.axis.y, p.axis.z, p.depth_slope_um, v.x, v.z};
 }
@@ -65,7 +67,8 @@ TEST(Gradients, RadialAndTwistedRadialLawsAgreeWithJets) {
       const auto jets = radial_sample<Jet>(u, twisted);
       const auto duals = radial_sample<D3>(u, twisted);
       for (std::size_t i = 0; i < 6; ++i)
-        expect_same(jets[i], duals[i], 20, (twisted ? "twisted " : "radial ") + std::to_string(i) + " u " + std::to_string(u));
+        expect_same(jets[i], duals[i], 20,
+                    (twisted ? "twisted " : "radial ") + std::to_string(i) + " u " + std::to_string(u));
     }
 }
 
@@ -74,8 +77,8 @@ std::array<S, 8> oblique_operator(double kx, double ky) {
   const S azimuth = variable<S>(0.4, 0), tilt = variable<S>(0.5, 1), n_e = variable<S>(1.74, 2);
   const OpticalPoint<S> p = TwistedLaw<S>{azimuth, S(1.2), tilt, S(1.52 * 1.52), n_e * n_e, S(5.0)}.at(S(0.3));
   const auto m = one_way(p, S(kx), S(ky));
-  return {m.index.a.re, m.index.b.re, m.index.c.re, m.index.d.re, m.admittance.a.re, m.admittance.b.re,
-          m.admittance.c.re, m.admittance.d.re};
+  return {m.index.a.re,      m.index.b.re,      m.index.c.re,      m.index.d.re,
+          m.admittance.a.re, m.admittance.b.re, m.admittance.c.re, m.admittance.d.re};
 }
 
 TEST(Gradients, ObliqueOperatorAgreesWithJets) {
@@ -100,7 +103,7 @@ TEST(Gradients, StepExponentialAgreesWithJetsThroughZero) {
   }
 }
 
-// ---- whole images ------------------------------------------------------------------------------------------------------
+// ---- whole images --------------------------------------------------------------------------------------------------
 
 struct Case {
   std::string name;
@@ -154,10 +157,13 @@ std::vector<Case> cases() {
     all.push_back(c);
   }
   for (int kind = 0; kind < 4; ++kind) {
-    Case c = base(std::array{"bipolar droplet", "droplet in a field in the image plane", "shell", "eccentric shell"}[static_cast<std::size_t>(kind)]);
+    Case c = base(std::array{"bipolar droplet", "droplet in a field in the image plane", "shell",
+                             "eccentric shell"}[static_cast<std::size_t>(kind)]);
     Droplet d;
     d.diameter_um = c.t.fixed("diameter_um", 16);
-    if (kind == 0) d.director = BipolarDirector{c.t.fixed("azimuth_deg", 20), c.t.fixed("tilt_deg", 30), c.t.fixed("pole_distance", 1.2)};
+    if (kind == 0)
+      d.director =
+          BipolarDirector{c.t.fixed("azimuth_deg", 20), c.t.fixed("tilt_deg", 30), c.t.fixed("pole_distance", 1.2)};
     if (kind == 1) {
       AxialDirector axial;
       axial.reduced_field = c.t.fixed("reduced_field", 7);
@@ -214,7 +220,9 @@ std::vector<Case> cases() {
     c.scene.sample = cell;
     return c;
   };
-  const auto field_of = [](Case& c) -> FreederickszDirector& { return std::get<FreederickszDirector>(std::get<Cell>(c.scene.sample).director); };
+  const auto field_of = [](Case& c) -> FreederickszDirector& {
+    return std::get<FreederickszDirector>(std::get<Cell>(c.scene.sample).director);
+  };
   all.push_back(field_cell("planar cell below its threshold", Anchoring::planar, 3.7, 0.9));
   all.push_back(field_cell("planar cell above its threshold", Anchoring::planar, 3.7, 1.05));
   all.push_back(field_cell("homeotropic cell", Anchoring::homeotropic, 0.5, 1.3));
@@ -258,7 +266,8 @@ std::vector<Case> cases() {
     Plate plate;
     plate.thickness_um = c.t.fixed("thickness_um", 60);
     for (int i = 0; i < 3; ++i)
-      plate.director.axis[static_cast<std::size_t>(i)] = c.t.fixed("axis" + std::to_string(i), std::array{-0.35, 0.35, -0.87}[static_cast<std::size_t>(i)]);
+      plate.director.axis[static_cast<std::size_t>(i)] =
+          c.t.fixed("axis" + std::to_string(i), std::array{-0.35, 0.35, -0.87}[static_cast<std::size_t>(i)]);
     HeatStep heat;
     heat.fourier_number = c.t.fixed("fourier_number", 0.07);
     heat.cold_k = c.t.fixed("cold_k", 278);
@@ -270,7 +279,8 @@ std::vector<Case> cases() {
     all.push_back(c);
     Case side = c;
     side.name = "heated plate, its screen seen from the side";
-    side.scene.view.camera = SideCamera{side.t.fixed("tilt_x_deg", 30), side.t.fixed("tilt_y_deg", -15), side.t.fixed("half_field_deg", 25)};
+    side.scene.view.camera =
+        SideCamera{side.t.fixed("tilt_x_deg", 30), side.t.fixed("tilt_y_deg", -15), side.t.fixed("half_field_deg", 25)};
     all.push_back(side);
     side.name = "heated plate, seen from in front by a camera that may move";
     for (const char* tilt : {"tilt_x_deg", "tilt_y_deg"}) side.t.table[side.t.table.find(tilt)].value = 0;
@@ -289,7 +299,8 @@ std::vector<Case> cases() {
     slab.profile.interpolation = SlabProfile::Interpolation::cubic;
     for (int i = 0; i < 6; ++i) {
       const double u = i / 5.0;
-      slab.profile.rows.push_back({250 * u, std::cos(0.3 + 0.5 * u), std::sin(0.3 + 0.5 * u), 0.4 + 0.2 * u, 1.52, 1.7 + 0.02 * u, 0, 2e-4 * u});
+      slab.profile.rows.push_back({250 * u, std::cos(0.3 + 0.5 * u), std::sin(0.3 + 0.5 * u), 0.4 + 0.2 * u, 1.52,
+                                   1.7 + 0.02 * u, 0, 2e-4 * u});
     }
     slab.half_angle_deg = c.t.fixed("half_angle_deg", 2);
     c.scene.sample = slab;
@@ -306,25 +317,31 @@ std::vector<Case> cases() {
     all.push_back(c);
   }
   {
-    // Every number of the laws of materials: wavelength (in the indices too), temperature, clearing point, coefficients.
+    // Every number of the laws of materials: wavelength (in the indices too), temperature, clearing point,
+    // coefficients.
     Case c = base("nematic droplet in a liquid of known dispersion");
     Droplet d;
     d.diameter_um = c.t.fixed("diameter_um", 16);
     c.scene.sample = d;
-    const auto law = [&](const std::string& name, Dispersion::Form form, std::vector<double> coefficients, std::vector<int> fitted) {
+    const auto law = [&](const std::string& name, Dispersion::Form form, std::vector<double> coefficients,
+                         std::vector<int> fitted) {
       Dispersion r;
       r.form = form;
       r.coefficients = coefficients;
       r.refs.resize(coefficients.size());
-      for (int i : fitted) r.refs[static_cast<std::size_t>(i)] = c.t.fixed(name + std::to_string(i), coefficients[static_cast<std::size_t>(i)]);
+      for (int i : fitted)
+        r.refs[static_cast<std::size_t>(i)] =
+            c.t.fixed(name + std::to_string(i), coefficients[static_cast<std::size_t>(i)]);
       r.lower_um = 0.4;
       r.upper_um = 0.8;
       return r;
     };
     LawIndices m;
-    m.indices = DispersiveIndices{law("cauchy", Dispersion::Form::cauchy, {1.5139, 0.0052, -2, 0.0008, -4.5}, {0, 1, 3}),
-                                  law("sellmeier", Dispersion::Form::sellmeier_2, {0, 1.83, 0.018}, {1, 2})};
-    m.haller = HallerLaw{c.t.fixed("reference_k", 298), c.t.fixed("clearing_k", 309), c.t.fixed("exponent", 0.17), c.t.fixed("slope", 2e-4)};
+    m.indices =
+        DispersiveIndices{law("cauchy", Dispersion::Form::cauchy, {1.5139, 0.0052, -2, 0.0008, -4.5}, {0, 1, 3}),
+                          law("sellmeier", Dispersion::Form::sellmeier_2, {0, 1.83, 0.018}, {1, 2})};
+    m.haller = HallerLaw{c.t.fixed("reference_k", 298), c.t.fixed("clearing_k", 309), c.t.fixed("exponent", 0.17),
+                         c.t.fixed("slope", 2e-4)};
     m.temperature_k = c.t.fixed("temperature_k", 304);
     m.birefringence_factor = c.t.fixed("factor", 1.05);
     c.scene.material = m;
@@ -344,15 +361,18 @@ std::vector<Case> cases() {
     plate.director.azimuth_deg = c.t.fixed("azimuth_deg", 40);
     plate.director.tilt_deg = c.t.fixed("tilt_deg", 35);
     HeatStep heat;
-    heat.fourier_number = c.t.fixed("fourier_number", 0.07), heat.cold_k = c.t.fixed("cold_k", 290), heat.hot_k = c.t.fixed("hot_k", 304);
+    heat.fourier_number = c.t.fixed("fourier_number", 0.07), heat.cold_k = c.t.fixed("cold_k", 290),
+    heat.hot_k = c.t.fixed("hot_k", 304);
     plate.heat = heat;
     plate.half_angle_deg = c.t.fixed("half_angle_deg", 15);
     c.scene.sample = plate;
     LawIndices m;
     FourParameterIndices four;
-    for (const auto& [um, a, b, dn, e, k] : {std::tuple{0.589, 1.6327, 1.347e-4, 0.3261, 0.1645, 308.74}, {0.633, 1.6238, 1.204e-4, 0.3185, 0.1650, 308.77}}) {
+    for (const auto& [um, a, b, dn, e, k] : {std::tuple{0.589, 1.6327, 1.347e-4, 0.3261, 0.1645, 308.74},
+                                             {0.633, 1.6238, 1.204e-4, 0.3185, 0.1650, 308.77}}) {
       const std::string name = "set" + std::to_string(um);
-      four.sets.push_back({um, c.t.fixed(name + "a", a), c.t.fixed(name + "b", b), c.t.fixed(name + "dn", dn), c.t.fixed(name + "e", e), c.t.fixed(name + "k", k)});
+      four.sets.push_back({um, c.t.fixed(name + "a", a), c.t.fixed(name + "b", b), c.t.fixed(name + "dn", dn),
+                           c.t.fixed(name + "e", e), c.t.fixed(name + "k", k)});
     }
     m.indices = four;
     m.birefringence_factor = c.t.fixed("factor", 0.95);
@@ -369,7 +389,8 @@ std::vector<Case> cases() {
     disc.stress_optic_brewster = c.t.fixed("stress_optic_brewster", 30);
     disc.load_azimuth_deg = c.t.fixed("load_azimuth_deg", 70);
     disc.residual_normal_mpa = {c.t.fixed("n1", 0.5), c.t.fixed("nx", 0.4), c.t.fixed("ny", -0.3)};
-    disc.residual_shear_mpa = {c.t.fixed("s1", -0.2), c.t.fixed("sx", 0.1), c.t.fixed("sy", 0.3), c.t.fixed("sxx", 0.6)};
+    disc.residual_shear_mpa = {c.t.fixed("s1", -0.2), c.t.fixed("sx", 0.1), c.t.fixed("sy", 0.3),
+                               c.t.fixed("sxx", 0.6)};
     c.scene.sample = disc;
     c.scene.microscope.quarter_wave = circular;
     all.push_back(c);
@@ -382,14 +403,17 @@ std::vector<Case> cases() {
   for (const std::string name : {"sampled field", "sampled field, E alone", "waves: sampled field"}) {
     Case c = base(name);
     const bool waves = name.starts_with("waves");
-    // One cell across, larger than the picture (waves: smaller): no face, where trilinear interpolation has a kink, is crossed by a difference.
+    // One cell across, larger than the picture (waves: smaller): no face, where trilinear interpolation has a kink, is
+    // crossed by a difference.
     auto grid = std::make_shared<VolumeGrid>();
     grid->nx = grid->ny = 2, grid->nz = 6;
     grid->spacing_um = {14, 15, 0.8};
     if (waves) grid->spacing_um = {3.1, 2.7, 0.7};
     for (int i = 0; i < 24; ++i) {
-      const double tilt = 0.4 * std::sin(1.1 * i), azimuth = 0.5 * std::cos(0.7 * i) + 0.04 * i, s = 0.8 + 0.2 * std::sin(2.3 * i);
-      grid->nodes.push_back(director_tensor(std::cos(tilt) * std::cos(azimuth), std::cos(tilt) * std::sin(azimuth), std::sin(tilt), s));
+      const double tilt = 0.4 * std::sin(1.1 * i), azimuth = 0.5 * std::cos(0.7 * i) + 0.04 * i,
+                   s = 0.8 + 0.2 * std::sin(2.3 * i);
+      grid->nodes.push_back(
+          director_tensor(std::cos(tilt) * std::cos(azimuth), std::cos(tilt) * std::sin(azimuth), std::sin(tilt), s));
     }
     SampledVolume volume;
     volume.grid = grid;
@@ -405,7 +429,8 @@ std::vector<Case> cases() {
     all.push_back(c);
   }
   // Wave optics: the exact series of a ball and of a shell, and propagation through what has none.
-  for (const std::string name : {"waves: series", "waves: series of a shell", "waves: twisted", "waves: bipolar", "waves: hedgehog in a field", "waves: eccentric shell"}) {
+  for (const std::string name : {"waves: series", "waves: series of a shell", "waves: twisted", "waves: bipolar",
+                                 "waves: hedgehog in a field", "waves: eccentric shell"}) {
     Case c = base(name);
     c.scene.ceiling = Ceiling::wave;
     c.scene.microscope.objective_na = 0.6;
@@ -414,7 +439,9 @@ std::vector<Case> cases() {
     Droplet d;
     d.diameter_um = c.t.fixed("diameter_um", 5);
     if (name == "waves: twisted") d.director = RadialDirector{c.t.fixed("twist_deg", 40)};
-    if (name == "waves: bipolar") d.director = BipolarDirector{c.t.fixed("azimuth_deg", 25), c.t.fixed("tilt_deg", 20), c.t.fixed("pole_distance", 1.2)};
+    if (name == "waves: bipolar")
+      d.director =
+          BipolarDirector{c.t.fixed("azimuth_deg", 25), c.t.fixed("tilt_deg", 20), c.t.fixed("pole_distance", 1.2)};
     if (name == "waves: hedgehog in a field") {
       AxialDirector axial;
       axial.reduced_field = c.t.fixed("reduced_field", 6);
@@ -424,7 +451,8 @@ std::vector<Case> cases() {
       ShellDirector shell;
       shell.wall_um = c.t.fixed("wall_um", 0.9);
       shell.core_index = c.t.fixed("core_index", 1.38);
-      if (name == "waves: eccentric shell") shell.offset_um = {c.t.fixed("offset_x", 0.3), c.t.fixed("offset_y", -0.2), c.t.fixed("offset_z", 0.1)};
+      if (name == "waves: eccentric shell")
+        shell.offset_um = {c.t.fixed("offset_x", 0.3), c.t.fixed("offset_y", -0.2), c.t.fixed("offset_z", 0.1)};
       d.director = shell;
     }
     c.scene.sample = d;
@@ -452,7 +480,8 @@ TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
   for (Case& c : cases()) {
     const Theta theta = c.t.table.values();
     RenderPlan p = plan(c.scene, theta, c.observable);
-    // Points that go from one part of a table to another jump by a little of the accuracy (PolarTable and RadialTable look at that).
+    // Points that go from one part of a table to another jump by a little of the accuracy (PolarTable and RadialTable
+    // look at that).
     p.disc.clear();
     if (c.scene.ceiling != Ceiling::wave) p.radial_panels = 0;
     std::vector<int> active;
@@ -461,14 +490,16 @@ TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
     bool any = false;
     for (std::size_t k = 0; k < active.size(); ++k) {
       const int i = active[k];
-      // Surfaces of propagated spheres are ramps a third of a wavelength thick whose second derivative jumps: differences must be short beside that.
+      // Surfaces of propagated spheres are ramps a third of a wavelength thick whose second derivative jumps:
+      // differences must be short beside that.
       const double longest = (p.wave ? 1e-5 : 5e-5) * std::max(0.1, std::abs(theta[static_cast<std::size_t>(i)]));
       const auto at = [&](double step) {
         Theta moved = theta;
         moved[static_cast<std::size_t>(i)] += step;
         return render(c.scene, p, moved, {}, 1).intensity;
       };
-      // A pixel is wrong by both steps or not at all: a kink near one of its points lies within the longer and not within the shorter.
+      // A pixel is wrong by both steps or not at all: a kink near one of its points lies within the longer and not
+      // within the shorter.
       std::vector<double> error(r.intensity.size(), std::numeric_limits<double>::infinity());
       for (const double h : {longest, longest / 4}) {
         const Image a = at(h), b = at(-h), a2 = at(h / 2), b2 = at(-h / 2);
@@ -481,7 +512,8 @@ TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
         }
         // 1e-11/h: rounding of the differences.
         for (std::size_t j = 0; j < a.size(); ++j)
-          error[j] = std::min(error[j], std::abs(exact.values()[j] - r.derivatives[k].values()[j]) / (1e-6 * size + 1e-11 / h));
+          error[j] = std::min(error[j],
+                              std::abs(exact.values()[j] - r.derivatives[k].values()[j]) / (1e-6 * size + 1e-11 / h));
         any = any || size > 1e-6;
       }
       EXPECT_LT(*std::max_element(error.begin(), error.end()), 1) << c.name << ", " << c.t.table[i].name;

@@ -17,15 +17,17 @@ namespace {
 using namespace testing;
 using study::relative_distance;
 
-Ray<double> ray_of(const study::RaySpec& spec, Continuity c) { return {2 * std::numbers::pi / spec.wavelength_um, spec.kx, spec.ky, c}; }
+Ray<double> ray_of(const study::RaySpec& spec, Continuity c) {
+  return {2 * std::numbers::pi / spec.wavelength_um, spec.kx, spec.ky, c};
+}
 study::RaySpec spec_of(const std::string& name) {
   for (const study::RaySpec& spec : study::ray_specs())
     if (spec.name == name) return spec;
   throw std::logic_error(name);
 }
 
-// 230 and 310 rad between the modes in 64 nodes where Magnus of order 6 needs thousands of steps; 1e-10 is what 1e4 rad of common phase leave of
-// rounding in products of thousands of matrices.
+// 230 and 310 rad between the modes in 64 nodes where Magnus of order 6 needs thousands of steps; 1e-10 is what 1e4 rad
+// of common phase leave of rounding in products of thousands of matrices.
 TEST(Modal, ThickSlabsInAFewNodes) {
   for (const char* name : {"evaluation_slab", "e44_plate"})
     for (const Continuity c : {Continuity::e_only, Continuity::e_and_h}) {
@@ -74,10 +76,12 @@ TEST(Modal, FluxIsKept) {
 TEST(Modal, RefusesJumps) {
   LawColumn<double, TiltTwistLaw> column(TiltTwistLaw{0, 0, 0, 0, 0, 1.5, 1.6, 5});
   column.jumps = true;
-  EXPECT_THROW(Modal<double>().transfer(column, ray_of(spec_of("twisted_cell"), Continuity::e_only), uniform_mesh(4)), std::logic_error);
+  EXPECT_THROW(Modal<double>().transfer(column, ray_of(spec_of("twisted_cell"), Continuity::e_only), uniform_mesh(4)),
+               std::logic_error);
 }
 
-/// A plate of 0.2 mm seen in a cone of 8 degrees, its axis 40 degrees out of its plane; its birefringence and that tilt.
+/// A plate of 0.2 mm seen in a cone of 8 degrees, its axis 40 degrees out of its plane; its birefringence and that
+/// tilt.
 std::pair<ParameterRef, ParameterRef> put_tilted_plate(TableBuilder& table, Scene& scene) {
   Plate plate;
   plate.thickness_um = table.fixed("thickness_um", 200);
@@ -107,8 +111,8 @@ bool every(int, int) { return true; }
 bool none(int, int) { return false; }
 bool every_other(int column, int row) { return (column + row) % 2 == 1; }
 
-// A picture interpolated from a few rays is the picture of all rays: within a hundredth of the accuracy asked, derivatives
-// with it; by what carries the fringes along to the 1e-5 to which three pixels give slopes (planar.cc).
+// A picture interpolated from a few rays is the picture of all rays: within a hundredth of the accuracy asked,
+// derivatives with it; by what carries the fringes along to the 1e-5 to which three pixels give slopes (planar.cc).
 TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
   for (const auto& [absorbing_slab, from_side] : {std::pair{false, false}, {true, false}, {false, true}}) {
     TableBuilder table;
@@ -119,8 +123,8 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
     scene.surround_index = table.fixed("index", 1.0);
     scene.view.center_x_px = table.fixed("center_x", 41.3);
     scene.view.center_y_px = table.fixed("center_y", 36.2);
-    std::vector<int> active{scene.microscope.polarizer_deg.index, scene.microscope.analyzer_deg.index, scene.surround_index.index, scene.view.center_x_px.index,
-                            scene.view.center_y_px.index};
+    std::vector<int> active{scene.microscope.polarizer_deg.index, scene.microscope.analyzer_deg.index,
+                            scene.surround_index.index, scene.view.center_x_px.index, scene.view.center_y_px.index};
     if (absorbing_slab) {
       Slab slab;
       slab.profile.interpolation = SlabProfile::Interpolation::cubic;
@@ -129,7 +133,8 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
         const double u = i / 8.0;
         OpticalPoint<double> p;
         column->sample({&u, 1}, &p);
-        slab.profile.rows.push_back({300 * u, p.axis.x, p.axis.y, p.axis.z, std::sqrt(p.ordinary), std::sqrt(p.extraordinary), 0, 3e-4});
+        slab.profile.rows.push_back(
+            {300 * u, p.axis.x, p.axis.y, p.axis.z, std::sqrt(p.ordinary), std::sqrt(p.extraordinary), 0, 3e-4});
       }
       slab.half_angle_deg = table.fixed("half_angle_deg", 3);
       scene.microscope.wavelength_nm = table.fixed("wavelength_nm", 500);
@@ -142,8 +147,11 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
       active.push_back(std::get<Plate>(scene.sample).half_angle_deg.index);
     }
     if (from_side) {
-      scene.view.camera = SideCamera{table.fixed("tilt_x_deg", 25), table.fixed("tilt_y_deg", -12), table.fixed("half_field_deg", 20)};
-      for (const ParameterRef& ref : {scene.view.camera->tilt_x_deg, scene.view.camera->tilt_y_deg, scene.view.camera->half_field_deg}) active.push_back(ref.index);
+      scene.view.camera =
+          SideCamera{table.fixed("tilt_x_deg", 25), table.fixed("tilt_y_deg", -12), table.fixed("half_field_deg", 20)};
+      for (const ParameterRef& ref :
+           {scene.view.camera->tilt_x_deg, scene.view.camera->tilt_y_deg, scene.view.camera->half_field_deg})
+        active.push_back(ref.index);
     }
     active.push_back(scene.microscope.wavelength_nm.index);
     const int unused = table.fixed("unused", 1).index;
@@ -163,9 +171,11 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
     EXPECT_LT(worst, 0.01 * scene.intensity_accuracy);
     EXPECT_GT(brightest, 0.3);
     std::vector<int> carrying{scene.view.center_x_px.index, scene.view.center_y_px.index};
-    std::visit([&](const auto& sample) {
-      if constexpr (requires { sample.half_angle_deg; }) carrying.push_back(sample.half_angle_deg.index);
-    }, scene.sample);
+    std::visit(
+        [&](const auto& sample) {
+          if constexpr (requires { sample.half_angle_deg; }) carrying.push_back(sample.half_angle_deg.index);
+        },
+        scene.sample);
     const auto compare = [&](const Rendering& table, std::size_t place, std::size_t j) {
       double error = 0, size = 0;
       for (std::size_t i = 0; i < b.intensity.size(); ++i) {
@@ -177,12 +187,21 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
       EXPECT_GT(size, 0) << j;
     };
     for (std::size_t j = 0; j < active.size(); ++j) compare(a, j, j);
-    // Some at a time, in any order: what the medium knows, what comes after it (polarizers, wavelength) and what moves the picture take different ways.
-    // Once from the table alone, once with every other square traced: what is left out of a table's derivatives is not what rays leave out.
+    // Some at a time, in any order: what the medium knows, what comes after it (polarizers, wavelength) and what moves
+    // the picture take different ways. Once from the table alone, once with every other square traced: what is left out
+    // of a table's derivatives is not what rays leave out.
     const RenderPlan mixed = in_squares(few, scene, every_other);
     const std::size_t wave = active.size() - 1;
-    for (const std::vector<std::size_t>& some : std::vector<std::vector<std::size_t>>{
-             {wave}, {3}, {wave, 0}, {2, wave}, {3, 2}, {wave, 1, 0}, {wave, 2, 0}, {4, 0, 5, 2}, {0, wave, 2, 1, 3}, {wave, 0, 1, 2, 5}}) {
+    for (const std::vector<std::size_t>& some : std::vector<std::vector<std::size_t>>{{wave},
+                                                                                      {3},
+                                                                                      {wave, 0},
+                                                                                      {2, wave},
+                                                                                      {3, 2},
+                                                                                      {wave, 1, 0},
+                                                                                      {wave, 2, 0},
+                                                                                      {4, 0, 5, 2},
+                                                                                      {0, wave, 2, 1, 3},
+                                                                                      {wave, 0, 1, 2, 5}}) {
       std::vector<int> list;
       for (const std::size_t j : some) list.push_back(active[j]);
       for (const RenderPlan& p : {few, mixed}) {
@@ -211,7 +230,8 @@ TEST(ConeView, IsAPinholeInSpace) {
   const ConeView<double> plain_view(scene, Values<double>(plain_theta, {}));
   const SideCamera refs{table.fixed("tilt_x_deg", 0), table.fixed("tilt_y_deg", 0), table.fixed("half_field_deg", 0)};
   scene.view.camera = refs;
-  for (const auto& [tilt_x, tilt_y, half_field] : {std::array{0.0, 0.0, 35.0}, {40.0, 0.0, 0.0}, {25.0, -12.0, 20.0}, {-50.0, 30.0, 8.0}}) {
+  for (const auto& [tilt_x, tilt_y, half_field] :
+       {std::array{0.0, 0.0, 35.0}, {40.0, 0.0, 0.0}, {25.0, -12.0, 20.0}, {-50.0, 30.0, 8.0}}) {
     table.table[refs.tilt_x_deg].value = tilt_x;
     table.table[refs.tilt_y_deg].value = tilt_y;
     table.table[refs.half_field_deg].value = half_field;
@@ -235,7 +255,8 @@ TEST(ConeView, IsAPinholeInSpace) {
   }
 }
 
-// A picture planned while the optic axis lay beside it, drawn when its image has come in: there modes turn within a pixel, and no polynomial follows.
+// A picture planned while the optic axis lay beside it, drawn when its image has come in: there modes turn within a
+// pixel, and no polynomial follows.
 TEST(FringeTable, SquaresThatAreNoLongerSmoothAreLeftToRays) {
   TableBuilder table;
   Scene scene;
@@ -254,12 +275,14 @@ TEST(FringeTable, SquaresThatAreNoLongerSmoothAreLeftToRays) {
     theta[static_cast<std::size_t>(tilt.index)] = degrees;
     const Rendering a = render(scene, few, theta), b = render(scene, all, theta);
     double worst = 0;
-    for (std::size_t i = 0; i < a.intensity.size(); ++i) worst = std::max(worst, std::abs(a.intensity.values()[i] - b.intensity.values()[i]));
+    for (std::size_t i = 0; i < a.intensity.size(); ++i)
+      worst = std::max(worst, std::abs(a.intensity.values()[i] - b.intensity.values()[i]));
     EXPECT_LT(worst, scene.intensity_accuracy) << degrees;
   }
 }
 
-// A pixel's samples follow the phase's slope where the pixel is, in the corners, too, where a camera at the side looks at the screen most aslant.
+// A pixel's samples follow the phase's slope where the pixel is, in the corners, too, where a camera at the side looks
+// at the screen most aslant.
 TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
   TableBuilder table;
   Scene scene;
@@ -269,7 +292,8 @@ TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
   put_tilted_plate(table, scene);
   table.table[std::get<Plate>(scene.sample).thickness_um].value = 600;
   table.table[std::get<Plate>(scene.sample).half_angle_deg].value = 30;
-  scene.view.camera = SideCamera{table.fixed("tilt_x_deg", 20), table.fixed("tilt_y_deg", 0), table.fixed("half_field_deg", 10)};
+  scene.view.camera =
+      SideCamera{table.fixed("tilt_x_deg", 20), table.fixed("tilt_y_deg", 0), table.fixed("half_field_deg", 10)};
   scene.method = "magnus4";
   const Theta theta = table.table.values();
   const RenderPlan planned = plan(scene, theta);
@@ -277,7 +301,8 @@ TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
   fine.samples = {8};
   const Image picture = render(scene, planned, theta).intensity, truth = render(scene, fine, theta).intensity;
   double worst = 0;
-  for (std::size_t i = 0; i < picture.size(); ++i) worst = std::max(worst, std::abs(picture.values()[i] - truth.values()[i]));
+  for (std::size_t i = 0; i < picture.size(); ++i)
+    worst = std::max(worst, std::abs(picture.values()[i] - truth.values()[i]));
   EXPECT_LT(worst, scene.intensity_accuracy);
 }
 
@@ -300,7 +325,8 @@ TEST(FringeTable, AnyWidthWillDo) {
       for (const std::vector<int>& by : {std::vector<int>{}, {scene.view.center_x_px.index}}) {
         const Image picture = render(scene, p, theta, by).intensity;
         double worst = 0;
-        for (std::size_t i = 0; i < rays.size(); ++i) worst = std::max(worst, std::abs(picture.values()[i] - rays.values()[i]));
+        for (std::size_t i = 0; i < rays.size(); ++i)
+          worst = std::max(worst, std::abs(picture.values()[i] - rays.values()[i]));
         EXPECT_LT(worst, 0.01 * scene.intensity_accuracy) << width << " wide, derivatives: " << by.size();
       }
   }
@@ -327,7 +353,8 @@ TEST(FringeTable, FringesOfThinPlatesAreCarriedAlongToo) {
     whole.fringe_blocks = {1};
     all.fringe_block_px = 0;
     all.fringe_blocks.clear();
-    const std::vector<int> active{scene.view.center_x_px.index, scene.view.center_y_px.index, std::get<Plate>(scene.sample).half_angle_deg.index};
+    const std::vector<int> active{scene.view.center_x_px.index, scene.view.center_y_px.index,
+                                  std::get<Plate>(scene.sample).half_angle_deg.index};
     const Rendering few = render(scene, whole, theta, active), rays = render(scene, all, theta, active);
     for (std::size_t j = 0; j < active.size(); ++j) {
       double error = 0, largest = 0;
@@ -365,10 +392,12 @@ TEST(FringeTable, PicturesDoNotDependOnTheOnesBefore) {
   render(other, rays, steep, {}, 1);
   EXPECT_EQ(render(scene, rays, theta, {}, 1).intensity.values(), before.values());
 
-  // From a table and with derivatives, at a width that leaves no register free beyond the picture, after one whose derivatives are steep.
+  // From a table and with derivatives, at a width that leaves no register free beyond the picture, after one whose
+  // derivatives are steep.
   const RenderPlan table_of = plan(scene, theta);
   ASSERT_GT(table_of.fringe_block_px, 0);
-  const std::vector<int> by{scene.view.center_x_px.index, scene.microscope.polarizer_deg.index}, others{scene.surround_index.index, scene.view.center_y_px.index};
+  const std::vector<int> by{scene.view.center_x_px.index, scene.microscope.polarizer_deg.index},
+      others{scene.surround_index.index, scene.view.center_y_px.index};
   for (const int width : {100, 101}) {
     scene.view.width = width;
     render(scene, table_of, theta, others, 1);

@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "birefit/render.h"
+#include "independent_droplet.h"
 #include "render/droplet.h"
 #include "render/fringe.h"
 #include "render/radial_table.h"
-#include "independent_droplet.h"
 #include "scene_builder.h"
 
 namespace birefit {
@@ -56,12 +56,14 @@ double mean_by_quadrature(const Fringe& f) {
 
 // Third order in the curvature: (curvature/8)^2 of the amplitude at most, whatever the slope.
 TEST(PixelMeans, FringesOfAnyFinenessHaveTheirMean) {
-  for (const Fringe& f : {Fringe{0, 0, 0}, Fringe{1e-3, 0, 0.05}, Fringe{0.3, -0.2, 0.05}, Fringe{2.5, 1.1, 0.05}, Fringe{-4.7, 5.9, 0.05},
-                          Fringe{2 * std::numbers::pi, 0, 0}, Fringe{2.5, 1.1, 0.05, 1}, Fringe{0.3, -5.9, 0.05, -1}}) {
+  for (const Fringe& f : {Fringe{0, 0, 0}, Fringe{1e-3, 0, 0.05}, Fringe{0.3, -0.2, 0.05}, Fringe{2.5, 1.1, 0.05},
+                          Fringe{-4.7, 5.9, 0.05}, Fringe{2 * std::numbers::pi, 0, 0}, Fringe{2.5, 1.1, 0.05, 1},
+                          Fringe{0.3, -5.9, 0.05, -1}}) {
     FringePoint<double> p[3][3];
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i)
-        p[j][i] = {f.amplitude(i - 1.0, j - 1.0), f.phase(i - 1.0, j - 1.0), f.mean(i - 1.0, j - 1.0), f.quadrature(i - 1.0, j - 1.0)};
+        p[j][i] = {f.amplitude(i - 1.0, j - 1.0), f.phase(i - 1.0, j - 1.0), f.mean(i - 1.0, j - 1.0),
+                   f.quadrature(i - 1.0, j - 1.0)};
     EXPECT_NEAR(fringe_mean<true>(p), mean_by_quadrature(f), 2e-5) << f.slope_x << ' ' << f.slope_y;
     if (f.size_of_quadrature == 0) {
       EXPECT_EQ(fringe_mean<true>(p), fringe_mean<false>(p));
@@ -76,11 +78,12 @@ TEST(PixelMeans, DerivativesOfAMeanAreThoseOfDifferences) {
     FringePoint<T> p[3][3];
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i)
-        p[j][i] = {0.4 + 0.03 * slope * double(j), slope * (i - 1.0) + 0.4 * slope * slope * (j - 1.0), T(0.5) + slope * (0.1 * i),
-                   0.1 + 0.02 * slope * double(i)};
+        p[j][i] = {0.4 + 0.03 * slope * double(j), slope * (i - 1.0) + 0.4 * slope * slope * (j - 1.0),
+                   T(0.5) + slope * (0.1 * i), 0.1 + 0.02 * slope * double(i)};
     return fringe_mean<true>(p);
   };
-  for (double slope : {0.0, 1e-4, 0.17, 1.0, 2.8, 3.1, 3.2, 4.0}) {  // q = 2.5, up to which a series serves, are slopes of 3.16 and, down the rows, 2.81
+  // q = 2.5, up to which a series serves, are slopes of 3.16 and, down the rows, 2.81
+  for (double slope : {0.0, 1e-4, 0.17, 1.0, 2.8, 3.1, 3.2, 4.0}) {
     D x(slope);
     x.d[0] = 1;
     const double h = 1e-3;
@@ -94,13 +97,17 @@ using Director = std::function<void(TableBuilder&, Droplet&)>;
 
 /// A sphere and the camera that looks at it.
 struct Sphere {
-  double diameter_um, pixel_um, birefringence = 0.22, wavelength_nm = 590, off_x_px = 0.31, off_y_px = 0.31, host = 1.5, analyzer_deg = 90;
+  double diameter_um, pixel_um, birefringence = 0.22, wavelength_nm = 590, off_x_px = 0.31, off_y_px = 0.31, host = 1.5,
+                                analyzer_deg = 90;
   Ceiling ceiling = Ceiling::one_way;
   int size() const { return static_cast<int>(std::ceil(1.05 * diameter_um / pixel_um)) + 6; }
   std::string words() const {
     char text[300];
-    std::snprintf(text, sizeof text, "diameter %.17g um, pixel %.17g um, birefringence %.17g, %.17g nm, off %.17g %.17g, host %g, analyser %g, ceiling %d", diameter_um, pixel_um, birefringence, wavelength_nm, off_x_px,
-                  off_y_px, host, analyzer_deg, static_cast<int>(ceiling));
+    std::snprintf(text, sizeof text,
+                  "diameter %.17g um, pixel %.17g um, birefringence %.17g, %.17g nm, off %.17g %.17g, host %g, "
+                  "analyser %g, ceiling %d",
+                  diameter_um, pixel_um, birefringence, wavelength_nm, off_x_px, off_y_px, host, analyzer_deg,
+                  static_cast<int>(ceiling));
     return text;
   }
 };
@@ -132,7 +139,9 @@ SphereScene scene_of(const Sphere& sphere, const Director& director, double accu
   const auto centre = [&](double off) { return (0.5 * sphere.size() + off + 0.5) * finer - 0.5; };
   s.view.center_x_px = b.fixed("center_x", centre(sphere.off_x_px));
   s.view.center_y_px = b.fixed("center_y", centre(sphere.off_y_px));
-  r.parameters = {droplet.diameter_um.index, material.birefringence.index, material.ordinary.index, s.surround_index.index, s.microscope.wavelength_nm.index, s.view.center_x_px.index, s.view.center_y_px.index};
+  r.parameters = {droplet.diameter_um.index, material.birefringence.index,     material.ordinary.index,
+                  s.surround_index.index,    s.microscope.wavelength_nm.index, s.view.center_x_px.index,
+                  s.view.center_y_px.index};
   return r;
 }
 Image picture_of(const SphereScene& s) {
@@ -140,7 +149,8 @@ Image picture_of(const SphereScene& s) {
   return render(s.scene, plan(s.scene, theta), theta, {}, 1).intensity;
 }
 
-/// The largest difference of any pixel from the mean of pixels a ninth the size, in units of the accuracy asked of either, and where it is.
+/// The largest difference of any pixel from the mean of pixels a ninth the size, in units of the accuracy asked of
+/// either, and where it is.
 struct WorstPixel {
   double error = 0;
   int column = 0, row = 0;
@@ -158,7 +168,10 @@ WorstPixel from_finer_pixels(const Sphere& sphere, const Director& director, dou
         for (int i = 0; i < kFiner; ++i) sum += fine(kFiner * column + i, kFiner * row + j);
       const double error = std::abs(coarse(column, row) - sum / (kFiner * kFiner)) / accuracy;
       const double half = 0.5 * sphere.size();
-      if (!(error <= worst.error)) worst = {error, column, row, 0.5 * sphere.diameter_um / sphere.pixel_um - std::hypot(column - half - sphere.off_x_px, row - half - sphere.off_y_px)};
+      if (!(error <= worst.error))
+        worst = {error, column, row,
+                 0.5 * sphere.diameter_um / sphere.pixel_um -
+                     std::hypot(column - half - sphere.off_x_px, row - half - sphere.off_y_px)};
     }
   return worst;
 }
@@ -168,7 +181,8 @@ class Draws {
   explicit Draws(unsigned long seed) : random_(seed) {}
   double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
   double evenly_in_log(double low, double high) { return low * std::pow(high / low, between(0, 1)); }
-  /// Any: 4 to `most_across` pixels across, up to two hundred radians of retardance, fringes far finer than a pixel among them.
+  /// Any: 4 to `most_across` pixels across, up to two hundred radians of retardance, fringes far finer than a pixel
+  /// among them.
   Sphere sphere(double most_across) {
     Sphere s{};
     s.pixel_um = evenly_in_log(0.05, 1);
@@ -211,13 +225,17 @@ Director field_across(double reduced_field) {
     droplet.director = axial;
   };
 }
-const Director kBipolar = [](TableBuilder& b, Droplet& droplet) { droplet.director = BipolarDirector{b.fixed("azimuth_deg", 25), b.fixed("tilt_deg", 10), {}}; };
+const Director kBipolar = [](TableBuilder& b, Droplet& droplet) {
+  droplet.director = BipolarDirector{b.fixed("azimuth_deg", 25), b.fixed("tilt_deg", 10), {}};
+};
 
 // Each of the two pictures is within the accuracy asked of the truth, and so within twice that of each other.
-void expect_means(const char* name, const Sphere& sphere, const Director& director, double accuracy, double& worst_of_all) {
+void expect_means(const char* name, const Sphere& sphere, const Director& director, double accuracy,
+                  double& worst_of_all) {
   const WorstPixel worst = from_finer_pixels(sphere, director, accuracy);
   worst_of_all = std::max(worst_of_all, worst.error);
-  EXPECT_LT(worst.error, 2) << name << ", accuracy " << accuracy << ", column " << worst.column << ", row " << worst.row << ", " << worst.from_rim_px << " pixels from the rim: " << sphere.words();
+  EXPECT_LT(worst.error, 2) << name << ", accuracy " << accuracy << ", column " << worst.column << ", row " << worst.row
+                            << ", " << worst.from_rim_px << " pixels from the rim: " << sphere.words();
 }
 
 TEST(PixelMeans, OfRoundSamplesAreThoseOfFinerPixelsAtAnyAccuracy) {
@@ -226,8 +244,13 @@ TEST(PixelMeans, OfRoundSamplesAreThoseOfFinerPixelsAtAnyAccuracy) {
     Director director;
     double finest;  ///< accuracy; a bipolar droplet's rays beside a boojum are not planned for less
   };
-  for (const Sample& s : {Sample{"radial", kRadial, 1e-6}, {"shell", shell_of(1.1), 1e-6}, {"thin shell", shell_of(0.15), 1e-6}, {"field along", field_along(6), 1e-6}, {"bipolar", kBipolar, 1e-4},
-                          {"field across", field_across(6), 1e-6}, {"eccentric shell", shell_of(1.5, 0.5, -0.2, 0.1), 1e-6}})
+  for (const Sample& s : {Sample{"radial", kRadial, 1e-6},
+                          {"shell", shell_of(1.1), 1e-6},
+                          {"thin shell", shell_of(0.15), 1e-6},
+                          {"field along", field_along(6), 1e-6},
+                          {"bipolar", kBipolar, 1e-4},
+                          {"field across", field_across(6), 1e-6},
+                          {"eccentric shell", shell_of(1.5, 0.5, -0.2, 0.1), 1e-6}})
     for (const Ceiling ceiling : {Ceiling::e_only, Ceiling::one_way})
       for (double accuracy = 1e-3; accuracy > 0.9 * s.finest; accuracy /= 10) {
         double worst = 0;
@@ -236,12 +259,13 @@ TEST(PixelMeans, OfRoundSamplesAreThoseOfFinerPixelsAtAnyAccuracy) {
           sphere.ceiling = ceiling, sphere.host = host;
           expect_means(s.name, sphere, s.director, accuracy, worst);
         }
-        std::printf("  %-15s %-7s %.0e: worst pixel %.2f of the accuracy\n", s.name, ceiling == Ceiling::e_only ? "e_only" : "one_way", accuracy, worst);
+        std::printf("  %-15s %-7s %.0e: worst pixel %.2f of the accuracy\n", s.name,
+                    ceiling == Ceiling::e_only ? "e_only" : "one_way", accuracy, worst);
       }
 }
 
-// Anywhere among droplets, shells and fields, not only where somebody looked: fringes that crowd towards a rim, a retardance that turns back
-// within a pixel, a core's edge beside the rim, pixels that are coarser than the fringes.
+// Anywhere among droplets, shells and fields, not only where somebody looked: fringes that crowd towards a rim, a
+// retardance that turns back within a pixel, a core's edge beside the rim, pixels that are coarser than the fringes.
 TEST(PixelMeans, OfRandomDropletsAreThoseOfFinerPixels) {
   Draws draw(20);
   struct Family {
@@ -250,9 +274,10 @@ TEST(PixelMeans, OfRandomDropletsAreThoseOfFinerPixels) {
     double most_across;
     std::function<Director(const Sphere&)> director;
   };
-  for (const Family& family : {Family{"radial", 60, 200, [](const Sphere&) { return kRadial; }},
-                               {"shell", 60, 200, [&](const Sphere& s) { return shell_of(s.diameter_um * draw.between(0.02, 0.4)); }},
-                               {"field along", 60, 120, [&](const Sphere&) { return field_along(draw.between(1, 39)); }}}) {
+  for (const Family& family :
+       {Family{"radial", 60, 200, [](const Sphere&) { return kRadial; }},
+        {"shell", 60, 200, [&](const Sphere& s) { return shell_of(s.diameter_um * draw.between(0.02, 0.4)); }},
+        {"field along", 60, 120, [&](const Sphere&) { return field_along(draw.between(1, 39)); }}}) {
     double worst = 0;
     for (int k = 0; k < family.draws; ++k) {
       const Sphere sphere = draw.sphere(family.most_across);
@@ -262,15 +287,18 @@ TEST(PixelMeans, OfRandomDropletsAreThoseOfFinerPixels) {
   }
 }
 
-/// The profile |E_cross|^2 / sin^2(2 azimuth) of a radial droplet by textbook formulas, cubics through 6,000 places of t = sqrt(1 - rho/edge).
+/// The profile |E_cross|^2 / sin^2(2 azimuth) of a radial droplet by textbook formulas, cubics through 6,000 places of
+/// t = sqrt(1 - rho/edge).
 class TextbookProfile {
  public:
   TextbookProfile(const Sphere& sphere, bool surfaces) {
     testing::IndependentDroplet d;
-    d.diameter_um = sphere.diameter_um, d.n_o = 1.52, d.n_e = 1.52 + sphere.birefringence, d.n_host = sphere.host, d.wavelength_um = 1e-3 * sphere.wavelength_nm;
+    d.diameter_um = sphere.diameter_um, d.n_o = 1.52, d.n_e = 1.52 + sphere.birefringence, d.n_host = sphere.host,
+    d.wavelength_um = 1e-3 * sphere.wavelength_nm;
     d.surfaces = surfaces;
     edge_um_ = d.edge_um();
-    for (int i = 0; i <= kPlaces; ++i) values_.push_back(d.ring(edge_um_ * (1 - square(std::max(i, 1) / static_cast<double>(kPlaces)))));
+    for (int i = 0; i <= kPlaces; ++i)
+      values_.push_back(d.ring(edge_um_ * (1 - square(std::max(i, 1) / static_cast<double>(kPlaces)))));
     values_[0] = 4 * values_[1] - 6 * values_[2] + 4 * values_[3] - values_[4];
   }
   double edge_um() const { return edge_um_; }
@@ -278,23 +306,30 @@ class TextbookProfile {
     const double x = std::clamp(t, 0.0, 1.0) * kPlaces;
     const std::size_t i = static_cast<std::size_t>(std::clamp(std::floor(x), 1.0, kPlaces - 2.0));
     const double f = x - static_cast<double>(i), *y = &values_[i - 1];
-    return y[0] * f * (f - 1) * (f - 2) / -6 + y[1] * (f + 1) * (f - 1) * (f - 2) / 2 - y[2] * (f + 1) * f * (f - 2) / 2 + y[3] * (f + 1) * f * (f - 1) / 6;
+    return y[0] * f * (f - 1) * (f - 2) / -6 + y[1] * (f + 1) * (f - 1) * (f - 2) / 2 -
+           y[2] * (f + 1) * f * (f - 2) / 2 + y[3] * (f + 1) * f * (f - 1) / 6;
   }
-  /// Over a pixel whose middle lies at (x, y) from the droplet's: lines of equal x by midpoints, each by Simpson's rule in t from where it comes into the disc.
+  /// Over a pixel whose middle lies at (x, y) from the droplet's: lines of equal x by midpoints, each by Simpson's rule
+  /// in t from where it comes into the disc.
   double mean(double x, double y, double pixel_um) const {
-    if (std::abs(x) > std::abs(y)) std::swap(x, y);  // light is the same with x and y exchanged: lines go across the rim
+    // light is the same with x and y exchanged: lines go across the rim
+    if (std::abs(x) > std::abs(y)) std::swap(x, y);
     constexpr int kLines = 400, kPieces = 128;
     double sum = 0;
     for (int i = 0; i < kLines; ++i) {
       const double at_x = x + pixel_um * ((i + 0.5) / kLines - 0.5), rim2 = edge_um_ * edge_um_ - at_x * at_x;
       if (rim2 <= 0) continue;
-      const double rim = std::sqrt(rim2), low = std::abs(y) - 0.5 * pixel_um, high = std::min(rim, std::abs(y) + 0.5 * pixel_um);
+      const double rim = std::sqrt(rim2), low = std::abs(y) - 0.5 * pixel_um,
+                   high = std::min(rim, std::abs(y) + 0.5 * pixel_um);
       if (high <= low) continue;
       const double first = std::sqrt(rim - high), last = std::sqrt(rim - low), step = (last - first) / kPieces;
       for (int k = 0; k <= kPieces; ++k) {
         const double u = first + k * step, at_y = rim - u * u, rho2 = at_x * at_x + at_y * at_y;
         const double cross = rho2 > 0 ? 4 * at_x * at_x * at_y * at_y / (rho2 * rho2) : 0;
-        sum += (k == 0 || k == kPieces ? 1 : k % 2 ? 4 : 2) / 3.0 * step * 2 * u * cross * at(std::sqrt(std::max(0.0, 1 - std::sqrt(rho2) / edge_um_))) / kLines;
+        sum += (k == 0 || k == kPieces ? 1
+                : k % 2                ? 4
+                                       : 2) /
+               3.0 * step * 2 * u * cross * at(std::sqrt(std::max(0.0, 1 - std::sqrt(rho2) / edge_um_))) / kLines;
       }
     }
     return sum / pixel_um;
@@ -307,11 +342,13 @@ class TextbookProfile {
   std::vector<double> values_;
 };
 
-// Shares nothing with the program: formulas, rays, quadrature. The droplet of 64 radians whose rim was once 0.085 wrong, one in a host of lower
-// index, and a coarse one.
+// Shares nothing with the program: formulas, rays, quadrature. The droplet of 64 radians whose rim was once 0.085
+// wrong, one in a host of lower index, and a coarse one.
 TEST(PixelMeans, OfRadialDropletsAreThoseOfTheTextbook) {
-  constexpr double kAccuracy = 1e-5;  // the textbook's own: its differences for the ray tube, and lines a 400th of a pixel apart
-  for (Sphere sphere : {Sphere{19.835765, 0.198253, 0.303719, 589, 0.3, -0.2, 1.52}, Sphere{9.3, 0.2, 0.22, 590, 0.1, 0.4, 1.43}, Sphere{12, 1, 0.2, 590, -0.3, 0.2, 1.5}})
+  // the textbook's own: its differences for the ray tube, and lines a 400th of a pixel apart
+  constexpr double kAccuracy = 1e-5;
+  for (Sphere sphere : {Sphere{19.835765, 0.198253, 0.303719, 589, 0.3, -0.2, 1.52},
+                        Sphere{9.3, 0.2, 0.22, 590, 0.1, 0.4, 1.43}, Sphere{12, 1, 0.2, 590, -0.3, 0.2, 1.5}})
     for (const Ceiling ceiling : {Ceiling::e_only, Ceiling::one_way}) {
       sphere.ceiling = ceiling;
       const SphereScene s = scene_of(sphere, kRadial, kAccuracy);
@@ -320,24 +357,29 @@ TEST(PixelMeans, OfRadialDropletsAreThoseOfTheTextbook) {
       double worst = 0;
       for (int row = 0; row < image.height(); ++row)
         for (int column = 0; column < image.width(); ++column) {
-          const double half = 0.5 * sphere.size(), x = (column - half - sphere.off_x_px) * sphere.pixel_um, y = (half + sphere.off_y_px - row) * sphere.pixel_um;
+          const double half = 0.5 * sphere.size(), x = (column - half - sphere.off_x_px) * sphere.pixel_um,
+                       y = (half + sphere.off_y_px - row) * sphere.pixel_um;
           const double from_rim = (profile.edge_um() - std::hypot(x, y)) / sphere.pixel_um;
-          if (std::abs(from_rim) > 3 && (row + 3 * column) % 17 != 0) continue;  // every pixel at the rim, some of the others
+          // every pixel at the rim, some of the others
+          if (std::abs(from_rim) > 3 && (row + 3 * column) % 17 != 0) continue;
           worst = std::max(worst, std::abs(image(column, row) - profile.mean(x, y, sphere.pixel_um)));
         }
       EXPECT_LT(worst, kAccuracy) << sphere.words();
-      std::printf("  %.3g um, host %.3g, %s: worst pixel %.1e\n", sphere.diameter_um, sphere.host, ceiling == Ceiling::e_only ? "e_only" : "one_way", worst);
+      std::printf("  %.3g um, host %.3g, %s: worst pixel %.1e\n", sphere.diameter_um, sphere.host,
+                  ceiling == Ceiling::e_only ? "e_only" : "one_way", worst);
     }
 }
 
-// Of pixels at the rim and a core's edge as of any other: light jumps there, or ends like a root, and both move with the parameters. A mean has a kink
-// where an edge passes a pixel's corner, of 3/2 of a power: differences over h are good to the root of h there.
+// Of pixels at the rim and a core's edge as of any other: light jumps there, or ends like a root, and both move with
+// the parameters. A mean has a kink where an edge passes a pixel's corner, of 3/2 of a power: differences over h are
+// good to the root of h there.
 TEST(PixelMeans, DerivativesAtRimsAndEdgesAreThoseOfDifferences) {
   struct Sample {
     const char* name;
     Director director;
   };
-  for (const Sample& sample : {Sample{"radial", kRadial}, {"shell", shell_of(1.1)}, {"field along", field_along(6)}, {"bipolar", kBipolar}})
+  for (const Sample& sample :
+       {Sample{"radial", kRadial}, {"shell", shell_of(1.1)}, {"field along", field_along(6)}, {"bipolar", kBipolar}})
     for (const Ceiling ceiling : {Ceiling::e_only, Ceiling::one_way})
       for (const double host : {1.43, 1.52})
         for (const double analyzer : {90.0, 50.0}) {
@@ -348,12 +390,14 @@ TEST(PixelMeans, DerivativesAtRimsAndEdgesAreThoseOfDifferences) {
           const RenderPlan p = plan(s.scene, theta);
           const Rendering exact = render(s.scene, p, theta, s.parameters, 1);
           for (std::size_t k = 0; k < s.parameters.size(); ++k) {
-            if (host == 1.52 && (k == 2 || k == 3)) continue;  // where the indices are equal the rim turns from grazing rays to total reflection
+            // where the indices are equal the rim turns from grazing rays to total reflection
+            if (host == 1.52 && (k == 2 || k == 3)) continue;
             const std::size_t j = static_cast<std::size_t>(s.parameters[k]);
             const double h = 1e-5 * theta[j];
             Theta up = theta, down = theta;
             up[j] += h, down[j] -= h;
-            const Image above = render(s.scene, p, up, {}, 1).intensity, below = render(s.scene, p, down, {}, 1).intensity;
+            const Image above = render(s.scene, p, up, {}, 1).intensity,
+                        below = render(s.scene, p, down, {}, 1).intensity;
             double worst = 0, size = 0;
             for (std::size_t i = 0; i < above.size(); ++i) {
               const double difference = (above.values()[i] - below.values()[i]) / (2 * h);
@@ -365,8 +409,9 @@ TEST(PixelMeans, DerivativesAtRimsAndEdgesAreThoseOfDifferences) {
         }
 }
 
-// The series' pictures take as few points a pixel as 96 pixels show to be enough, and say thrice the worst of those. With 8 x 8 points as the
-// truth (wherever fewer were planned) every pixel is within the accuracy asked, and what is said is not less than half the worst pixel's error.
+// The series' pictures take as few points a pixel as 96 pixels show to be enough, and say thrice the worst of those.
+// With 8 x 8 points as the truth (wherever fewer were planned) every pixel is within the accuracy asked, and what is
+// said is not less than half the worst pixel's error.
 TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
   for (const double diameter : {4.0, 9.0, 20.0, 40.0})
     for (const double na : {0.3, 0.8, 1.3})
@@ -392,16 +437,19 @@ TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
         const RenderPlan planned = plan(s, theta);
         RenderPlan fine = planned;
         fine.samples = {8};
-        const Image picture = render(s, planned, theta, {}, 1).intensity, truth = render(s, fine, theta, {}, 1).intensity;
+        const Image picture = render(s, planned, theta, {}, 1).intensity,
+                    truth = render(s, fine, theta, {}, 1).intensity;
         double worst = 0;
-        for (std::size_t i = 0; i < picture.size(); ++i) worst = std::max(worst, std::abs(picture.values()[i] - truth.values()[i]));
+        for (std::size_t i = 0; i < picture.size(); ++i)
+          worst = std::max(worst, std::abs(picture.values()[i] - truth.values()[i]));
         EXPECT_LE(worst, s.intensity_accuracy) << diameter << " um, NA " << na << ", pixels of " << pixel << " um";
-        EXPECT_LE(worst, 2 * planned.numerical_error) << diameter << " um, NA " << na << ", pixels of " << pixel << " um";
+        EXPECT_LE(worst, 2 * planned.numerical_error)
+            << diameter << " um, NA " << na << ", pixels of " << pixel << " um";
       }
 }
 
-// Degree 11 on panels of 1/6 of a smooth function of 5 radians: (5/12)^12 / (2^11 12!) = 3e-17; powers lose (1 + sqrt 2)^11
-// = 16,000 units of rounding, derivatives (11^2 x 2 x 6 panels / 2) more at a panel's end.
+// Degree 11 on panels of 1/6 of a smooth function of 5 radians: (5/12)^12 / (2^11 12!) = 3e-17; powers lose (1 + sqrt
+// 2)^11 = 16,000 units of rounding, derivatives (11^2 x 2 x 6 panels / 2) more at a panel's end.
 TEST(RadialTable, ReadsWhatWasTabulatedWithItsDerivatives) {
   using D = Dual<Pack, 1>;
   D scale(Pack(5.0));
@@ -415,7 +463,8 @@ TEST(RadialTable, ReadsWhatWasTabulatedWithItsDerivatives) {
     // Lanes in different panels.
     alignas(64) double places[kLanes];
     for (int k = 0; k < kLanes; ++k) places[k] = std::fmod(v0 + 0.3 * k, 1.0);
-    const Pack v = Pack::load_aligned(places), basis[3]{Pack(1.0), Pack(1.0), Pack(1.0)}, turned[3]{Pack(0.0), Pack(-2.0), Pack(0.0)};
+    const Pack v = Pack::load_aligned(places), basis[3]{Pack(1.0), Pack(1.0), Pack(1.0)},
+               turned[3]{Pack(0.0), Pack(-2.0), Pack(0.0)};
     RadialTable<D>::Slopes slopes;
     const D sum = table.sum<3>(v, basis, turned, &slopes);
     for (int k = 0; k < kLanes; ++k) {

@@ -1,4 +1,5 @@
-// What the planner promises: the picture it plans is within the accuracy asked of the same physics computed to convergence.
+// What the planner promises: the picture it plans is within the accuracy asked of the same physics computed to
+// convergence.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +18,8 @@ namespace birefit {
 namespace {
 using namespace testing;
 
-/// A scene under construction: a view somewhere off the middle, any wavelength and polarizers; the sample is still to come.
+/// A scene under construction: a view somewhere off the middle, any wavelength and polarizers; the sample is still to
+/// come.
 struct RandomScene {
   std::mt19937_64 random;
   TableBuilder table;
@@ -69,7 +71,8 @@ RandomScene random_scene(unsigned long seed) {
     Plate plate;
     plate.thickness_um = b.fixed("thickness_um", std::pow(10, between(0.7, 2.7)));
     const double tilt = between(0, 1.5), azimuth = between(0, 6.3);
-    plate.director.axis = {b.fixed("x", std::cos(tilt) * std::cos(azimuth)), b.fixed("y", std::cos(tilt) * std::sin(azimuth)), b.fixed("z", std::sin(tilt))};
+    plate.director.axis = {b.fixed("x", std::cos(tilt) * std::cos(azimuth)),
+                           b.fixed("y", std::cos(tilt) * std::sin(azimuth)), b.fixed("z", std::sin(tilt))};
     if (between(0, 1) < 0.6) {
       HeatStep heat;
       heat.fourier_number = b.fixed("fourier_number", std::pow(10, between(-2, 0)));
@@ -102,7 +105,8 @@ RandomScene random_unsymmetric_scene(unsigned long seed) {
   s.view.pixel_size_um = diameter / size * between(1.0, 1.3);
   const int kind = static_cast<int>(between(0, 3));
   if (kind == 0) {
-    droplet.director = BipolarDirector{b.fixed("azimuth_deg", between(0, 180)), b.fixed("tilt_deg", between(-60, 60)), b.fixed("pole_distance", between(1.05, 2))};
+    droplet.director = BipolarDirector{b.fixed("azimuth_deg", between(0, 180)), b.fixed("tilt_deg", between(-60, 60)),
+                                       b.fixed("pole_distance", between(1.05, 2))};
     r.kind = "bipolar";
   } else if (kind == 1) {
     AxialDirector axial;
@@ -117,7 +121,8 @@ RandomScene random_unsymmetric_scene(unsigned long seed) {
   } else {
     ShellDirector shell;
     shell.wall_um = b.fixed("wall_um", 0.5 * diameter * between(0.2, 0.6));
-    for (std::size_t i = 0; i < 3; ++i) shell.offset_um[i] = b.fixed("offset_um" + std::to_string(i), 0.05 * diameter * between(-1, 1));
+    for (std::size_t i = 0; i < 3; ++i)
+      shell.offset_um[i] = b.fixed("offset_um" + std::to_string(i), 0.05 * diameter * between(-1, 1));
     droplet.director = shell;
     r.kind = "eccentric shell";
   }
@@ -151,14 +156,15 @@ void expect_kept(unsigned long first, unsigned long last) {
     worst = std::max(worst, ratio);
     EXPECT_LE(ratio, 1) << r.kind << ", seed " << seed << ", asked " << asked;
   }
-  for (const auto& [kind, s] : seen) std::printf("  %-16s %3d scenes, worst error/asked %.2f\n", kind.c_str(), s.first, s.second);
+  for (const auto& [kind, s] : seen)
+    std::printf("  %-16s %3d scenes, worst error/asked %.2f\n", kind.c_str(), s.first, s.second);
 }
 
 TEST(Planner, PicturesAreWithinTheAccuracyAsked) { expect_kept(1, 40); }
 
-// A plate cut exactly normal to its axis: in the middle both waves are one, and nothing divides by their difference. Between crossed
-// polarizers along x and y a black cross and, on the diagonal, sin^2 of half the phase k0 d (q_o - q_e), q_e = (n_o/n_e) sqrt(n_e^2 - kappa^2),
-// but for the faces' transmissions.
+// A plate cut exactly normal to its axis: in the middle both waves are one, and nothing divides by their difference.
+// Between crossed polarizers along x and y a black cross and, on the diagonal, sin^2 of half the phase k0 d (q_o -
+// q_e), q_e = (n_o/n_e) sqrt(n_e^2 - kappa^2), but for the faces' transmissions.
 TEST(Planner, PlateCutNormalToItsAxisHasItsCross) {
   testing::TableBuilder b;
   Scene scene;
@@ -179,17 +185,22 @@ TEST(Planner, PlateCutNormalToItsAxisHasItsCross) {
   const Theta theta = b.table.values();
   const Image image = render(scene, plan(scene, theta), theta, {}, 1).intensity;
   for (int i = 0; i < 65; ++i) {
-    EXPECT_LT(image(i, 32), 5e-3) << i;  // a pixel's mean beside an exact zero: a sixty-fifth of the diagonal's, squared
-    const double tangent = std::tan(10 * std::numbers::pi / 180) * std::abs(i - 32) * std::sqrt(2.0) / 32.5, kappa = 1.53 * tangent / std::sqrt(1 + tangent * tangent);
-    const double phase = 2 * std::numbers::pi / 0.64 * 300 * (std::sqrt(1.53 * 1.53 - kappa * kappa) - 1.53 / 1.63 * std::sqrt(1.63 * 1.63 - kappa * kappa));
-    // The fringe turns by up to 0.35 rad within a pixel: its mean is 0.35^2/12 of its contrast off; the faces' transmissions 0.2 %.
+    // a pixel's mean beside an exact zero: a sixty-fifth of the diagonal's, squared
+    EXPECT_LT(image(i, 32), 5e-3) << i;
+    const double tangent = std::tan(10 * std::numbers::pi / 180) * std::abs(i - 32) * std::sqrt(2.0) / 32.5,
+                 kappa = 1.53 * tangent / std::sqrt(1 + tangent * tangent);
+    const double phase =
+        2 * std::numbers::pi / 0.64 * 300 *
+        (std::sqrt(1.53 * 1.53 - kappa * kappa) - 1.53 / 1.63 * std::sqrt(1.63 * 1.63 - kappa * kappa));
+    // The fringe turns by up to 0.35 rad within a pixel: its mean is 0.35^2/12 of its contrast off; the faces'
+    // transmissions 0.2 %.
     EXPECT_NEAR(image(i, i), std::pow(std::sin(phase / 2), 2), 0.015) << i;
   }
 }
 TEST(LongPlanner, PicturesAreWithinTheAccuracyAsked) { expect_kept(41, 340); }
 
-// The same rays for both: what steps by place and interpolated parts of the disc leave of the accuracy. (Means over pixels that a kink
-// crosses - a core's edge, a wall seen from the side - are another question: PixelMeans.)
+// The same rays for both: what steps by place and interpolated parts of the disc leave of the accuracy. (Means over
+// pixels that a kink crosses - a core's edge, a wall seen from the side - are another question: PixelMeans.)
 void expect_rays_kept(unsigned long first, unsigned long last) {
   std::map<std::string, std::pair<int, double>> seen;
   for (unsigned long seed = first; seed <= last; ++seed) {
@@ -200,22 +211,26 @@ void expect_rays_kept(unsigned long first, unsigned long last) {
     const RenderPlan planned = plan(r.scene, theta);
     RenderPlan exact = planned;
     for (DiscSquare& square : exact.disc) square.smooth = false, square.steps = 512;
-    const Image a = render(r.scene, planned, theta, {}, 2).intensity, b = render(r.scene, exact, theta, {}, 2).intensity;
+    const Image a = render(r.scene, planned, theta, {}, 2).intensity,
+                b = render(r.scene, exact, theta, {}, 2).intensity;
     double worst = 0;
     for (std::size_t i = 0; i < a.size(); ++i)
-      if (const double error = std::abs(a.values()[i] - b.values()[i]); !(error <= worst)) worst = std::isnan(error) ? 1e300 : error;
+      if (const double error = std::abs(a.values()[i] - b.values()[i]); !(error <= worst))
+        worst = std::isnan(error) ? 1e300 : error;
     auto& [count, ratio] = seen[r.kind];
     ++count;
     ratio = std::max(ratio, worst / asked);
     EXPECT_LE(worst / asked, 1) << r.kind << ", seed " << seed << ", asked " << asked;
   }
-  for (const auto& [kind, s] : seen) std::printf("  %-16s %3d scenes, worst error/asked %.2f\n", kind.c_str(), s.first, s.second);
+  for (const auto& [kind, s] : seen)
+    std::printf("  %-16s %3d scenes, worst error/asked %.2f\n", kind.c_str(), s.first, s.second);
 }
 TEST(Planner, UnsymmetricDropletsAreWithinTheAccuracyAsked) { expect_rays_kept(1, 12); }
 TEST(LongPlanner, UnsymmetricDropletsAreWithinTheAccuracyAsked) { expect_rays_kept(13, 212); }
 
-/// Samples of the medium a ray, as planned, over those of the cheapest registered method and effort that holds the accuracy on
-/// the same pilot rays. Efforts as on the chart, twice as many each time, from one on; 0 where there is no choice.
+/// Samples of the medium a ray, as planned, over those of the cheapest registered method and effort that holds the
+/// accuracy on the same pilot rays. Efforts as on the chart, twice as many each time, from one on; 0 where there is no
+/// choice.
 double planned_over_cheapest(const Scene& scene, const Theta& theta, const RenderPlan& planned) {
   if (planned.method == "closed_form" || scene.ceiling == Ceiling::reflections) return 0;
   const Values<double> value(theta, {});
@@ -246,9 +261,12 @@ void expect_economical(unsigned long first, unsigned long last) {
     auto& [count, worst] = seen[r.kind];
     ++count;
     worst = std::max(worst, ratio);
-    EXPECT_LE(ratio, 1.5) << r.kind << ", seed " << seed << ", asked " << r.scene.intensity_accuracy << ": " << planned.method << " " << planned.steps;
+    EXPECT_LE(ratio, 1.5) << r.kind << ", seed " << seed << ", asked " << r.scene.intensity_accuracy << ": "
+                          << planned.method << " " << planned.steps;
   }
-  for (const auto& [kind, s] : seen) std::printf("  %-16s %3d scenes, at worst %.2f times the samples of the cheapest\n", kind.c_str(), s.first, s.second);
+  for (const auto& [kind, s] : seen)
+    std::printf("  %-16s %3d scenes, at worst %.2f times the samples of the cheapest\n", kind.c_str(), s.first,
+                s.second);
 }
 
 // Not 1: it asks the next finer effort to hold too, and prefers the diagonal method for plates, whose pixel means then
@@ -288,8 +306,9 @@ TEST(Planner, TotalReflectionOfOnePolarisationIsNoHole) {
     for (const double x : d.values()) EXPECT_TRUE(std::isfinite(x));
 }
 
-// Of droplets of 9.3 um, whose ln(radius/core) is 6.1 to 7.8: the stable ring for 7 lies at 0.9334 of the radius at e = 12 and at 0.8213 at e = 6
-// (tests/data/physics/droplet_ring_equilibrium.csv); it moves out with the field, and half-way in lies the barrier.
+// Of droplets of 9.3 um, whose ln(radius/core) is 6.1 to 7.8: the stable ring for 7 lies at 0.9334 of the radius at e =
+// 12 and at 0.8213 at e = 6 (tests/data/physics/droplet_ring_equilibrium.csv); it moves out with the field, and
+// half-way in lies the barrier.
 TEST(Planner, SaysWhereNoFreeRingWouldBe) {
   const auto said = [](double e, double ring) {
     TableBuilder b;
@@ -311,7 +330,8 @@ TEST(Planner, SaysWhereNoFreeRingWouldBe) {
     scene.surround_index = b.fixed("index", 1.43);
     for (const std::string& warning : plan(scene, b.table.values()).warnings)
       for (const char* what : {"not stable", "would move out", "would move in"})
-        if (warning.starts_with("A ring of defects") && warning.find(what) != std::string::npos) return std::string(what);
+        if (warning.starts_with("A ring of defects") && warning.find(what) != std::string::npos)
+          return std::string(what);
     return std::string("nothing");
   };
   EXPECT_EQ(said(12, 0.9334), "nothing");

@@ -66,7 +66,8 @@ Job job_of(const Case& c) {
   j.scene.view.pixel_size_um = 0.062;
   j.scene.view.center_x_px = j.b.fixed("center_x", 80.3);
   j.scene.view.center_y_px = j.b.fixed("center_y", 78.9);
-  j.by = {droplet.diameter_um.index, material.birefringence.index, material.ordinary.index, j.scene.surround_index.index, j.scene.view.center_x_px.index, j.scene.view.center_y_px.index};
+  j.by = {droplet.diameter_um.index,    material.birefringence.index,   material.ordinary.index,
+          j.scene.surround_index.index, j.scene.view.center_x_px.index, j.scene.view.center_y_px.index};
   c.director(j.b, droplet, j.by);
   j.scene.sample = droplet;
   return j;
@@ -123,20 +124,24 @@ TEST(PolarTable, PicturesAreThoseOfRays) {
     for (const DiscSquare& q : p.disc) area[q.of_core] += 1.0 / disc::panels(q.level) / disc::sectors(q.level);
     EXPECT_NEAR(area[0], 1, 1e-12) << c.name;
     EXPECT_NEAR(area[1], c.name[0] == 'e' ? 1 : 0, 1e-12) << c.name;
-    const Image table = render(j.scene, p, theta, {}, 2).intensity, rays = render(j.scene, with_rays_alone(p), theta, {}, 2).intensity;
+    const Image table = render(j.scene, p, theta, {}, 2).intensity,
+                rays = render(j.scene, with_rays_alone(p), theta, {}, 2).intensity;
     // A hundredth of the accuracy at places between; a pixel's mean takes four thirds of five points' errors.
     const double error = largest_difference(table, rays);
     EXPECT_LT(error, 3e-2 * j.scene.intensity_accuracy) << c.name;
     EXPECT_GT(error, 0) << c.name;
-    std::printf("  %-30s %3ld of %3zu parts smooth, off by %.1e\n", c.name, static_cast<long>(smooth), p.disc.size(), error);
+    std::printf("  %-30s %3ld of %3zu parts smooth, off by %.1e\n", c.name, static_cast<long>(smooth), p.disc.size(),
+                error);
   }
 }
 
-// A pixel's middle may be the droplet's own, which has no azimuth: the picture there is the one a hair beside it, and so is how it moves.
+// A pixel's middle may be the droplet's own, which has no azimuth: the picture there is the one a hair beside it, and
+// so is how it moves.
 TEST(PolarTable, TheMiddleIsAPlaceLikeAnyOther) {
   for (const Case& c : kCases) {
     Job j = job_of(c);
-    const std::size_t x = static_cast<std::size_t>(j.scene.view.center_x_px.index), y = static_cast<std::size_t>(j.scene.view.center_y_px.index);
+    const std::size_t x = static_cast<std::size_t>(j.scene.view.center_x_px.index),
+                      y = static_cast<std::size_t>(j.scene.view.center_y_px.index);
     Theta theta = j.b.table.values();
     theta[x] = 80, theta[y] = 79;
     RenderPlan p = plan(j.scene, theta);
@@ -151,40 +156,53 @@ TEST(PolarTable, TheMiddleIsAPlaceLikeAnyOther) {
     // Slopes are below 1 a pixel here, curvatures below 10.
     EXPECT_LT(largest_difference(table, beside.intensity), hair) << c.name;
     EXPECT_LT(largest_difference(in_the_middle.intensity, beside.intensity), hair) << c.name;
-    // What a bipolar droplet's surface couples is left out (docs/methods.md), by 1e-4 of the light and differently on all sides of the middle: its slope there is none.
+    // What a bipolar droplet's surface couples is left out (docs/methods.md), by 1e-4 of the light and differently on
+    // all sides of the middle: its slope there is none.
     if (std::string(c.name) == "bipolar") continue;
-    for (std::size_t k = 0; k < by.size(); ++k) EXPECT_LT(largest_difference(in_the_middle.derivatives[k], beside.derivatives[k]), 10 * hair) << c.name << " " << k;
+    for (std::size_t k = 0; k < by.size(); ++k)
+      EXPECT_LT(largest_difference(in_the_middle.derivatives[k], beside.derivatives[k]), 10 * hair)
+          << c.name << " " << k;
   }
 }
 
-// A core towards the light, in a host of much lower index: rays near the sphere's rim turn back into it, so that places in the core are seen twice and
-// its disc cannot be told from the way a ray passes its middle. Such a picture is planned without, and a picture that was planned with a disc of its
-// own does without when a fit has moved the core there.
+// A core towards the light, in a host of much lower index: rays near the sphere's rim turn back into it, so that places
+// in the core are seen twice and its disc cannot be told from the way a ray passes its middle. Such a picture is
+// planned without, and a picture that was planned with a disc of its own does without when a fit has moved the core
+// there.
 TEST(PolarTable, ACoreThatIsSeenTwiceHasNoDisc) {
   Job j = job_of({"shell", [](TableBuilder& b, Droplet& d, std::vector<int>& by) {
                     ShellDirector shell;
                     shell.wall_um = b.fixed("wall_um", 3.1 * 0.45);
-                    shell.offset_um = {b.fixed("offset_x_um", 0.045), b.fixed("offset_y_um", 0), b.fixed("offset_z_um", 2.8 * 0.45)};
+                    shell.offset_um = {b.fixed("offset_x_um", 0.045), b.fixed("offset_y_um", 0),
+                                       b.fixed("offset_z_um", 2.8 * 0.45)};
                     by = {shell.offset_um[2].index, shell.wall_um.index};
                     d.director = shell;
                   }});
   Theta theta = j.b.table.values();
-  const auto set = [&](const char* name, double value) { theta[static_cast<std::size_t>(j.b.table.find(name).index)] = value; };
+  const auto set = [&](const char* name, double value) {
+    theta[static_cast<std::size_t>(j.b.table.find(name).index)] = value;
+  };
   set("ordinary", 1.6), set("birefringence", 0.1), set("surround", 1.33);
   j.scene.view.pixel_size_um = 0.126;
-  const auto of_core = [](const RenderPlan& p) { return std::count_if(p.disc.begin(), p.disc.end(), [](const DiscSquare& q) { return q.of_core; }); };
+  const auto of_core = [](const RenderPlan& p) {
+    return std::count_if(p.disc.begin(), p.disc.end(), [](const DiscSquare& q) { return q.of_core; });
+  };
   const RenderPlan there = plan(j.scene, theta);
   EXPECT_EQ(of_core(there), 0);
-  EXPECT_LT(largest_difference(render(j.scene, there, theta, {}, 2).intensity, render(j.scene, with_rays_alone(there), theta, {}, 2).intensity), 3e-2 * j.scene.intensity_accuracy);
+  EXPECT_LT(largest_difference(render(j.scene, there, theta, {}, 2).intensity,
+                               render(j.scene, with_rays_alone(there), theta, {}, 2).intensity),
+            3e-2 * j.scene.intensity_accuracy);
   const Theta seen_twice = theta;
   set("offset_z_um", 0.2);
   const RenderPlan apart = plan(j.scene, theta);
   ASSERT_GT(of_core(apart), 0);
-  EXPECT_LT(largest_difference(render(j.scene, apart, seen_twice, {}, 2).intensity, render(j.scene, with_rays_alone(apart), seen_twice, {}, 2).intensity), 0.5 * j.scene.intensity_accuracy);
+  EXPECT_LT(largest_difference(render(j.scene, apart, seen_twice, {}, 2).intensity,
+                               render(j.scene, with_rays_alone(apart), seen_twice, {}, 2).intensity),
+            0.5 * j.scene.intensity_accuracy);
 }
 
-// A fit moves the droplet, lets it grow and turns it with the plan it has; what is no longer smooth (a core's edge has come in) must be
-// found out.
+// A fit moves the droplet, lets it grow and turns it with the plan it has; what is no longer smooth (a core's edge has
+// come in) must be found out.
 TEST(PolarTable, PartsFollowTheDroplet) {
   for (const Case& c : kCases) {
     const Job j = job_of(c);
@@ -194,9 +212,10 @@ TEST(PolarTable, PartsFollowTheDroplet) {
     theta[static_cast<std::size_t>(j.by[5])] -= 5.1;
     for (const int index : {j.by[0], j.by[6], j.by[7]}) {
       theta[static_cast<std::size_t>(index)] *= 1.1;
-      const double error = largest_difference(render(j.scene, p, theta, {}, 2).intensity, render(j.scene, with_rays_alone(p), theta, {}, 2).intensity);
-      // Parts are given up at a tail of a tenth of the accuracy. Where a kink has just come in, between a part's end and its first point,
-      // no tail shows it.
+      const double error = largest_difference(render(j.scene, p, theta, {}, 2).intensity,
+                                              render(j.scene, with_rays_alone(p), theta, {}, 2).intensity);
+      // Parts are given up at a tail of a tenth of the accuracy. Where a kink has just come in, between a part's end
+      // and its first point, no tail shows it.
       EXPECT_LT(error, 0.5 * j.scene.intensity_accuracy) << c.name;
     }
   }
@@ -207,16 +226,19 @@ TEST(PolarTable, DerivativesAreThoseOfWhatIsRead) {
     const Job j = job_of(c);
     const Theta theta = j.b.table.values();
     const RenderPlan p = plan(j.scene, theta);
-    const Rendering all = render(j.scene, p, theta, j.by, 2), rays = render(j.scene, with_rays_alone(p), theta, j.by, 2);
+    const Rendering all = render(j.scene, p, theta, j.by, 2),
+                    rays = render(j.scene, with_rays_alone(p), theta, j.by, 2);
     EXPECT_LT(largest_difference(all.intensity, render(j.scene, p, theta, {}, 1).intensity), 1e-12) << c.name;
     // A director from elements has kinks between them, which polynomials follow to less, and so do differences.
     const bool elements = c.name[0] == 'u', kink = c.name[0] == 'e';
     for (std::size_t k = 0; k < j.by.size(); ++k) {
       const Image& d = all.derivatives[k];
-      const double size = std::abs(*std::max_element(d.values().begin(), d.values().end(), [](double a, double b) { return std::abs(a) < std::abs(b); }));
+      const double size = std::abs(*std::max_element(d.values().begin(), d.values().end(),
+                                                     [](double a, double b) { return std::abs(a) < std::abs(b); }));
       ASSERT_GT(size, 0) << c.name << ", " << k;
       // The rays' own: an error of 1e-6 in the value is more in its slope.
-      EXPECT_LT(largest_difference(d, rays.derivatives[k]), (elements ? 1e-3 : 2e-4) * size) << c.name << ", parameter " << k;
+      EXPECT_LT(largest_difference(d, rays.derivatives[k]), (elements ? 1e-3 : 2e-4) * size)
+          << c.name << ", parameter " << k;
       // Central differences of the same picture, extrapolated once, away from the rim, where light ends like a root.
       const std::size_t at = static_cast<std::size_t>(j.by[k]);
       const double h = 1e-3 * std::max(1.0, std::abs(theta[at])) / (k == 4 || k == 5 ? 80 : 1);
@@ -237,7 +259,8 @@ TEST(PolarTable, DerivativesAreThoseOfWhatIsRead) {
           worst = std::max(worst, std::abs(difference - d(column, row)));
           off += (difference - d(column, row)) * (difference - d(column, row)), all += difference * difference;
         }
-      // Over a step the core's edge goes from pixel to pixel, which take their points by where it passes: worst pixels say little there.
+      // Over a step the core's edge goes from pixel to pixel, which take their points by where it passes: worst pixels
+      // say little there.
       EXPECT_LT(std::sqrt(off / all), kink ? 1e-2 : 2e-3) << c.name << ", parameter " << k;
       if (!kink) {
         EXPECT_LT(worst, (elements ? 3e-3 : 1e-3) * size) << c.name << ", parameter " << k;

@@ -1,5 +1,5 @@
-// A picture read from a table over the radius is the picture of one ray a point, derivatives included: droplets, and shells
-// with the kink that a core's edge leaves.
+// A picture read from a table over the radius is the picture of one ray a point, derivatives included: droplets, and
+// shells with the kink that a core's edge leaves.
 
 #include <gtest/gtest.h>
 
@@ -64,7 +64,8 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
     s.view.pixel_size_um = 0.07;
     s.view.center_x_px = b.fixed("center_x", 80.3);
     s.view.center_y_px = b.fixed("center_y", 78.9);
-    std::vector<int> by{droplet.diameter_um.index, material.birefringence.index, s.view.center_x_px.index, s.surround_index.index,
+    std::vector<int> by{droplet.diameter_um.index, material.birefringence.index, s.view.center_x_px.index,
+                        s.surround_index.index,
                         // Two combinations of the others: light knows sizes and indices in wavelengths only.
                         material.ordinary.index, s.microscope.wavelength_nm.index};
     if (c.wall_um > 0) by.push_back(std::get<ShellDirector>(droplet.director).wall_um.index);
@@ -78,18 +79,20 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
     const Rendering read = render(s, table, theta, by), direct = render(s, rays, theta, by);
     const auto worst = [](const Image& a, const Image& b) {
       double error = 0;
-      for (std::size_t i = 0; i < a.values().size(); ++i) error = std::max(error, std::abs(a.values()[i] - b.values()[i]));
+      for (std::size_t i = 0; i < a.values().size(); ++i)
+        error = std::max(error, std::abs(a.values()[i] - b.values()[i]));
       return error;
     };
     double light = 0;
     for (const double v : direct.intensity.values()) light = std::max(light, v);
     EXPECT_GT(light, 0.5) << c.name;
-    // The planner builds tables to 1e-3 of the accuracy; ten times that leaves room between the radii it looked at. A director from elements has
-    // kinks between them, which polynomials follow to less, their slopes above all.
+    // The planner builds tables to 1e-3 of the accuracy; ten times that leaves room between the radii it looked at. A
+    // director from elements has kinks between them, which polynomials follow to less, their slopes above all.
     const bool elements = c.field > 0;
     EXPECT_LT(worst(read.intensity, direct.intensity), (elements ? 2e-2 : 1e-2) * s.intensity_accuracy) << c.name;
     for (std::size_t j = 0; j < by.size(); ++j) {
-      // To the accuracy asked for, relative to the largest. Derivatives of a root at its end have no bound: a thousandth of the pixels is left out.
+      // To the accuracy asked for, relative to the largest. Derivatives of a root at its end have no bound: a
+      // thousandth of the pixels is left out.
       std::vector<double> error;
       double size = 0;
       for (std::size_t i = 0; i < read.derivatives[j].values().size(); ++i) {
@@ -98,7 +101,8 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
       }
       std::sort(error.begin(), error.end());
       EXPECT_GT(size, 0) << c.name;
-      EXPECT_LT(error[error.size() - 1 - error.size() / 1000], (elements ? 5 : 1) * s.intensity_accuracy * size) << c.name << ", " << b.table[by[j]].name;
+      EXPECT_LT(error[error.size() - 1 - error.size() / 1000], (elements ? 5 : 1) * s.intensity_accuracy * size)
+          << c.name << ", " << b.table[by[j]].name;
     }
   }
 }

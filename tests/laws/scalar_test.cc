@@ -34,7 +34,8 @@ TEST(Lanes, SinesAndCosinesAreExactToRounding) {
     alignas(64) double x[kLanes];
     for (int k = 0; k < kLanes; ++k) {
       x[k] = std::copysign(std::pow(10.0, exponent(random)), fraction(random));
-      if ((i + k) % 3 == 0) x[k] = std::floor(1000 * fraction(random)) * 1.5707963267948966 * (1 + 1e-15 * fraction(random));
+      if ((i + k) % 3 == 0)
+        x[k] = std::floor(1000 * fraction(random)) * 1.5707963267948966 * (1 + 1e-15 * fraction(random));
       if ((i + k) % 97 == 0) x[k] = std::copysign(0.0, fraction(random));
     }
     Pack s, c;

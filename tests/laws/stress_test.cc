@@ -33,7 +33,8 @@ void expect_answers_within_their_own_estimate_or_flagged(const Points& points) {
   }
   EXPECT_GT(judged, 150);
   // Flagging everything is no answer: the workhorses answer nearly everywhere.
-  const int places = static_cast<int>(std::count_if(points.begin(), points.end(), [](const StressPoint& p) { return p.method == "magnus4"; }));
+  const int places = static_cast<int>(
+      std::count_if(points.begin(), points.end(), [](const StressPoint& p) { return p.method == "magnus4"; }));
   EXPECT_GT(answered["magnus4"], 0.8 * places);
   EXPECT_GT(answered["magnus6"], 0.8 * places);
 }
@@ -44,24 +45,51 @@ void expect_every_known_trap(const Points& points) {
     swept.insert(p.sweep);
     methods.insert(p.method);
   }
-  for (const char* trap : {"impact_um", "rim_gap", "axis_passes_ray", "birefringence", "c2_parameter", "pole_birefringence", "gap_to_total_reflection",
-                           "thickness_um", "pitch_um", "absorption_k", "host_index", "turn_width_um", "step_beside_node", "kink_beside_node",
-                           "sub_layer_width", "crossed_polarizer_deg", "parallel_polarizer_deg", "wave_radius_um in 1.43", "wave_host_index dn 0.02",
-                           "wave_birefringence in 1.52", "wave_objective_na in 1.33", "wave_focus_um na 0.8", "wave_wall_um in 1.33", "wave_analyzer_deg",
-                           "wave_pixels_across", "wave_bipolar_dn in 1.43", "wave_twist_deg in 1.43", "wave_offset_um in 1.43"})
+  for (const char* trap : {"impact_um",
+                           "rim_gap",
+                           "axis_passes_ray",
+                           "birefringence",
+                           "c2_parameter",
+                           "pole_birefringence",
+                           "gap_to_total_reflection",
+                           "thickness_um",
+                           "pitch_um",
+                           "absorption_k",
+                           "host_index",
+                           "turn_width_um",
+                           "step_beside_node",
+                           "kink_beside_node",
+                           "sub_layer_width",
+                           "crossed_polarizer_deg",
+                           "parallel_polarizer_deg",
+                           "wave_radius_um in 1.43",
+                           "wave_host_index dn 0.02",
+                           "wave_birefringence in 1.52",
+                           "wave_objective_na in 1.33",
+                           "wave_focus_um na 0.8",
+                           "wave_wall_um in 1.33",
+                           "wave_analyzer_deg",
+                           "wave_pixels_across",
+                           "wave_bipolar_dn in 1.43",
+                           "wave_twist_deg in 1.43",
+                           "wave_offset_um in 1.43"})
     EXPECT_TRUE(swept.contains(trap)) << trap;
-  for (const TransportMethod<double>* method : transport_methods<double>()) EXPECT_TRUE(methods.contains(method->info().name)) << method->info().name;
-  for (const char* waves : {"series of a ball", "split_step of a ball", "march of a ball"}) EXPECT_TRUE(methods.contains(waves)) << waves;
+  for (const TransportMethod<double>* method : transport_methods<double>())
+    EXPECT_TRUE(methods.contains(method->info().name)) << method->info().name;
+  for (const char* waves : {"series of a ball", "split_step of a ball", "march of a ball"})
+    EXPECT_TRUE(methods.contains(waves)) << waves;
 }
 
 // An estimate that always says 1 would obey the law too: the median of estimate over error stays below 100.
 void expect_sharp_estimates(const Points& points) {
   std::map<std::string, std::vector<double>> sharpness;
   for (const StressPoint& p : points)  // a picture by rays states what was asked for, no estimate of its own
-    if (p.flag.empty() && p.error > 1e-10 && p.sweep.find("_polarizer_deg") == std::string::npos) sharpness[p.method].push_back(p.estimate / p.error);
+    if (p.flag.empty() && p.error > 1e-10 && p.sweep.find("_polarizer_deg") == std::string::npos)
+      sharpness[p.method].push_back(p.estimate / p.error);
   for (auto& [method, ratios] : sharpness) {
     std::nth_element(ratios.begin(), ratios.begin() + static_cast<long>(ratios.size() / 2), ratios.end());
-    std::printf("  %-20s median estimate/error %.1f of %zu\n", method.c_str(), ratios[ratios.size() / 2], ratios.size());
+    std::printf("  %-20s median estimate/error %.1f of %zu\n", method.c_str(), ratios[ratios.size() / 2],
+                ratios.size());
     EXPECT_LT(ratios[ratios.size() / 2], 100) << method;
   }
   EXPECT_GE(sharpness.size(), 6u);

@@ -1,5 +1,6 @@
-// Pictures that half a turn about the viewing axis, or a mirror, leaves as they are: half of them is computed, and must be the picture
-// and the derivatives that computing all of it gives; and a scene without that symmetry must not be taken for one.
+// Pictures that half a turn about the viewing axis, or a mirror, leaves as they are: half of them is computed, and must
+// be the picture and the derivatives that computing all of it gives; and a scene without that symmetry must not be
+// taken for one.
 
 #include <gtest/gtest.h>
 
@@ -18,8 +19,8 @@ using namespace testing;
 struct Case {
   const char* name;
   std::function<void(TableBuilder&, Scene&, std::vector<int>&)> build;  ///< adds what derivatives are taken by
-  bool half;              ///< with these derivatives
-  bool half_of_values;    ///< the picture alone
+  bool half;                                                            ///< with these derivatives
+  bool half_of_values;                                                  ///< the picture alone
 };
 
 Droplet droplet(TableBuilder& b, std::vector<int>& by) {
@@ -88,8 +89,10 @@ const Case kCases[] = {
        by.clear();  // no bound to the slope by the diameter where a ray touches the core
      },
      false, false},
-    {"plate in a cone", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 20, 0, by); }, true, true},
-    {"plate cut normal to its axis", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 0, 90, by); }, true, true},
+    {"plate in a cone", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 20, 0, by); },
+     true, true},
+    {"plate cut normal to its axis",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 0, 90, by); }, true, true},
     {"plate, its tilt searched",
      [](TableBuilder& b, Scene& s, std::vector<int>& by) {
        const Plate p = plate(b, s, 20, 0, by);
@@ -97,11 +100,12 @@ const Case kCases[] = {
        s.sample = p;
      },
      false, true},
-    {"plate with a tilted axis", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 20, 30, by); }, false, false},
+    {"plate with a tilted axis",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 20, 30, by); }, false, false},
 };
 
-/// The same of two ways to compute it; a millionth of a pixel between them changes an intensity by a few millionths of a fringe, a
-/// derivative relatively as much.
+/// The same of two ways to compute it; a millionth of a pixel between them changes an intensity by a few millionths of
+/// a fringe, a derivative relatively as much.
 void expect_same(const Image& x, const Image& y, const std::string& what) {
   double size_of = 0, error = 0;
   for (std::size_t i = 0; i < y.values().size(); ++i) {
@@ -134,14 +138,18 @@ TEST(HalfTurn, HalfAPictureIsComputedWhereTheOtherIsTheSame) {
       Theta beside = centred;  // a millionth of a pixel: no symmetry that could be used
       beside[static_cast<std::size_t>(s.view.center_x_px.index)] += 1e-6;
       const RenderPlan p = plan(s, centred);
-      EXPECT_EQ(make_pixel_model<double>(s, p, Values<double>(centred, {}))->symmetry() == Symmetry::half_turn, c.half_of_values) << c.name;
+      EXPECT_EQ(make_pixel_model<double>(s, p, Values<double>(centred, {}))->symmetry() == Symmetry::half_turn,
+                c.half_of_values)
+          << c.name;
       EXPECT_EQ(make_pixel_model<double>(s, p, Values<double>(beside, {}))->symmetry(), Symmetry::none) << c.name;
-      EXPECT_EQ(make_pixel_model<Dual4>(s, p, Values<Dual4>(centred, by))->symmetry() == Symmetry::half_turn, c.half) << c.name;
+      EXPECT_EQ(make_pixel_model<Dual4>(s, p, Values<Dual4>(centred, by))->symmetry() == Symmetry::half_turn, c.half)
+          << c.name;
       const Image alone = render(s, p, centred, {}).intensity, whole_alone = render(s, p, beside, {}).intensity;
       const Rendering half = render(s, p, centred, by), whole = render(s, p, beside, by);
       expect_same(alone, whole_alone, std::string(c.name) + ", image alone");
       expect_same(half.intensity, whole.intensity, std::string(c.name) + ", image");
-      for (std::size_t j = 0; j < by.size(); ++j) expect_same(half.derivatives[j], whole.derivatives[j], std::string(c.name) + ", " + b.table[by[j]].name);
+      for (std::size_t j = 0; j < by.size(); ++j)
+        expect_same(half.derivatives[j], whole.derivatives[j], std::string(c.name) + ", " + b.table[by[j]].name);
     }
 }
 
@@ -153,15 +161,18 @@ struct Mirrored {
 };
 Droplet bipolar(TableBuilder& b, double azimuth_deg, double tilt_deg, std::vector<int>& by, bool searched) {
   Droplet d = droplet(b, by);
-  const BipolarDirector director{b.fixed("azimuth_deg", azimuth_deg), b.fixed("tilt_deg", tilt_deg), b.fixed("pole_distance", 1.2)};
+  const BipolarDirector director{b.fixed("azimuth_deg", azimuth_deg), b.fixed("tilt_deg", tilt_deg),
+                                 b.fixed("pole_distance", 1.2)};
   by.insert(by.end(), {director.tilt_deg.index, director.pole_distance.index});
   if (searched) by.push_back(director.azimuth_deg.index);
   d.director = director;
   return d;
 }
 const Mirrored kMirrored[] = {
-    {"radial droplet beside the middle", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = droplet(b, by); }, 0, 90, true},
-    {"its polarizers turned", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = droplet(b, by); }, 10, 100, false},
+    {"radial droplet beside the middle",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = droplet(b, by); }, 0, 90, true},
+    {"its polarizers turned", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = droplet(b, by); }, 10,
+     100, false},
     {"twisted droplet",
      [](TableBuilder& b, Scene& s, std::vector<int>& by) {
        Droplet d = droplet(b, by);
@@ -169,10 +180,14 @@ const Mirrored kMirrored[] = {
        s.sample = d;
      },
      0, 90, false},
-    {"tilted bipolar droplet", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 0, 30, by, false); }, 90, 0, true},
-    {"poles along y", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 90, 0, by, false); }, 0, 0, false},
-    {"its azimuth searched", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 0, 30, by, true); }, 0, 90, false},
-    {"poles out of the mirror", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 20, 30, by, false); }, 0, 90, false},
+    {"tilted bipolar droplet",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 0, 30, by, false); }, 90, 0, true},
+    {"poles along y", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 90, 0, by, false); },
+     0, 0, false},
+    {"its azimuth searched",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 0, 30, by, true); }, 0, 90, false},
+    {"poles out of the mirror",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = bipolar(b, 20, 30, by, false); }, 0, 90, false},
     {"shell with its core aside",
      [](TableBuilder& b, Scene& s, std::vector<int>& by) {
        Droplet d = droplet(b, by);
@@ -184,8 +199,10 @@ const Mirrored kMirrored[] = {
        by.clear();  // no bound to the slopes where a ray touches the core
      },
      0, 90, true},
-    {"plate with its axis tilted in the mirror", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 0, 30, by); }, 0, 90, true},
-    {"plate with its axis tilted across", [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 45, 30, by); }, 0, 90, false},
+    {"plate with its axis tilted in the mirror",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 0, 30, by); }, 0, 90, true},
+    {"plate with its axis tilted across",
+     [](TableBuilder& b, Scene& s, std::vector<int>& by) { s.sample = plate(b, s, 45, 30, by); }, 0, 90, false},
 };
 
 // The centre may lie anywhere on the middle row, and be searched along it.
@@ -211,13 +228,15 @@ TEST(Mirror, HalfAPictureIsComputedWhereTheOtherIsItsMirrorImage) {
       Theta beside = middle;
       beside[static_cast<std::size_t>(s.view.center_y_px.index)] += 1e-6;
       const RenderPlan p = plan(s, middle);
-      EXPECT_EQ(make_pixel_model<Dual4>(s, p, Values<Dual4>(middle, by))->symmetry() == Symmetry::mirror, c.mirror) << c.name;
+      EXPECT_EQ(make_pixel_model<Dual4>(s, p, Values<Dual4>(middle, by))->symmetry() == Symmetry::mirror, c.mirror)
+          << c.name;
       EXPECT_EQ(make_pixel_model<Dual4>(s, p, Values<Dual4>(beside, by))->symmetry(), Symmetry::none) << c.name;
       std::vector<int> by_angle{s.microscope.analyzer_deg.index};
       EXPECT_NE(make_pixel_model<Dual1>(s, p, Values<Dual1>(middle, by_angle))->symmetry(), Symmetry::mirror) << c.name;
       const Rendering half = render(s, p, middle, by), whole = render(s, p, beside, by);
       expect_same(half.intensity, whole.intensity, std::string(c.name) + ", image");
-      for (std::size_t j = 0; j < by.size(); ++j) expect_same(half.derivatives[j], whole.derivatives[j], std::string(c.name) + ", " + b.table[by[j]].name);
+      for (std::size_t j = 0; j < by.size(); ++j)
+        expect_same(half.derivatives[j], whole.derivatives[j], std::string(c.name) + ", " + b.table[by[j]].name);
     }
 }
 

@@ -102,7 +102,8 @@ TEST(TransportLaws, AnswersAreFiniteOrRefused) {
         law.thickness_um = thickness_um;
         const LawColumn<double, TiltTwistLaw> column(law);
         try {
-          EXPECT_LT(size(method.transfer(column, oblique_ray(c), uniform_mesh(steps))), 1e6) << thickness_um << " um, " << steps << " steps";
+          EXPECT_LT(size(method.transfer(column, oblique_ray(c), uniform_mesh(steps))), 1e6)
+              << thickness_um << " um, " << steps << " steps";
           ++answered[method.info().name];
         } catch (const std::domain_error& error) {
           EXPECT_NE(std::string(error.what()).find(method.info().name), std::string::npos);
@@ -125,7 +126,9 @@ TEST(TransportLaws, AHomogeneousMediumTakesAnyStep) {
   for_each_method([](const auto& method, Continuity c) {
     const LawColumn<double, TiltTwistLaw> column(TiltTwistLaw{0.3, 0, 0, 0.7, 0, 1.52, 1.74, 1e4});
     // 1.7e5 rad of phase, known to 4e-11.
-    EXPECT_LT(distance(method.transfer(column, oblique_ray(c), uniform_mesh(1)), method.transfer(column, oblique_ray(c), uniform_mesh(64))), 1e-9);
+    EXPECT_LT(distance(method.transfer(column, oblique_ray(c), uniform_mesh(1)),
+                       method.transfer(column, oblique_ray(c), uniform_mesh(64))),
+              1e-9);
   });
 }
 // The mesh that adapts starts from steps that its method refuses.
@@ -188,7 +191,9 @@ TEST(TransportLaws, AxisAndItsOppositeAreTheSameMedium) {  // C17
     const auto check = [&](const TiltTwistLaw& law, const Ray<double>& ray) {
       const LawColumn<double, TiltTwistLaw> column(law);
       const LawColumn<double, Flipped<TiltTwistLaw>> flipped({law});
-      EXPECT_LT(distance(method.transfer(column, ray, uniform_mesh(32)), method.transfer(flipped, ray, uniform_mesh(32))), 1e-12);
+      EXPECT_LT(
+          distance(method.transfer(column, ray, uniform_mesh(32)), method.transfer(flipped, ray, uniform_mesh(32))),
+          1e-12);
     };
     check(kPlanar, normal_ray(c));
     if (coupled(method)) check(kCoupled, oblique_ray(c));
@@ -220,7 +225,7 @@ double measured_order(const TransportMethod<double>& method, const Ray<double>& 
 
 TEST(TransportLaws, MeasuredOrderIsTheDeclaredOne) {
   for_each_method([](const auto& method, Continuity c) {
-    if (method.info().order == 0) return;  // spectral
+    if (method.info().order == 0) return;                       // spectral
     if (is_layers(method) && c == Continuity::e_and_h) return;  // their own fact below
     // 128 steps of order 6 already reach rounding.
     EXPECT_NEAR(measured_order(method, oblique_ray(c), method.info().order > 4 ? 24 : 128), method.info().order, 0.25);
@@ -228,13 +233,16 @@ TEST(TransportLaws, MeasuredOrderIsTheDeclaredOne) {
 }
 // Dropping the backward wave at n faces of height ~ 1/n leaves an error ~ n (1/n)^2.
 TEST(TransportLaws, LayersWithEAndHContinuousConvergeAtFirstOrder) {
-  const double order = measured_order(transport_method<double>("layers_midpoint"), oblique_ray(Continuity::e_and_h), 8192);
-  // The 1/n^2 of the layers' middles is as large as the 1/n of the faces at 1,024 layers (1.4 there), an eighth at 8,192.
+  const double order =
+      measured_order(transport_method<double>("layers_midpoint"), oblique_ray(Continuity::e_and_h), 8192);
+  // The 1/n^2 of the layers' middles is as large as the 1/n of the faces at 1,024 layers (1.4 there), an eighth at
+  // 8,192.
   EXPECT_GT(order, 0.8);
   EXPECT_LT(order, 1.3);
 }
 
-// a = N^(1/2) E_t at normal incidence; N is symmetric there and its root is (N + sqrt(det) I)/sqrt(trace + 2 sqrt(det)).
+// a = N^(1/2) E_t at normal incidence; N is symmetric there and its root is (N + sqrt(det) I)/sqrt(trace + 2
+// sqrt(det)).
 TEST(TransportLaws, RetarderIsTheFluxNormalisedTransfer) {
   const LawColumn<double, TiltTwistLaw> column(kCoupled);
   const auto root = [&](double u) {
@@ -282,7 +290,8 @@ Eigen::Matrix4cd berreman(C eo, C ee, const Eigen::Vector3d& a, double kx, doubl
   return d;
 }
 
-// The two forward normal components of uniaxial plates, from the quartic equation (tests/data/physics/README.md): the eigenvalues of N.
+// The two forward normal components of uniaxial plates, from the quartic equation (tests/data/physics/README.md): the
+// eigenvalues of N.
 TEST(OneWayOperator, HasTheNormalComponentsOfTheQuartic) {
   const testing::ReferenceTable table(testing::data_path("physics/plate_wavevectors.csv"));
   const testing::ReferenceTable tensors(testing::data_path("physics/plate_tensors.csv"));
@@ -290,19 +299,26 @@ TEST(OneWayOperator, HasTheNormalComponentsOfTheQuartic) {
   const auto medium = [&](const std::string& name, double eo, const Vec3<double>& axis) {
     std::size_t row = 0;
     while (tensors.text(row, "case") != name) ++row;
-    return OpticalPoint<double>{axis, eo, tensors.number(row, "exx") + tensors.number(row, "eyy") + tensors.number(row, "ezz") - 2 * eo, 0.0, 0.0, 1.0};
+    return OpticalPoint<double>{
+        axis, eo,  tensors.number(row, "exx") + tensors.number(row, "eyy") + tensors.number(row, "ezz") - 2 * eo,
+        0.0,  0.0, 1.0};
   };
   const double a = 1 / std::sqrt(8.0), c = std::sqrt(3.0) / 2;
-  const OpticalPoint<double> e44 = medium("E44_278K_axisA", 1.53 * 1.53, {-a, a, -c}), calcite = medium("calcite_c_axis", 1.6584 * 1.6584, {0, 0, 1});
+  const OpticalPoint<double> e44 = medium("E44_278K_axisA", 1.53 * 1.53, {-a, a, -c}),
+                             calcite = medium("calcite_c_axis", 1.6584 * 1.6584, {0, 0, 1});
   int compared = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
     const std::string name = table.text(row, "case");
     if (name != "E44_278K_axisA" && name != "calcite_c_axis") continue;  // biaxial
     const OpticalPoint<double>& p = name == "calcite_c_axis" ? calcite : e44;
-    const double angle = table.number(row, "theta_inc_deg") * std::numbers::pi / 180, azimuth = table.number(row, "azimuth_deg") * std::numbers::pi / 180;
-    const Matrix2<double> n = one_way_lossless(p, std::sin(angle) * std::cos(azimuth), std::sin(angle) * std::sin(azimuth)).index;
-    const double half = 0.5 * (n.a + n.d), root = std::sqrt(std::max(0.25 * (n.a - n.d) * (n.a - n.d) + n.b * n.c, 0.0));
-    const double tolerance = root < 1e-6 ? 3e-7 : 1e-11;  // at double roots, along the axis, theirs are good to 1e-7; tensors have 12 digits
+    const double angle = table.number(row, "theta_inc_deg") * std::numbers::pi / 180,
+                 azimuth = table.number(row, "azimuth_deg") * std::numbers::pi / 180;
+    const Matrix2<double> n =
+        one_way_lossless(p, std::sin(angle) * std::cos(azimuth), std::sin(angle) * std::sin(azimuth)).index;
+    const double half = 0.5 * (n.a + n.d),
+                 root = std::sqrt(std::max(0.25 * (n.a - n.d) * (n.a - n.d) + n.b * n.c, 0.0));
+    // at double roots, along the axis, theirs are good to 1e-7; tensors have 12 digits
+    const double tolerance = root < 1e-6 ? 3e-7 : 1e-11;
     EXPECT_NEAR(half - root, table.number(row, "q_small"), tolerance) << name << " " << angle << " " << azimuth;
     EXPECT_NEAR(half + root, table.number(row, "q_large"), tolerance) << name << " " << angle << " " << azimuth;
     ++compared;
@@ -322,7 +338,8 @@ TEST(OneWayOperator, IntertwinesWithBerremanInRandomMedia) {
     const double kx = kappa * std::cos(azimuth), ky = kappa * std::sin(azimuth);
     Eigen::Vector3d a(gauss(random), gauss(random), gauss(random));
     if (i % 4 == 0)  // axis within 1e-6 of the ordinary wavevector
-      a = Eigen::Vector3d(kx, ky, std::sqrt(n_o * n_o - kappa * kappa)).normalized() + 5e-7 * Eigen::Vector3d(gauss(random), gauss(random), gauss(random)) * unit(random);
+      a = Eigen::Vector3d(kx, ky, std::sqrt(n_o * n_o - kappa * kappa)).normalized() +
+          5e-7 * Eigen::Vector3d(gauss(random), gauss(random), gauss(random)) * unit(random);
     a.normalize();
     const C eo = C(n_o, k_o) * C(n_o, k_o), ee = C(n_e, k_e) * C(n_e, k_e);
     const OpticalPoint<double> p{{a.x(), a.y(), a.z()}, eo.real(), ee.real(), eo.imag(), ee.imag(), 1};

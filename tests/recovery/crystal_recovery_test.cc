@@ -19,8 +19,8 @@ struct Bar {
   double half_wave_v = 1500, built_in_v = 0;
   double gain = 3000, offset = 200, read = 20;
   int width = 80, height = 64;
-  int good_from = 0, good_to = 64;   ///< rows of a field as the model has it
-  double bad_field = 0;              ///< elsewhere: a field larger by up to this part, by chance from frame to frame
+  int good_from = 0, good_to = 64;  ///< rows of a field as the model has it
+  double bad_field = 0;             ///< elsewhere: a field larger by up to this part, by chance from frame to frame
 };
 
 FitJob job_of(const Bar& bar, const std::vector<double>& volts, bool built_in_free, unsigned seed) {
@@ -55,8 +55,8 @@ FitJob job_of(const Bar& bar, const std::vector<double>& volts, bool built_in_fr
         mean.push_back(bar.offset + bar.gain * std::pow(std::sin(phase), 2));
       }
     job.measurements.push_back(micrograph_of(std::to_string(static_cast<int>(volts[g])), scene,
-                                            camera(mean, 1, bar.read, seed + 100 * static_cast<unsigned>(g), false),
-                                            gain, offset, {bar.read, 1}));
+                                             camera(mean, 1, bar.read, seed + 100 * static_cast<unsigned>(g), false),
+                                             gain, offset, {bar.read, 1}));
   }
   job.parameters = b.table;
   job.options.threads = 1;

@@ -1,4 +1,5 @@
-// Load and centre of a photoelastic disc from one image. Truth: the textbook's stresses and intensity, in code of its own.
+// Load and centre of a photoelastic disc from one image. Truth: the textbook's stresses and intensity, in code of its
+// own.
 
 #include <gtest/gtest.h>
 
@@ -43,7 +44,8 @@ FitJob disc_job(double counts_per_photon, double read_counts, unsigned long seed
   disc.diameter_um = b.fixed("diameter_um", 2 * d.radius_um);
   disc.thickness_um = b.fixed("thickness_um", d.thickness_um);
   disc.load_n = b.fitted("load_n", 125, 60, 350);
-  disc.stress_optic_brewster = coefficient_free ? b.fitted("stress_optic_brewster", 52, 20, 100) : b.fixed("stress_optic_brewster", d.stress_optic_brewster);
+  disc.stress_optic_brewster = coefficient_free ? b.fitted("stress_optic_brewster", 52, 20, 100)
+                                                : b.fixed("stress_optic_brewster", d.stress_optic_brewster);
   disc.load_azimuth_deg = b.fixed("load_azimuth_deg", 90);
   scene.sample = disc;
   scene.microscope.wavelength_nm = b.fixed("wavelength_nm", d.wavelength_nm);
@@ -57,12 +59,14 @@ FitJob disc_job(double counts_per_photon, double read_counts, unsigned long seed
   scene.view.rotation_deg = b.fixed("rotation", 0);
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
   FitJob job;
-  Picture m = micrograph_of("disc", scene, camera(mean, counts_per_photon, read_counts, seed, false), gain, offset, {read_counts, counts_per_photon});
+  Picture m = micrograph_of("disc", scene, camera(mean, counts_per_photon, read_counts, seed, false), gain, offset,
+                            {read_counts, counts_per_photon});
   const double radius = d.radius_um / d.um_per_px;
   for (int row = 0; row < kSide; ++row)  // not the edge, not the forces
     for (int column = 0; column < kSide; ++column) {
       const double x = column - 32, y = 31 - row;
-      if (std::hypot(x, y) > 0.95 * radius || std::hypot(x, std::abs(y) - radius) < 0.2 * radius) m.mask(column, row) = 0;
+      if (std::hypot(x, y) > 0.95 * radius || std::hypot(x, std::abs(y) - radius) < 0.2 * radius)
+        m.mask(column, row) = 0;
     }
   job.measurements.push_back(m);
   job.parameters = b.table;
@@ -75,16 +79,17 @@ std::map<std::string, Spread> recover(double counts_per_photon, double read_coun
   for (int seed = 1; seed <= seeds; ++seed) {
     const FitResult r = fit(disc_job(counts_per_photon, read_counts, static_cast<unsigned long>(seed)));
     EXPECT_TRUE(r.has_answer()) << "seed " << seed << ": " << r.verdict;
-    for (const auto& [name, value] : {std::pair{"load_n", truth().load_n}, std::pair{"center_x", truth().center_x_px}, std::pair{"center_y", truth().center_y_px},
-                                      std::pair{"gain", kGain}, std::pair{"offset", kOffset}}) {
+    for (const auto& [name, value] :
+         {std::pair{"load_n", truth().load_n}, std::pair{"center_x", truth().center_x_px},
+          std::pair{"center_y", truth().center_y_px}, std::pair{"gain", kGain}, std::pair{"offset", kOffset}}) {
       const ParameterEstimate* p = find_estimate(r, name);
       EXPECT_LT(std::abs(p->value - value), 5 * p->stderr_) << name << " seed " << seed << " " << p->value;
       spread[name].add(p->value - value, p->stderr_);
     }
   }
   for (const auto& [name, s] : spread)
-    std::printf("  photon %g read %g %-9s spread/stderr %.3f bias %.2f worst %.2f (stderr %.2g)\n", counts_per_photon, read_counts, name.c_str(), s.ratio(),
-                s.bias(), s.worst(), s.stderr_[0]);
+    std::printf("  photon %g read %g %-9s spread/stderr %.3f bias %.2f worst %.2f (stderr %.2g)\n", counts_per_photon,
+                read_counts, name.c_str(), s.ratio(), s.bias(), s.worst(), s.stderr_[0]);
   return spread;
 }
 
@@ -98,8 +103,8 @@ TEST(DiscRecovery, CoefficientAndLoadTogetherAreNotIdentifiable) {
   EXPECT_NE(r.verdict.find("load_n"), std::string::npos) << r.verdict;
 }
 
-// What is left out around the forces follows the direction searched for: from starts up to 45 degrees off, between bounds
-// as wide, the forces' own places are not fitted, though the start's are.
+// What is left out around the forces follows the direction searched for: from starts up to 45 degrees off, between
+// bounds as wide, the forces' own places are not fitted, though the start's are.
 TEST(DiscRecovery, ZonesAroundTheForcesFollowTheDirection) {
   std::mt19937_64 random(49);
   const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
@@ -136,14 +141,15 @@ TEST(DiscRecovery, ZonesAroundTheForcesFollowTheDirection) {
     scene.view.rotation_deg = b.fixed("rotation", 0);
     const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
     FitJob job;
-    job.measurements.push_back(micrograph_of("disc", scene, camera(mean, 1, 3, 1000u + static_cast<unsigned>(draw), false),
-                                            gain, offset, {3, 1}));
+    job.measurements.push_back(micrograph_of(
+        "disc", scene, camera(mean, 1, 3, 1000u + static_cast<unsigned>(draw), false), gain, offset, {3, 1}));
     job.parameters = b.table;
     job.options.threads = 1;
     const FitResult r = fit(job);
     EXPECT_TRUE(r.has_answer()) << draw << ": " << r.verdict;
     EXPECT_LT(r.reduced_chi_square, 1.1) << draw;  // 4000 pixels and more: 1 +- 0.022
-    for (const auto& [name, value] : {std::pair{"load_n", d.load_n}, std::pair{"load_azimuth_deg", d.load_azimuth_deg}}) {
+    for (const auto& [name, value] :
+         {std::pair{"load_n", d.load_n}, std::pair{"load_azimuth_deg", d.load_azimuth_deg}}) {
       const ParameterEstimate* e = find_estimate(r, name);
       EXPECT_LT(std::abs(e->value - value), 5 * e->stderr_) << draw << ' ' << name << ' ' << e->value << ' ' << value;
     }
@@ -151,8 +157,8 @@ TEST(DiscRecovery, ZonesAroundTheForcesFollowTheDirection) {
   }
 }
 
-// The standard error of a fit that knows its noise is the Cramer-Rao bound. 300 repetitions tell the spread to 1/sqrt(2 * 299) =
-// 4 %: at most 1.1 times the bound leaves 2.4 of these. Noise of 1 % of the range.
+// The standard error of a fit that knows its noise is the Cramer-Rao bound. 300 repetitions tell the spread to 1/sqrt(2
+// * 299) = 4 %: at most 1.1 times the bound leaves 2.4 of these. Noise of 1 % of the range.
 TEST(LongDiscRecovery, SpreadIsTheCramerRaoBoundAtOnePercentNoise) {
   for (const auto& [name, s] : recover(0.001, 0.01 * kGain, 300)) {
     EXPECT_LE(s.ratio(), 1.1) << name;

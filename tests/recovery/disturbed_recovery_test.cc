@@ -1,6 +1,7 @@
-// A droplet's image with what real ones have: dust, scratches, another droplet, uneven light, a camera curve, JPEG, polarizers off their marks,
-// saturation, a cut-off edge. Without help a fit may be worse, never confidently wrong; with the setting made for it, it is as good as without
-// the disturbance. The pictures are birefit's own: what is tested is the estimation.
+// A droplet's image with what real ones have: dust, scratches, another droplet, uneven light, a camera curve, JPEG,
+// polarizers off their marks, saturation, a cut-off edge. Without help a fit may be worse, never confidently wrong;
+// with the setting made for it, it is as good as without the disturbance. The pictures are birefit's own: what is
+// tested is the estimation.
 
 #include <gtest/gtest.h>
 
@@ -32,7 +33,8 @@ struct Droplet96 {
     birefit::Droplet droplet;
     droplet.diameter_um = diameter = b.fitted("diameter_um", kDiameter, 8.7, 9.9);
     scene.sample = droplet;
-    scene.material = ConstantIndices{b.fixed("ordinary", 1.52), birefringence = b.fitted("birefringence", kBirefringence, 0.15, 0.30)};
+    scene.material = ConstantIndices{b.fixed("ordinary", 1.52),
+                                     birefringence = b.fitted("birefringence", kBirefringence, 0.15, 0.30)};
     scene.surround_index = b.fixed("surround", 1.43);
     scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
     scene.microscope.polarizer_deg = polarizer = b.fixed("polarizer_deg", 0);
@@ -54,18 +56,21 @@ struct Droplet96 {
 };
 
 using Random = std::mt19937_64;
-double uniform(Random& random, double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
+double uniform(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
 
 /// Counts with photon and read noise.
 void expose(Image& counts, Random& random) {
   std::normal_distribution<double> normal;
-  for (double& v : counts.values()) v = static_cast<double>(std::poisson_distribution<long>(std::max(v, 0.0))(random)) + 3 * normal(random);
+  for (double& v : counts.values())
+    v = static_cast<double>(std::poisson_distribution<long>(std::max(v, 0.0))(random)) + 3 * normal(random);
 }
 
 struct Disturbance {
-  std::function<void(Droplet96&)> truth = [](Droplet96&) {};                ///< of the scene
-  std::function<void(Image&, Random&)> light = [](Image&, Random&) {};      ///< on mean counts
-  std::function<void(Image&, Random&)> camera = [](Image&, Random&) {};     ///< on recorded counts
+  std::function<void(Droplet96&)> truth = [](Droplet96&) {};             ///< of the scene
+  std::function<void(Image&, Random&)> light = [](Image&, Random&) {};   ///< on mean counts
+  std::function<void(Image&, Random&)> camera = [](Image&, Random&) {};  ///< on recorded counts
   std::function<void(Droplet96&, FitJob&)> help = [](Droplet96&, FitJob&) {};
 };
 
@@ -79,7 +84,14 @@ FitResult fit_one(const Disturbance& by, bool helped, unsigned seed) {
   expose(counts, random);
   by.camera(counts, random);
   // Starts and what the user believes.
-  for (const auto& [ref, start] : {std::pair(d.diameter, 9.2), {d.birefringence, 0.21}, {d.center_x, 47.0}, {d.center_y, 48.0}, {d.polarizer, 0.0}, {d.analyzer, 90.0}, {d.gain, 900.0}, {d.offset, 0.0}})
+  for (const auto& [ref, start] : {std::pair(d.diameter, 9.2),
+                                   {d.birefringence, 0.21},
+                                   {d.center_x, 47.0},
+                                   {d.center_y, 48.0},
+                                   {d.polarizer, 0.0},
+                                   {d.analyzer, 90.0},
+                                   {d.gain, 900.0},
+                                   {d.offset, 0.0}})
     d.b.table[ref].value = start;
   FitJob job;
   Picture m = micrograph_of("droplet", d.scene, counts.values(), d.gain, d.offset, {3, 1});
@@ -107,15 +119,19 @@ Outcome fits(const char* name, const Disturbance& by, bool helped, int seeds = 1
       ++all.without_answer;
       continue;
     }
-    for (const auto& [p, truth, spread] : {std::tuple("diameter_um", kDiameter, &all.diameter), {"birefringence", kBirefringence, &all.birefringence}}) {
+    for (const auto& [p, truth, spread] :
+         {std::tuple("diameter_um", kDiameter, &all.diameter), {"birefringence", kBirefringence, &all.birefringence}}) {
       const ParameterEstimate* e = find_estimate(r, p);
       spread->add(e->value - truth, e->stderr_);
       if (std::abs(e->value - truth) > 5 * e->stderr_) ++all.wrong;
     }
   }
-  std::printf("  %-14s %-8s reduced chi-square %6.2f, %2d without answer, errors in standard errors: diameter mean %+.2f worst %.2f, birefringence mean %+.2f worst %.2f; standard error of the birefringence %.2g\n",
-              name, helped ? "helped" : "", all.reduced, all.without_answer, all.diameter.bias(), all.diameter.worst(), all.birefringence.bias(), all.birefringence.worst(),
-              all.birefringence.stderr_.empty() ? 0 : all.birefringence.stderr_[0]);
+  std::printf(
+      "  %-14s %-8s reduced chi-square %6.2f, %2d without answer, errors in standard errors: diameter mean %+.2f worst "
+      "%.2f, birefringence mean %+.2f worst %.2f; standard error of the birefringence %.2g\n",
+      name, helped ? "helped" : "", all.reduced, all.without_answer, all.diameter.bias(), all.diameter.worst(),
+      all.birefringence.bias(), all.birefringence.worst(),
+      all.birefringence.stderr_.empty() ? 0 : all.birefringence.stderr_[0]);
   return all;
 }
 
@@ -123,9 +139,11 @@ Disturbance dust() {
   Disturbance d;
   d.light = [](Image& counts, Random& random) {
     for (int speck = 0; speck < 5; ++speck) {
-      const double x0 = uniform(random, 10, 86), y0 = uniform(random, 10, 86), r = uniform(random, 1.5, 3.5), depth = uniform(random, 0.5, 1);
+      const double x0 = uniform(random, 10, 86), y0 = uniform(random, 10, 86), r = uniform(random, 1.5, 3.5),
+                   depth = uniform(random, 0.5, 1);
       for (int y = 0; y < kSize; ++y)
-        for (int x = 0; x < kSize; ++x) counts(x, y) *= 1 - depth / (1 + std::exp(4 * (std::hypot(x - x0, y - y0) - r)));
+        for (int x = 0; x < kSize; ++x)
+          counts(x, y) *= 1 - depth / (1 + std::exp(4 * (std::hypot(x - x0, y - y0) - r)));
     }
   };
   d.help = [](Droplet96&, FitJob& job) { job.options.leave_out_outliers = true; };
@@ -166,7 +184,8 @@ TEST(DisturbedRecovery, AnotherDroplet) {
   Disturbance d;
   d.light = [](Image& counts, Random&) {
     Droplet96 other;
-    for (const auto& [ref, value] : {std::pair(other.diameter, 4.0), {other.center_x, 90.0}, {other.center_y, 8.0}}) other.b.table[ref].value = value;
+    for (const auto& [ref, value] : {std::pair(other.diameter, 4.0), {other.center_x, 90.0}, {other.center_y, 8.0}})
+      other.b.table[ref].value = value;
     const Image light = other.light();
     for (std::size_t i = 0; i < light.size(); ++i) counts.values()[i] += kGain * light.values()[i];
   };
@@ -184,7 +203,8 @@ TEST(DisturbedRecovery, UnevenLight) {
   const auto free = [](std::vector<std::pair<UnevenLight::Shape, bool>> shapes) {
     return [shapes](Droplet96& d, FitJob& job) {
       int number = 0;
-      for (const auto& [shape, of_intensity] : shapes) picture(job, 0).uneven.push_back({d.b.linear("uneven " + std::to_string(number++), 0), shape, of_intensity});
+      for (const auto& [shape, of_intensity] : shapes)
+        picture(job, 0).uneven.push_back({d.b.linear("uneven " + std::to_string(number++), 0), shape, of_intensity});
     };
   };
   using Shape = UnevenLight::Shape;
@@ -197,7 +217,8 @@ TEST(DisturbedRecovery, UnevenLight) {
   tilted.help = free({{Shape::x, false}, {Shape::y, false}});
   vignetting.light = [&](Image& counts, Random&) {
     for (int r = 0; r < kSize; ++r)
-      for (int c = 0; c < kSize; ++c) counts(c, r) = kOffset + (counts(c, r) - kOffset) * (1 - 0.15 * (x(c) * x(c) + x(r) * x(r)) + 0.05 * x(c));
+      for (int c = 0; c < kSize; ++c)
+        counts(c, r) = kOffset + (counts(c, r) - kOffset) * (1 - 0.15 * (x(c) * x(c) + x(r) * x(r)) + 0.05 * x(c));
   };
   vignetting.help = free({{Shape::x, true}, {Shape::y, true}, {Shape::square, true}});
   for (const auto& [name, what] : {std::pair("tilted light", tilted), {"vignetting", vignetting}}) {
@@ -216,16 +237,21 @@ TEST(DisturbedRecovery, CameraCurveAndJpeg) {
   };
   // Blocks of 8 x 8 cosines, their coefficients rounded to the luminance table of ITU-T T.81 annex K (quality 50).
   jpeg.camera = [](Image& counts, Random&) {
-    constexpr int kTable[8][8] = {{16, 11, 10, 16, 24, 40, 51, 61},     {12, 12, 14, 19, 26, 58, 60, 55},     {14, 13, 16, 24, 40, 57, 69, 56},   {14, 17, 22, 29, 51, 87, 80, 62},
-                                  {18, 22, 37, 56, 68, 109, 103, 77}, {24, 35, 55, 64, 81, 104, 113, 92}, {49, 64, 78, 87, 103, 121, 120, 101}, {72, 92, 95, 98, 112, 100, 103, 99}};
-    const auto basis = [](int k, int i) { return std::sqrt((k ? 2.0 : 1.0) / 8) * std::cos((2 * i + 1) * k * M_PI / 16); };
+    constexpr int kTable[8][8] = {{16, 11, 10, 16, 24, 40, 51, 61},     {12, 12, 14, 19, 26, 58, 60, 55},
+                                  {14, 13, 16, 24, 40, 57, 69, 56},     {14, 17, 22, 29, 51, 87, 80, 62},
+                                  {18, 22, 37, 56, 68, 109, 103, 77},   {24, 35, 55, 64, 81, 104, 113, 92},
+                                  {49, 64, 78, 87, 103, 121, 120, 101}, {72, 92, 95, 98, 112, 100, 103, 99}};
+    const auto basis = [](int k, int i) {
+      return std::sqrt((k ? 2.0 : 1.0) / 8) * std::cos((2 * i + 1) * k * M_PI / 16);
+    };
     for (int top = 0; top < kSize; top += 8)
       for (int left = 0; left < kSize; left += 8) {
         double c[8][8] = {};
         for (int v = 0; v < 8; ++v)
           for (int u = 0; u < 8; ++u) {
             for (int y = 0; y < 8; ++y)
-              for (int x = 0; x < 8; ++x) c[v][u] += basis(v, y) * basis(u, x) * (counts(left + x, top + y) * 255 / 1100 - 128);
+              for (int x = 0; x < 8; ++x)
+                c[v][u] += basis(v, y) * basis(u, x) * (counts(left + x, top + y) * 255 / 1100 - 128);
             c[v][u] = std::round(c[v][u] / kTable[v][u]) * kTable[v][u];
           }
         for (int y = 0; y < 8; ++y)
@@ -280,7 +306,8 @@ TEST(DisturbedRecovery, SaturatedAndCutOff) {
   };
   EXPECT_EQ(fits("saturated", saturated, false).wrong, 0);
   const Outcome helped = fits("saturated", saturated, true);
-  // Pixels whose noise alone decided which side of the limit they are on are a biased sample, by less than their number tells.
+  // Pixels whose noise alone decided which side of the limit they are on are a biased sample, by less than their number
+  // tells.
   EXPECT_EQ(helped.wrong + helped.without_answer, 0);
   const Outcome half = fits("cut off", cut, false);
   EXPECT_EQ(half.wrong, 0);
@@ -297,8 +324,11 @@ TEST(WrongModel, IsNeverAGoodFitAroundAWrongNumber) {
     return d;
   };
   const std::vector<std::pair<const char*, Disturbance>> cases{
-      {"bipolar", with([](Droplet96& d, birefit::Droplet& sample) { sample.director = BipolarDirector{d.b.fixed("azimuth", 30), {}, {}}; })},
-      {"twisted", with([](Droplet96& d, birefit::Droplet& sample) { sample.director = RadialDirector{d.b.fixed("twist", 20)}; })},
+      {"bipolar", with([](Droplet96& d, birefit::Droplet& sample) {
+         sample.director = BipolarDirector{d.b.fixed("azimuth", 30), {}, {}};
+       })},
+      {"twisted",
+       with([](Droplet96& d, birefit::Droplet& sample) { sample.director = RadialDirector{d.b.fixed("twist", 20)}; })},
       {"shell", with([](Droplet96& d, birefit::Droplet& sample) {
          ShellDirector shell;
          shell.wall_um = d.b.fixed("wall", 4);
@@ -310,9 +340,12 @@ TEST(WrongModel, IsNeverAGoodFitAroundAWrongNumber) {
     if (std::string(name) == "two droplets")  // one above the other, to be seen through each other
       what.light = [](Image& counts, Random&) {
         Droplet96 other;
-        for (const auto& [ref, value] : {std::pair(other.diameter, 6.0), {other.center_x, 52.0}, {other.center_y, 40.0}}) other.b.table[ref].value = value;
+        for (const auto& [ref, value] :
+             {std::pair(other.diameter, 6.0), {other.center_x, 52.0}, {other.center_y, 40.0}})
+          other.b.table[ref].value = value;
         const Image light = other.light();
-        for (std::size_t i = 0; i < light.size(); ++i) counts.values()[i] = 0.6 * counts.values()[i] + 400 * light.values()[i];
+        for (std::size_t i = 0; i < light.size(); ++i)
+          counts.values()[i] = 0.6 * counts.values()[i] + 400 * light.values()[i];
       };
     const Outcome outcome = fits(name, what, false, 3);
     EXPECT_EQ(outcome.wrong, 0) << name;
@@ -329,9 +362,13 @@ TEST(WrongModel, AWrongInputDoesWhatTheResultSaysOfIt) {
     std::function<void(Droplet96&, double)> believe;
   };
   const std::vector<Case> cases{
-      {"wavelength_nm", 0.01, [](Droplet96& d, double factor) { d.b.table[d.scene.microscope.wavelength_nm].value *= factor; }},
+      {"wavelength_nm", 0.01,
+       [](Droplet96& d, double factor) { d.b.table[d.scene.microscope.wavelength_nm].value *= factor; }},
       {"surround", 0.002, [](Droplet96& d, double factor) { d.b.table[d.scene.surround_index].value *= factor; }},
-      {"ordinary", 0.002, [](Droplet96& d, double factor) { d.b.table[std::get<ConstantIndices>(d.scene.material).ordinary].value *= factor; }},
+      {"ordinary", 0.002,
+       [](Droplet96& d, double factor) {
+         d.b.table[std::get<ConstantIndices>(d.scene.material).ordinary].value *= factor;
+       }},
       {"micrograph.pixel_size_um", 0.01, [](Droplet96& d, double factor) { d.scene.view.pixel_size_um *= factor; }}};
   const FitResult right = fit_one({}, false, 1);
   for (const Case& c : cases) {
@@ -341,12 +378,14 @@ TEST(WrongModel, AWrongInputDoesWhatTheResultSaysOfIt) {
       picture(job, 0).scene = d.scene;
     };
     const FitResult there = fit_one(wrong, true, 1);
-    const auto input = std::find_if(right.inputs.begin(), right.inputs.end(), [&](const InputEffect& i) { return i.name == c.input; });
+    const auto input =
+        std::find_if(right.inputs.begin(), right.inputs.end(), [&](const InputEffect& i) { return i.name == c.input; });
     ASSERT_NE(input, right.inputs.end()) << c.input;
     for (std::size_t j = 0; j < 2; ++j) {
-      const double moved = there.parameters[j].value - right.parameters[j].value, said = input->shift[j] * c.relative * input->value / input->step;
-      std::printf("  %-26s %+.1f %%: %-14s moves by %+.5f, said %+.5f (%.0f standard errors)\n", c.input, 100 * c.relative, right.parameters[j].name.c_str(), moved, said,
-                  said / right.parameters[j].stderr_);
+      const double moved = there.parameters[j].value - right.parameters[j].value,
+                   said = input->shift[j] * c.relative * input->value / input->step;
+      std::printf("  %-26s %+.1f %%: %-14s moves by %+.5f, said %+.5f (%.0f standard errors)\n", c.input,
+                  100 * c.relative, right.parameters[j].name.c_str(), moved, said, said / right.parameters[j].stderr_);
       // To first order: a twentieth of it, and the noise of weights that were settled again.
       EXPECT_NEAR(moved, said, 0.05 * std::abs(said) + right.parameters[j].stderr_) << c.input;
     }

@@ -83,8 +83,9 @@ FitJob droplet_job(double counts_per_photon, double read_counts, unsigned long s
   scene.view.rotation_deg = b.fixed("rotation", 0);
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
   FitJob job;
-  job.measurements.push_back(micrograph_of("droplet", scene, camera(mean_counts(), counts_per_photon, read_counts, seed, false),
-                                          gain, offset, {read_counts, counts_per_photon}));
+  job.measurements.push_back(micrograph_of("droplet", scene,
+                                           camera(mean_counts(), counts_per_photon, read_counts, seed, false), gain,
+                                           offset, {read_counts, counts_per_photon}));
   job.parameters = b.table;
   job.options.threads = 1;
   return job;
@@ -119,8 +120,8 @@ std::map<std::string, Spread> recover(double counts_per_photon, double read_coun
   return spread;
 }
 
-// The two computations agree before any fit is judged: half a percent of the incident light at the worst pixel (the rim,
-// where 15 x 15 midpoints and birefit's Gauss points see the end of the light differently), 1e-3 RMS.
+// The two computations agree before any fit is judged: half a percent of the incident light at the worst pixel (the
+// rim, where 15 x 15 midpoints and birefit's Gauss points see the end of the light differently), 1e-3 RMS.
 TEST(DropletRecovery, TruthIsTheRenderedImage) {
   const FitJob job = droplet_job(1, 3, 1);
   Theta theta = job.parameters.values();

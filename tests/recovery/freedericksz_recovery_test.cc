@@ -50,11 +50,13 @@ FitJob voltage_job(double v, double start, unsigned long seed, double pretilt_de
     const std::string name = std::to_string(wavelength_nm);
     here.microscope.wavelength_nm = b.fixed("wavelength_nm " + name, wavelength_nm);
     // Below the threshold a cell without pretilt stays as it is: its retardance is that of its indices.
-    const double light = pretilt_deg > 0 ? kCell.crossed(v, wavelength_nm / 1000)
-                                         : std::pow(std::sin(M_PI * 1000 / wavelength_nm * kCell.thickness_um * (kCell.n_e - kCell.n_o)), 2);
+    const double light =
+        pretilt_deg > 0
+            ? kCell.crossed(v, wavelength_nm / 1000)
+            : std::pow(std::sin(M_PI * 1000 / wavelength_nm * kCell.thickness_um * (kCell.n_e - kCell.n_o)), 2);
     const std::vector<double> mean(kSide * kSide, kGain * light);
     job.measurements.push_back(micrograph_of(name, here, camera(mean, 1, 3, 10 * seed + job.measurements.size(), false),
-                                            gain, offset, {3, 1}));
+                                             gain, offset, {3, 1}));
   }
   job.parameters = b.table;
   job.options.threads = 1;
@@ -92,7 +94,8 @@ TEST(FreederickszRecovery, ReducedVoltageIsFoundFromBothSidesOfTheThreshold) {
     }
 }
 
-// Far below the threshold the director hardly moves: how far below is not known, that it is below is, and is reported as a limit.
+// Far below the threshold the director hardly moves: how far below is not known, that it is below is, and is reported
+// as a limit.
 TEST(FreederickszRecovery, BelowTheThresholdIsALimit) {
   int limited = 0, within = 0;
   constexpr int kSeeds = 14;
@@ -112,7 +115,8 @@ TEST(FreederickszRecovery, BelowTheThresholdIsALimit) {
   EXPECT_GE(within, limited - 3);
 }
 
-// Without pretilt nothing at all moves below the threshold: no derivative, and still a limit. The threshold itself is sharp.
+// Without pretilt nothing at all moves below the threshold: no derivative, and still a limit. The threshold itself is
+// sharp.
 TEST(FreederickszRecovery, WithoutPretiltTheLimitIsTheThreshold) {
   FitJob job = voltage_job(0.3, 0.6, 7, 0);
   const FitResult r = fit(job);
@@ -124,8 +128,9 @@ TEST(FreederickszRecovery, WithoutPretiltTheLimitIsTheThreshold) {
   EXPECT_LT(p->limit_value, 1.01);
 }
 
-// Scatter of the estimates against the bound of Cramer and Rao, of 1 % noise (10 counts of 1000 in one pixel of each colour; Gaussian and
-// constant, so that the bound is exactly that of the derivative). From 1.05 up, where the phase is nearly linear within the error.
+// Scatter of the estimates against the bound of Cramer and Rao, of 1 % noise (10 counts of 1000 in one pixel of each
+// colour; Gaussian and constant, so that the bound is exactly that of the derivative). From 1.05 up, where the phase is
+// nearly linear within the error.
 double spread_over_bound(double v, int seeds) {
   double squares = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
@@ -135,14 +140,18 @@ double spread_over_bound(double v, int seeds) {
   }
   double information = 0;
   for (double wavelength_nm : kWavelengthsNm) {
-    const double h = 1e-3, slope = kGain * (kCell.crossed(v + h, wavelength_nm / 1000) - kCell.crossed(v - h, wavelength_nm / 1000)) / (2 * h);
+    const double h = 1e-3,
+                 slope = kGain *
+                         (kCell.crossed(v + h, wavelength_nm / 1000) - kCell.crossed(v - h, wavelength_nm / 1000)) /
+                         (2 * h);
     information += std::pow(slope / kNoise, 2);
   }
   return std::sqrt(squares / seeds * information);
 }
 
 TEST(FreederickszRecovery, ScatterIsThatOfCramerAndRao) {
-  // Started nearby: what is asked is the scatter. That of 12 seeds is itself known to 1 / sqrt(24) = 20 %: three of these above 1.1.
+  // Started nearby: what is asked is the scatter. That of 12 seeds is itself known to 1 / sqrt(24) = 20 %: three of
+  // these above 1.1.
   for (double v : {1.05, 1.7}) EXPECT_LT(spread_over_bound(v, 12), 1.1 + 3 * 0.2) << v;
 }
 

@@ -17,8 +17,8 @@
 #include "birefit/fit.h"
 #include "birefit/render.h"
 #include "core/threads.h"
-#include "random_families.h"
 #include "pictures.h"
+#include "random_families.h"
 
 namespace birefit {
 namespace {
@@ -230,7 +230,8 @@ void expect_sound(const Family& family, const Count& count) {
   EXPECT_LE(count.timid, count.problems / 10);
   constexpr int kEnough = 100;  // of right answers, to say how often something stands in them
   for (const auto& [words, number] : count.warnings)
-    if (count.right >= kEnough && 20 * number > count.right) ADD_FAILURE() << family.name << ": " << number << " times " << words;
+    if (count.right >= kEnough && 20 * number > count.right)
+      ADD_FAILURE() << family.name << ": " << number << " times " << words;
 }
 
 class GlobalSearch : public ::testing::TestWithParam<Family> {};
@@ -267,7 +268,8 @@ class LongGlobalSearch : public GlobalSearch {};
 TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   const Count count = solve(GetParam(), problems_or(GetParam().many), first_problem());
   expect_sound(GetParam(), count);
-  // Straight rays through a droplet are held to their interval: of two thousand intervals 95 % scatter by half a percent.
+  // Straight rays through a droplet are held to their interval: of two thousand intervals 95 % scatter by half a
+  // percent.
   if (GetParam().name != std::string("Droplet") || count.intervals < 2000) return;
   EXPECT_GE(count.inside, 0.93 * count.intervals);
   EXPECT_LE(count.inside, 0.97 * count.intervals);

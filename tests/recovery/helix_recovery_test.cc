@@ -1,5 +1,6 @@
-// The pitch of a cholesteric cell from six grey levels. Truth: the closed form of a uniform twist at normal incidence (with E = R(alpha) E', alpha = alpha_0 + q z,
-// dE'/dz = (i k dn/2 sigma_z + q epsilon) E' but for the common phase), which ceiling e_only is exactly.
+// The pitch of a cholesteric cell from six grey levels. Truth: the closed form of a uniform twist at normal incidence
+// (with E = R(alpha) E', alpha = alpha_0 + q z, dE'/dz = (i k dn/2 sigma_z + q epsilon) E' but for the common phase),
+// which ceiling e_only is exactly.
 
 #include <gtest/gtest.h>
 
@@ -18,10 +19,13 @@ using namespace testing;
 constexpr double kThickness = 12, kBirefringence = 0.1, kGain = 1000, kNoise = 10;
 
 double light(double pitch_um, double azimuth_deg, double polarizer_deg, double analyzer_deg, double wavelength_um) {
-  const double degree = M_PI / 180, half = M_PI * kBirefringence * kThickness / wavelength_um, turn = 2 * M_PI * kThickness / pitch_um, x = std::hypot(half, turn);
-  const double c = std::cos(x), s = std::sin(x) / x, in = polarizer_deg * degree - azimuth_deg * degree, out = analyzer_deg * degree - azimuth_deg * degree - turn;
+  const double degree = M_PI / 180, half = M_PI * kBirefringence * kThickness / wavelength_um,
+               turn = 2 * M_PI * kThickness / pitch_um, x = std::hypot(half, turn);
+  const double c = std::cos(x), s = std::sin(x) / x, in = polarizer_deg * degree - azimuth_deg * degree,
+               out = analyzer_deg * degree - azimuth_deg * degree - turn;
   const std::complex<double> along(c, s * half);
-  const std::complex<double> ex = along * std::cos(in) + turn * s * std::sin(in), ey = -turn * s * std::cos(in) + std::conj(along) * std::sin(in);
+  const std::complex<double> ex = along * std::cos(in) + turn * s * std::sin(in),
+                             ey = -turn * s * std::cos(in) + std::conj(along) * std::sin(in);
   return std::norm(std::cos(out) * ex + std::sin(out) * ey);
 }
 
@@ -30,7 +34,9 @@ FitJob pitch_job(double pitch_um, double azimuth_deg, std::mt19937_64& random) {
   HelixDirector helix;
   std::uniform_real_distribution<double> between(-1, 1);
   const double sign = pitch_um > 0 ? 1 : -1, size = std::abs(pitch_um);
-  helix.pitch_um = b.fitted("pitch_um", pitch_um * (1 + 0.1 * between(random)), std::min(sign * 0.8 * size, sign * 1.25 * size), std::max(sign * 0.8 * size, sign * 1.25 * size));
+  helix.pitch_um =
+      b.fitted("pitch_um", pitch_um * (1 + 0.1 * between(random)), std::min(sign * 0.8 * size, sign * 1.25 * size),
+               std::max(sign * 0.8 * size, sign * 1.25 * size));
   helix.azimuth_deg = b.fitted("azimuth_deg", azimuth_deg + 5 * between(random), azimuth_deg - 20, azimuth_deg + 20);
   Scene scene;
   scene.sample = Cell{b.fixed("thickness_um", kThickness), helix};
@@ -49,7 +55,10 @@ FitJob pitch_job(double pitch_um, double azimuth_deg, std::mt19937_64& random) {
       here.microscope.wavelength_nm = b.fixed("wavelength_nm " + name, wavelength_nm);
       here.microscope.polarizer_deg = b.fixed("polarizer_deg " + name, between_deg[0]);
       here.microscope.analyzer_deg = b.fixed("analyzer_deg " + name, between_deg[1]);
-      job.measurements.push_back(micrograph_of(name, here, {kGain * light(pitch_um, azimuth_deg, between_deg[0], between_deg[1], wavelength_nm / 1000) + noise(random)}, gain, offset, {kNoise, 0}));
+      job.measurements.push_back(micrograph_of(
+          name, here,
+          {kGain * light(pitch_um, azimuth_deg, between_deg[0], between_deg[1], wavelength_nm / 1000) + noise(random)},
+          gain, offset, {kNoise, 0}));
     }
   job.parameters = b.table;
   job.options.threads = 1;
@@ -61,7 +70,8 @@ TEST(HelixRecovery, PitchAndAzimuthScatterAsTheirErrorsSay) {
   std::mt19937_64 random(31);
   Spread pitch, azimuth;
   for (int i = 0; i < 60; ++i) {
-    const double of = (i % 2 ? -1 : 1) * std::uniform_real_distribution<double>(14, 30)(random), at = std::uniform_real_distribution<double>(10, 60)(random);
+    const double of = (i % 2 ? -1 : 1) * std::uniform_real_distribution<double>(14, 30)(random),
+                 at = std::uniform_real_distribution<double>(10, 60)(random);
     const FitResult r = fit(pitch_job(of, at, random));
     ASSERT_TRUE(r.has_answer()) << of << ' ' << at << ": " << r.verdict;
     pitch.add(find_estimate(r, "pitch_um")->value - of, find_estimate(r, "pitch_um")->stderr_);

@@ -57,8 +57,9 @@ FitJob plate_job(double counts_per_photon, double read_counts, unsigned long see
   scene.view.rotation_deg = b.fixed("rotation", 0);
   FitJob job;
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
-  job.measurements.push_back(micrograph_of("plate", scene, camera(mean_counts(), counts_per_photon, read_counts, seed, false),
-                                          gain, offset, {read_counts, counts_per_photon}));
+  job.measurements.push_back(micrograph_of("plate", scene,
+                                           camera(mean_counts(), counts_per_photon, read_counts, seed, false), gain,
+                                           offset, {read_counts, counts_per_photon}));
   job.parameters = b.table;
   job.options.threads = 1;
   return job;
@@ -77,8 +78,8 @@ Spread recover(double counts_per_photon, double read_counts, int seeds) {
       EXPECT_LT(std::abs(q->value - value), 5 * q->stderr_) << name << " seed " << seed << " " << q->value;
     }
   }
-  std::printf("  photon %g read %g fourier_number spread/stderr %.3f bias %.2f worst %.2f (stderr %.2g)\n", counts_per_photon,
-              read_counts, spread.ratio(), spread.bias(), spread.worst(), spread.stderr_[0]);
+  std::printf("  photon %g read %g fourier_number spread/stderr %.3f bias %.2f worst %.2f (stderr %.2g)\n",
+              counts_per_photon, read_counts, spread.ratio(), spread.bias(), spread.worst(), spread.stderr_[0]);
   return spread;
 }
 
@@ -97,8 +98,8 @@ TEST(PlateRecovery, TruthIsTheRenderedImage) {
     worst = std::max(worst, std::abs(d));
   }
   const double rms = std::sqrt(sum / static_cast<double>(r.intensity.size()));
-  std::printf("  %s, %d steps, %zu mesh, numerical %.1e; render against truth: rms %.2g, worst %.2g\n", chosen.method.c_str(),
-              chosen.steps, chosen.mesh.size(), chosen.numerical_error, rms, worst);
+  std::printf("  %s, %d steps, %zu mesh, numerical %.1e; render against truth: rms %.2g, worst %.2g\n",
+              chosen.method.c_str(), chosen.steps, chosen.mesh.size(), chosen.numerical_error, rms, worst);
   EXPECT_LT(rms, 2e-5);
   EXPECT_LT(worst, scene.intensity_accuracy);
 }
@@ -115,16 +116,18 @@ TEST(PlateFit, FourierNumberWithHotSideIsNamedAsDegenerate) {
   bool named = false;
   for (const FisherDirection& d : r.directions)
     if (!d.identifiable)
-      named = named || (d.words.find("fourier_number") != std::string::npos && d.words.find("hot_k") != std::string::npos);
+      named =
+          named || (d.words.find("fourier_number") != std::string::npos && d.words.find("hot_k") != std::string::npos);
   EXPECT_TRUE(named) << r.verdict;
   const ParameterEstimate *fo = find_estimate(r, "fourier_number"), *hot = find_estimate(r, "hot_k");
-  std::printf("  fourier %.6g +- %.2g, hot %.6g +- %.2g, correlation %.8f\n  verdict: %s\n", fo->value, fo->stderr_, hot->value,
-              hot->stderr_, r.correlation.size() ? r.correlation(0, 1) : 0.0, r.verdict.c_str());
-  for (const FisherDirection& d : r.directions) std::printf("  direction identifiable %d: %s\n", d.identifiable, d.words.c_str());
+  std::printf("  fourier %.6g +- %.2g, hot %.6g +- %.2g, correlation %.8f\n  verdict: %s\n", fo->value, fo->stderr_,
+              hot->value, hot->stderr_, r.correlation.size() ? r.correlation(0, 1) : 0.0, r.verdict.c_str());
+  for (const FisherDirection& d : r.directions)
+    std::printf("  direction identifiable %d: %s\n", d.identifiable, d.words.c_str());
 }
 
-// The picture of a screen that a camera looked at from the side, by lines of sight in space and plane waves in the plate: where the camera
-// stood, how near and what it saw.
+// The picture of a screen that a camera looked at from the side, by lines of sight in space and plane waves in the
+// plate: where the camera stood, how near and what it saw.
 TEST(PlateFit, ACameraAtTheSideIsFound) {
   const IndependentCamera from{28, -15, 22};
   constexpr double kHalfAngle = 15, kCenterX = 30.4, kCenterY = 33.1;
@@ -138,7 +141,8 @@ TEST(PlateFit, ACameraAtTheSideIsFound) {
       double sum = 0;
       for (int j = 0; j < 3; ++j)
         for (int i = 0; i < 3; ++i) {
-          const auto [x, y] = from.on_screen((column + gauss[i] - kCenterX) * 2 / kSize, (kCenterY - row - gauss[j]) * 2 / kSize);
+          const auto [x, y] =
+              from.on_screen((column + gauss[i] - kCenterX) * 2 / kSize, (kCenterY - row - gauss[j]) * 2 / kSize);
           const double edge = std::tan(kHalfAngle * M_PI / 180);
           sum += weight[i] * weight[j] * plate.intensity(edge * x, edge * y);
         }
@@ -152,9 +156,15 @@ TEST(PlateFit, ACameraAtTheSideIsFound) {
   std::get<HeatStep>(sample.heat).fourier_number = b.fixed("fourier", kFourier);
   b.table[b.table.find("fourier_number")].free = false;
   sample.thickness_um = b.fixed("thin_um", 100);
-  const std::vector<std::pair<std::string, double>> truth = {{"half_angle", kHalfAngle}, {"tilt_x_deg", from.tilt_x_deg}, {"tilt_y_deg", from.tilt_y_deg}, {"half_field_deg", from.half_field_deg}, {"column", kCenterX}, {"row", kCenterY}};
+  const std::vector<std::pair<std::string, double>> truth = {{"half_angle", kHalfAngle},
+                                                             {"tilt_x_deg", from.tilt_x_deg},
+                                                             {"tilt_y_deg", from.tilt_y_deg},
+                                                             {"half_field_deg", from.half_field_deg},
+                                                             {"column", kCenterX},
+                                                             {"row", kCenterY}};
   sample.half_angle_deg = b.fitted("half_angle", 14, 12, 18);
-  taken.scene.view.camera = SideCamera{b.fitted("tilt_x_deg", 20, 5, 50), b.fitted("tilt_y_deg", -5, -40, 10), b.fitted("half_field_deg", 10, 0, 45)};
+  taken.scene.view.camera = SideCamera{b.fitted("tilt_x_deg", 20, 5, 50), b.fitted("tilt_y_deg", -5, -40, 10),
+                                       b.fitted("half_field_deg", 10, 0, 45)};
   taken.scene.view.center_x_px = b.fitted("column", 31.5, 27, 36);
   taken.scene.view.center_y_px = b.fitted("row", 31.5, 27, 36);
   job.parameters = b.table;

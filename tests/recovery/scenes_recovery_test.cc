@@ -1,6 +1,6 @@
-// Scatter of estimates against the bound of Cramer and Rao, for many scenes: truths drawn at random, pictures by the model itself
-// (its physics is held by tests/cross), 1 % of Gaussian noise. With constant weights the bound at the truth is the standard error that a
-// fit states, so errors in units of it must scatter by one.
+// Scatter of estimates against the bound of Cramer and Rao, for many scenes: truths drawn at random, pictures by the
+// model itself (its physics is held by tests/cross), 1 % of Gaussian noise. With constant weights the bound at the
+// truth is the standard error that a fit states, so errors in units of it must scatter by one.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,8 @@ struct Draw {
   TableBuilder b;
   Scene scene;
   std::mt19937_64 random;
-  double share = 1;  ///< of the margins that bounds get: less than all where four parameters form fringes, which makes a long search
+  /// of the margins that bounds get: less than all where four parameters form fringes, which makes a long search
+  double share = 1;
   double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
   /// Free, its truth drawn from [low, high]; bounds `margin` beyond the draw, on both sides.
   ParameterRef drawn(const std::string& name, double low, double high, double margin) {
@@ -46,8 +47,10 @@ void microscope(Draw& d, int size, double pixel_um, double half_field_um) {
   s.view.width = s.view.height = size;
   s.view.pixel_size_um = pixel_um;
   const double middle = 0.5 * (size - 1);
-  s.view.center_x_px = half_field_um > 0 ? d.drawn("center_x", middle - 1, middle + 1, 1) : d.b.fixed("center_x", middle);
-  s.view.center_y_px = half_field_um > 0 ? d.drawn("center_y", middle - 1, middle + 1, 1) : d.b.fixed("center_y", middle);
+  s.view.center_x_px =
+      half_field_um > 0 ? d.drawn("center_x", middle - 1, middle + 1, 1) : d.b.fixed("center_x", middle);
+  s.view.center_y_px =
+      half_field_um > 0 ? d.drawn("center_y", middle - 1, middle + 1, 1) : d.b.fixed("center_y", middle);
   s.view.rotation_deg = d.b.fixed("rotation_deg", 0);
   s.intensity_accuracy = 1e-3;  // a tenth of the least noise
 }
@@ -67,7 +70,8 @@ struct Scatter {
   int inside = 0, all = 0, refused = 0;
 };
 
-/// Fits of `draws` pictures, one a thread. Starts are drawn within the bounds: where one of another order could win, the scan decides.
+/// Fits of `draws` pictures, one a thread. Starts are drawn within the bounds: where one of another order could win,
+/// the scan decides.
 Scatter scatter(int draws, const std::function<void(Draw&)>& make, const std::string& of) {
   struct Fitted {
     FitResult result;
@@ -111,15 +115,19 @@ Scatter scatter(int draws, const std::function<void(Draw&)>& make, const std::st
       if (p.linear || p.at_bound || !p.limit.empty()) continue;
       const double error = p.value - f.truth[f.truth.find(p.name)].value;
       result.by_name[p.name].add(error, p.stderr_);
-      if (std::abs(error) > 4 * p.stderr_) std::printf("  %d: %s %g off by %.1f standard errors, 95 %% interval %g to %g, reduced chi-square %.2f\n", number, p.name.c_str(), p.value - error, error / p.stderr_,
-                                                         p.interval95_low, p.interval95_high, f.result.reduced_chi_square);
+      if (std::abs(error) > 4 * p.stderr_)
+        std::printf("  %d: %s %g off by %.1f standard errors, 95 %% interval %g to %g, reduced chi-square %.2f\n",
+                    number, p.name.c_str(), p.value - error, error / p.stderr_, p.interval95_low, p.interval95_high,
+                    f.result.reduced_chi_square);
       result.all += 1;
       result.inside += p.interval95_low <= p.value - error && p.value - error <= p.interval95_high;
     }
   }
   for (const auto& [name, s] : result.by_name)
-    std::printf("  %s, %s: spread/bound %.3f, bias %.2f, worst %.2f of %zu\n", of.c_str(), name.c_str(), s.ratio(), s.bias(), s.worst(), s.error.size());
-  std::printf("  %s: %d of %d inside their 95 %% intervals, %d refused\n", of.c_str(), result.inside, result.all, result.refused);
+    std::printf("  %s, %s: spread/bound %.3f, bias %.2f, worst %.2f of %zu\n", of.c_str(), name.c_str(), s.ratio(),
+                s.bias(), s.worst(), s.error.size());
+  std::printf("  %s: %d of %d inside their 95 %% intervals, %d refused\n", of.c_str(), result.inside, result.all,
+              result.refused);
   return result;
 }
 
@@ -156,12 +164,16 @@ void eccentric_shell(Draw& d) {
   droplet(d, [](Draw& draw, Droplet& sample) {
     ShellDirector s;
     s.wall_um = draw.drawn("wall_um", 1.2, 1.6, 0.2);
-    s.offset_um = {draw.drawn("offset_x", -0.5, 0.5, 0.3), draw.drawn("offset_y", -0.5, 0.5, 0.3), draw.b.fixed("offset_z", 0)};
+    s.offset_um = {draw.drawn("offset_x", -0.5, 0.5, 0.3), draw.drawn("offset_y", -0.5, 0.5, 0.3),
+                   draw.b.fixed("offset_z", 0)};
     sample.director = s;
   });
 }
 void bipolar(Draw& d) {
-  droplet(d, [](Draw& draw, Droplet& sample) { sample.director = BipolarDirector{draw.drawn("azimuth_deg", 10, 80, 8), draw.b.fixed("tilt_deg", 0), draw.drawn("pole_distance", 1.1, 1.5, 0.08)}; });
+  droplet(d, [](Draw& draw, Droplet& sample) {
+    sample.director = BipolarDirector{draw.drawn("azimuth_deg", 10, 80, 8), draw.b.fixed("tilt_deg", 0),
+                                      draw.drawn("pole_distance", 1.1, 1.5, 0.08)};
+  });
 }
 void heated_plate(Draw& d) {
   microscope(d, 64, 0, 0);
@@ -234,9 +246,10 @@ TEST(BranchRecovery, TheBranchThatMadeThePictureIsReported) {
   }
 }
 
-// 1,000 droplets, hedgehog or ring by a coin, of 1 to 100 % of noise, each fitted as both: the field known to 15 %, the ring anywhere around
-// where it may rest. The ratio of the two likelihoods is exp of half the difference of chi-square by the noise that was drawn. Where it exceeds
-// 100, noise alone deceives about one in a hundred at the worst; what a fit adds is a branch that it left in a wrong minimum.
+// 1,000 droplets, hedgehog or ring by a coin, of 1 to 100 % of noise, each fitted as both: the field known to 15 %, the
+// ring anywhere around where it may rest. The ratio of the two likelihoods is exp of half the difference of chi-square
+// by the noise that was drawn. Where it exceeds 100, noise alone deceives about one in a hundred at the worst; what a
+// fit adds is a branch that it left in a wrong minimum.
 TEST(LongBranchRecovery, TheLikelierBranchIsTheTrueOne) {
   const int draws = problems_or(1000), first_seed = first_problem();
   const double decided = 2 * std::log(100.0);
@@ -248,9 +261,11 @@ TEST(LongBranchRecovery, TheLikelierBranchIsTheTrueOne) {
     Draw d;
     d.random.seed(static_cast<unsigned long>(first_seed + i) * 15485863);
     const bool ring = d.between(0, 1) < 0.5;
-    const double e = d.between(5, 30), gap = d.between(0.7, 1.1), noise = kGain * std::exp(d.between(std::log(0.01), 0));
+    const double e = d.between(5, 30), gap = d.between(0.7, 1.1),
+                 noise = kGain * std::exp(d.between(std::log(0.01), 0));
     microscope(d, 32, 0.3, 0);
-    // A ring rests where the field and its line tension balance, 0.7 to 1.1 coherence lengths from the sphere (docs/methods.md).
+    // A ring rests where the field and its line tension balance, 0.7 to 1.1 coherence lengths from the sphere
+    // (docs/methods.md).
     AxialDirector axial;
     axial.reduced_field = d.b.fitted("reduced_field", e, 0.85 * e, 1.15 * e);
     axial.ring_radius = d.b.fitted("ring_radius", 1 - gap / e, 1 - 1.3 / e, 1 - 0.5 / e);
@@ -292,12 +307,15 @@ TEST(LongBranchRecovery, TheLikelierBranchIsTheTrueOne) {
       count.right += true_one.reported;
     }
     if (!true_one.reported)
-      std::printf("  %d: %s of e = %.2f, ring %.3f, %.2f um, noise %.3f: the other branch's chi-square is %+.1f, reduced %.3f\n", first_seed + i, ring ? "ring" : "hedgehog", e,
-                  1 - gap / e, truth[static_cast<std::size_t>(with_ring.diameter_um.index)], noise / kGain, apart,
-                  r.reduced_chi_square);
+      std::printf(
+          "  %d: %s of e = %.2f, ring %.3f, %.2f um, noise %.3f: the other branch's chi-square is %+.1f, reduced "
+          "%.3f\n",
+          first_seed + i, ring ? "ring" : "hedgehog", e, 1 - gap / e,
+          truth[static_cast<std::size_t>(with_ring.diameter_um.index)], noise / kGain, apart, r.reduced_chi_square);
   });
   for (const auto& [name, count] : {std::pair{"hedgehogs", hedgehogs}, {"rings", rings}})
-    std::printf("  %d %s: likelihood ratio above 100 in %d, right in %d of these\n", count.all, name, count.decided, count.right);
+    std::printf("  %d %s: likelihood ratio above 100 in %d, right in %d of these\n", count.all, name, count.decided,
+                count.right);
   const int of = hedgehogs.decided + rings.decided;
   EXPECT_GE(of, draws / 2);
   EXPECT_GE(hedgehogs.right + rings.right, 0.96 * of);
@@ -314,7 +332,8 @@ TEST_P(ScenesRecovery, EstimatesAreWithinTheirErrors) {
   for (const auto& [parameter, spread] : s.by_name) EXPECT_LT(spread.worst(), 5) << parameter;
 }
 
-// 300 pictures a scene. A spread of at most 1.1 times the bound is what is asked; that of 300 numbers is known to 4 %, and of some 25 parameters none is three times that below it.
+// 300 pictures a scene. A spread of at most 1.1 times the bound is what is asked; that of 300 numbers is known to 4 %,
+// and of some 25 parameters none is three times that below it.
 TEST_P(LongScenesRecovery, SpreadIsThatOfTheCramerRaoBound) {
   const auto& [name, make, refused] = kScenes[GetParam()];
   const Scatter s = scatter(problems_or(300), make, name);

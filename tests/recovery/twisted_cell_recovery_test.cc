@@ -1,5 +1,6 @@
-// A 90-degree twisted cell: retardance and twist from six uniform images and two of the empty field. Truth: the closed matrix of a uniform twist
-// (Yeh & Gu, Optics of Liquid Crystal Displays, 4.1), written here; ceiling e_only, whose transport it is exactly.
+// A 90-degree twisted cell: retardance and twist from six uniform images and two of the empty field. Truth: the closed
+// matrix of a uniform twist (Yeh & Gu, Optics of Liquid Crystal Displays, 4.1), written here; ceiling e_only, whose
+// transport it is exactly.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +17,8 @@ namespace {
 using namespace testing;
 
 constexpr int kSide = 32;
-constexpr double kGain = 1000, kOffset = 50, kThickness = 5, kBirefringence = 0.13, kTwistDeg = 90, kAzimuthDeg = 10, kWavelength = 0.55;
+constexpr double kGain = 1000, kOffset = 50, kThickness = 5, kBirefringence = 0.13, kTwistDeg = 90, kAzimuthDeg = 10,
+                 kWavelength = 0.55;
 
 constexpr IndependentCell kCell{kThickness, kBirefringence, kTwistDeg, kAzimuthDeg, kWavelength};
 
@@ -40,14 +42,16 @@ FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
   FitJob job;
   int k = 0;
-  for (const auto& [p, a] : {std::pair{0.0, 0.0}, {0.0, 90.0}, {45.0, 45.0}, {45.0, 135.0}, {20.0, 80.0}, {70.0, 10.0}}) {
+  for (const auto& [p, a] :
+       {std::pair{0.0, 0.0}, {0.0, 90.0}, {45.0, 45.0}, {45.0, 135.0}, {20.0, 80.0}, {70.0, 10.0}}) {
     Scene here = scene;
     here.microscope.polarizer_deg = b.fixed("polarizer_" + std::to_string(k), p);
     here.microscope.analyzer_deg = b.fixed("analyzer_" + std::to_string(k), a);
     const std::vector<double> mean(kSide * kSide, kOffset + kGain * kCell.intensity(p, a));
-    job.measurements.push_back(micrograph_of("image " + std::to_string(k), here,
-                                            camera(mean, counts_per_photon, read_counts, 1000 * seed + static_cast<unsigned long>(k), false),
-                                            gain, offset, {read_counts, counts_per_photon}));
+    job.measurements.push_back(
+        micrograph_of("image " + std::to_string(k), here,
+                      camera(mean, counts_per_photon, read_counts, 1000 * seed + static_cast<unsigned long>(k), false),
+                      gain, offset, {read_counts, counts_per_photon}));
     ++k;
   }
   // The empty field between parallel and crossed polarizers fixes gain and offset; without it six images between linear
@@ -59,9 +63,10 @@ FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed
     here.microscope.polarizer_deg = b.fixed("polarizer_" + std::to_string(k), 0);
     here.microscope.analyzer_deg = b.fixed("analyzer_" + std::to_string(k), a);
     const std::vector<double> mean(kSide * kSide, kOffset + (a == 0 ? kGain : 0));
-    job.measurements.push_back(micrograph_of("empty " + std::to_string(k), here,
-                                            camera(mean, counts_per_photon, read_counts, 1000 * seed + static_cast<unsigned long>(k), false),
-                                            gain, offset, {read_counts, counts_per_photon}));
+    job.measurements.push_back(
+        micrograph_of("empty " + std::to_string(k), here,
+                      camera(mean, counts_per_photon, read_counts, 1000 * seed + static_cast<unsigned long>(k), false),
+                      gain, offset, {read_counts, counts_per_photon}));
     ++k;
   }
   job.parameters = b.table;
@@ -92,7 +97,8 @@ TEST(TwistedCellRecovery, RetardanceAndTwistAreWithinFiveStandardErrors) { recov
 
 class LongTwistedCellRecovery : public ::testing::TestWithParam<std::pair<double, double>> {};
 TEST_P(LongTwistedCellRecovery, StandardErrorsAreTheSpread) {
-  for (const auto& [name, s] : recover(GetParam().first, GetParam().second, 200)) EXPECT_NEAR(s.ratio(), 1, 0.2) << name;
+  for (const auto& [name, s] : recover(GetParam().first, GetParam().second, 200))
+    EXPECT_NEAR(s.ratio(), 1, 0.2) << name;
 }
 INSTANTIATE_TEST_SUITE_P(ThreeNoiseLevels, LongTwistedCellRecovery,
                          ::testing::Values(std::pair{0.3, 1.5}, std::pair{1.0, 3.0}, std::pair{5.0, 12.0}));

@@ -1,5 +1,6 @@
-// Radial droplets as Maxwell's equations show them (the exact series, summed here at the points of every pixel, with 1 % of noise): the
-// series fitted to them, wave propagation fitted to them, and rays, which must say what they are worth.
+// Radial droplets as Maxwell's equations show them (the exact series, summed here at the points of every pixel, with 1
+// % of noise): the series fitted to them, wave propagation fitted to them, and rays, which must say what they are
+// worth.
 
 #include <gtest/gtest.h>
 
@@ -41,32 +42,40 @@ struct WaveDraw {
   }
 };
 
-/// Radius 3 to 12 um, hosts 1.43 to 1.55, birefringence 0.05 to 0.24, apertures 0.4 and 0.8. Bounds of half and of one and a half times the
-/// birefringence, and of 6 % of the diameter, to both sides; the start anywhere between them.
+/// Radius 3 to 12 um, hosts 1.43 to 1.55, birefringence 0.05 to 0.24, apertures 0.4 and 0.8. Bounds of half and of one
+/// and a half times the birefringence, and of 6 % of the diameter, to both sides; the start anywhere between them.
 WaveDraw draw(unsigned seed, double largest_um, int size, double focus_um = 0) {
   std::mt19937_64 random(seed * 7919u);
-  const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
   WaveDraw d;
-  const double radius = between(3, largest_um), host = between(1.43, 1.55), na = seed % 2 ? 0.4 : 0.8, k0 = 2 * std::numbers::pi / 0.59, n_o = 1.52;
+  const double radius = between(3, largest_um), host = between(1.43, 1.55), na = seed % 2 ? 0.4 : 0.8,
+               k0 = 2 * std::numbers::pi / 0.59, n_o = 1.52;
   d.diameter = 2 * radius;
   d.birefringence = between(0.05, 0.24);
   Scene& s = d.scene;
-  s.sample = Droplet{d.b.fitted("diameter_um", between(0.95, 1.05) * d.diameter, 0.94 * d.diameter, 1.06 * d.diameter), RadialDirector{}};
-  s.material = ConstantIndices{d.b.fixed("ordinary", n_o), d.b.fitted("birefringence", between(0.6, 1.4) * d.birefringence, 0.5 * d.birefringence, 1.5 * d.birefringence)};
+  s.sample = Droplet{d.b.fitted("diameter_um", between(0.95, 1.05) * d.diameter, 0.94 * d.diameter, 1.06 * d.diameter),
+                     RadialDirector{}};
+  s.material = ConstantIndices{
+      d.b.fixed("ordinary", n_o),
+      d.b.fitted("birefringence", between(0.6, 1.4) * d.birefringence, 0.5 * d.birefringence, 1.5 * d.birefringence)};
   s.surround_index = d.b.fixed("surround", host);
   s.microscope.wavelength_nm = d.b.fixed("wavelength_nm", 590);
   s.microscope.polarizer_deg = d.b.fixed("polarizer_deg", 30);
   s.microscope.analyzer_deg = d.b.fixed("analyzer_deg", 120);
   s.microscope.objective_na = na;
   s.view.width = s.view.height = size;
-  const double px = s.view.pixel_size_um = (d.diameter + 4) / size, middle = 0.5 * (size - 1), cx = middle + between(-1, 1), cy = middle + between(-1, 1);
+  const double px = s.view.pixel_size_um = (d.diameter + 4) / size, middle = 0.5 * (size - 1),
+               cx = middle + between(-1, 1), cy = middle + between(-1, 1);
   s.view.center_x_px = d.b.fitted("center_x", middle, middle - 3, middle + 3);
   s.view.center_y_px = d.b.fitted("center_y", middle, middle - 3, middle + 3);
   s.view.rotation_deg = d.b.fixed("rotation_deg", 0);
 
   RadialBall<double> ball{{{radius, n_o, n_o + d.birefringence}}, host, k0};
   const RadialImage<double> image(radial_series(ball), na, focus_um, px * size);
-  // Fringes are no finer than lambda / (2 NA), 0.37 um, pixels no wider than 0.5 um: six Gauss points a side err by 1e-5.
+  // Fringes are no finer than lambda / (2 NA), 0.37 um, pixels no wider than 0.5 um: six Gauss points a side err by
+  // 1e-5.
   std::vector<double> node, weight;
   legendre_nodes(6, node, weight);
   const double twice = 2 * std::numbers::pi / 6;
@@ -107,8 +116,9 @@ struct Tally {
     }
   }
   void print(const char* of) const {
-    std::printf("  %s: %d answers, %d refused; %d of %d intervals hold the truth, %d wider than 2 %%, %d confidently wrong\n", of, answers, refused, inside, intervals, wide,
-                wrong);
+    std::printf(
+        "  %s: %d answers, %d refused; %d of %d intervals hold the truth, %d wider than 2 %%, %d confidently wrong\n",
+        of, answers, refused, inside, intervals, wide, wrong);
   }
 };
 
@@ -116,8 +126,9 @@ void describe(int i, const WaveDraw& d, const FitResult& r) {
   for (const char* name : {"birefringence", "diameter_um"}) {
     const ParameterEstimate* p = find_estimate(r, name);
     const double truth = *name == 'b' ? d.birefringence : d.diameter;
-    std::printf("  %3d %-13s truth %.5g: %+.3f %% +/- %.3f %%, %+.1f standard errors%s\n", i, name, truth, 100 * (p->value / truth - 1), 100 * p->stderr_ / truth,
-                (p->value - truth) / p->stderr_, r.has_answer() ? "" : "  (no answer)");
+    std::printf("  %3d %-13s truth %.5g: %+.3f %% +/- %.3f %%, %+.1f standard errors%s\n", i, name, truth,
+                100 * (p->value / truth - 1), 100 * p->stderr_ / truth, (p->value - truth) / p->stderr_,
+                r.has_answer() ? "" : "  (no answer)");
   }
 }
 
@@ -136,7 +147,8 @@ void check_rays(int draws, double largest_um, int size) {
     const FitResult r = fit(d.job(Ceiling::one_way, "auto"));
     const ParameterEstimate *n = find_estimate(r, "birefringence"), *w = find_estimate(r, "diameter_um");
     ASSERT_TRUE(n && w);
-    const bool misses = !(n->interval95_low <= d.birefringence && d.birefringence <= n->interval95_high) || !(w->interval95_low <= d.diameter && d.diameter <= w->interval95_high);
+    const bool misses = !(n->interval95_low <= d.birefringence && d.birefringence <= n->interval95_high) ||
+                        !(w->interval95_low <= d.diameter && d.diameter <= w->interval95_high);
     missed += misses;
     silent += misses && !says_rays_do_not_suffice(r);
   }
@@ -159,20 +171,28 @@ void check_series(int draws, double largest_um, int size, double least_share) {
   EXPECT_GE(t.inside, least_share * t.intervals);
 }
 
-TEST(SeriesRecovery, TruthIsInsideTheInterval) { check_series(12, 7, 48, 0.8); }  // of 24 intervals fewer than 20: 0.3 % by chance
-TEST(LongSeriesRecovery, TruthIsInsideTheInterval) { check_series(problems_or(500), 12, 64, 0.93); }  // 95 % less three standard deviations
+TEST(SeriesRecovery, TruthIsInsideTheInterval) {
+  check_series(12, 7, 48, 0.8);
+}  // of 24 intervals fewer than 20: 0.3 % by chance
+TEST(LongSeriesRecovery, TruthIsInsideTheInterval) {
+  check_series(problems_or(500), 12, 64, 0.93);
+}  // 95 % less three standard deviations
 TEST(RaysOnWaves, SayWhenTheyAreWrong) { check_rays(4, 6, 48); }
 TEST(LongRaysOnWaves, SayWhenTheyAreWrong) { check_rays(problems_or(100), 12, 64); }
 
-// The objective takes contrast from fine fringes, and a free gain gives it back at the price of another birefringence, of another order even. Of the first 24 draws these are all whose
-// free gain, the diameter known, is below 0.8 of the true one. A gain that is known to 5 % ends at its bound, which says that something is left out, and leaves the 1 to 7 % that rays lose.
+// The objective takes contrast from fine fringes, and a free gain gives it back at the price of another birefringence,
+// of another order even. Of the first 24 draws these are all whose free gain, the diameter known, is below 0.8 of the
+// true one. A gain that is known to 5 % ends at its bound, which says that something is left out, and leaves the 1 to 7
+// % that rays lose.
 TEST(RaysOnWaves, AKnownGainKeepsTheFringeOrder) {
   double worst = 0, worst_known = 0;
   for (const unsigned seed : {5u, 9u, 13u, 18u, 21u, 23u, 24u}) {
     const WaveDraw d = draw(seed, 12, 48);
     for (const bool known : {false, true}) {
       FitJob job = d.job(Ceiling::one_way, "auto");
-      Parameter &size = job.parameters[job.parameters.find("diameter_um")], &n = job.parameters[job.parameters.find("birefringence")], &gain = job.parameters[job.parameters.find("gain")];
+      Parameter &size = job.parameters[job.parameters.find("diameter_um")],
+                &n = job.parameters[job.parameters.find("birefringence")],
+                &gain = job.parameters[job.parameters.find("gain")];
       size.free = false, size.value = d.diameter;
       n.lower = 0.3 * d.birefringence, n.upper = 1.7 * d.birefringence;
       if (known) gain.value = 1000, gain.lower = 950, gain.upper = 1050;
@@ -187,7 +207,8 @@ TEST(RaysOnWaves, AKnownGainKeepsTheFringeOrder) {
       }
     }
   }
-  std::printf("  birefringence off by up to %.0f %% with a free gain, %.1f %% with a known one\n", 100 * worst, 100 * worst_known);
+  std::printf("  birefringence off by up to %.0f %% with a free gain, %.1f %% with a known one\n", 100 * worst,
+              100 * worst_known);
   EXPECT_LT(worst_known, 0.07);
   EXPECT_GT(worst, worst_known);
 }
@@ -210,7 +231,8 @@ void check_propagation(int draws, double largest_um, int size, double least_shar
 TEST(WaveRecovery, TruthIsInsideTheInterval) { check_propagation(2, 4, 48, 0.5); }
 TEST(LongWaveRecovery, TruthIsInsideTheInterval) { check_propagation(problems_or(60), 12, 64, 0.9); }
 
-// The plane in focus is fitted along, from the middle on: by the series, and by propagation, whose rays to start from know no focus. Either side of the droplet looks different.
+// The plane in focus is fitted along, from the middle on: by the series, and by propagation, whose rays to start from
+// know no focus. Either side of the droplet looks different.
 TEST(WaveRecovery, TheFocusIsFoundAlong) {
   for (const double focus : {-1.2, 0.7})
     for (const char* method : {"series", "split_step"}) {
@@ -218,12 +240,14 @@ TEST(WaveRecovery, TheFocusIsFoundAlong) {
       d.scene.microscope.focus_um = d.b.fitted("focus_um", 0, -2.5, 2.5);
       const FitResult r = fit(d.job(Ceiling::wave, method));
       EXPECT_TRUE(r.has_answer()) << r.verdict;
-      for (const auto& [name, truth] : {std::pair{"birefringence", d.birefringence}, {"diameter_um", d.diameter}, {"focus_um", focus}}) {
+      for (const auto& [name, truth] :
+           {std::pair{"birefringence", d.birefringence}, {"diameter_um", d.diameter}, {"focus_um", focus}}) {
         const ParameterEstimate* p = find_estimate(r, name);
         ASSERT_TRUE(p) << name;
         std::printf("  %s, %s: %.5g +/- %.2g, truth %.5g\n", method, name, p->value, p->stderr_, truth);
         EXPECT_LT(std::abs(p->value - truth), 4 * p->stderr_) << method << " " << name;
-        EXPECT_LT(p->stderr_, std::string(name) == "focus_um" ? 0.1 : 0.02 * truth) << method << " " << name;  // a tenth of the depth of field, 0.59 / 0.8^2 um; useful
+        EXPECT_LT(p->stderr_, std::string(name) == "focus_um" ? 0.1 : 0.02 * truth)
+            << method << " " << name;  // a tenth of the depth of field, 0.59 / 0.8^2 um; useful
       }
     }
 }
@@ -249,11 +273,13 @@ TEST(ChoosingWaves, NotWhereItWouldTakeTooLong) {
   job.options.max_seconds = 1e-6;
   const FitResult r = fit(job);
   EXPECT_EQ(r.micrographs[0].plan.physics, "one_way");
-  EXPECT_TRUE(std::any_of(r.warnings.begin(), r.warnings.end(), [](const std::string& w) { return w.find("rays are taken instead") != std::string::npos; }));
+  EXPECT_TRUE(std::any_of(r.warnings.begin(), r.warnings.end(),
+                          [](const std::string& w) { return w.find("rays are taken instead") != std::string::npos; }));
 }
 
-// By how much rays are off is foretold from the picture alone: a fit by rays to the waves of what it found returns what it lost, with the right sign.
-// It is first order in that loss: where rays are off by percents, it may fall far short of it. The error bar holds it, and with it the truth.
+// By how much rays are off is foretold from the picture alone: a fit by rays to the waves of what it found returns what
+// it lost, with the right sign. It is first order in that loss: where rays are off by percents, it may fall far short
+// of it. The error bar holds it, and with it the truth.
 TEST(ChoosingWaves, RaysForetellTheirBias) {
   int told = 0;
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
@@ -261,12 +287,15 @@ TEST(ChoosingWaves, RaysForetellTheirBias) {
     const FitResult r = fit(d.job(Ceiling::one_way, "auto"));
     for (const std::string& w : r.warnings) {
       const std::size_t at = w.find("rays return "), off = w.find(" off by ");
-      if (w.find("Rays are not the image") == std::string::npos || at == std::string::npos || off == std::string::npos) continue;
+      if (w.find("Rays are not the image") == std::string::npos || at == std::string::npos || off == std::string::npos)
+        continue;
       const std::string name = w.substr(at + 12, off - at - 12);
-      const double foretold = std::stod(w.substr(off + 8)), truth = name == "birefringence" ? d.birefringence : d.diameter;
+      const double foretold = std::stod(w.substr(off + 8)),
+                   truth = name == "birefringence" ? d.birefringence : d.diameter;
       const ParameterEstimate* p = find_estimate(r, name);
       const double bias = p->value - truth;
-      std::printf("  %u %s: off by %+.4g, foretold %+.4g, standard error %.2g\n", seed, name.c_str(), bias, foretold, p->stderr_);
+      std::printf("  %u %s: off by %+.4g, foretold %+.4g, standard error %.2g\n", seed, name.c_str(), bias, foretold,
+                  p->stderr_);
       EXPECT_GT(foretold * bias, 0) << name;
       EXPECT_LT(std::abs(bias), 3 * p->stderr_) << name;
       EXPECT_GE(p->stderr_, 0.94 * std::abs(foretold)) << name;  // among other things; the warning has two digits
@@ -279,10 +308,11 @@ TEST(ChoosingWaves, RaysForetellTheirBias) {
   EXPECT_GE(told, 3);
 }
 
-// ---- no symmetry: Maxwell's equations marched through a bipolar droplet -----------------------------------------------------------------------------
+// ---- no symmetry: Maxwell's equations marched through a bipolar droplet --------------------------------------------
 
-/// Radius 2 to 3 um, birefringence 0.06 to 0.18, hosts 1.45 to 1.55, apertures 0.4 to 0.7, poles anywhere up to 50 degrees out of the image plane; 1 % of noise. As a droplet, or
-/// sampled at 56 nodes a side of a box that is 15 % wider, which a fit may turn and scale.
+/// Radius 2 to 3 um, birefringence 0.06 to 0.18, hosts 1.45 to 1.55, apertures 0.4 to 0.7, poles anywhere up to 50
+/// degrees out of the image plane; 1 % of noise. As a droplet, or sampled at 56 nodes a side of a box that is 15 %
+/// wider, which a fit may turn and scale.
 struct BipolarDraw {
   TableBuilder b;
   Scene droplet, sampled;
@@ -292,13 +322,17 @@ struct BipolarDraw {
 
   BipolarDraw(unsigned seed, bool as_samples) {
     std::mt19937_64 random(seed * 7919u + 11);
-    const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    const auto between = [&](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
     constexpr int kSize = 48, kNodes = 56;
-    const double radius = between(2, 3), birefringence = between(0.06, 0.18), host = between(1.45, 1.55), azimuth = between(10, 80), tilt = between(0, 50), aperture = between(0.4, 0.7);
+    const double radius = between(2, 3), birefringence = between(0.06, 0.18), host = between(1.45, 1.55),
+                 azimuth = between(10, 80), tilt = between(0, 50), aperture = between(0.4, 0.7);
     const double middle = 0.5 * (kSize - 1), cx = middle + between(-1, 1), cy = middle + between(-1, 1);
     Scene& s = droplet;
     s.ceiling = Ceiling::wave;
-    s.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fitted("birefringence", between(0.9, 1.1) * birefringence, 0.6 * birefringence, 1.4 * birefringence)};
+    s.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fitted("birefringence", between(0.9, 1.1) * birefringence,
+                                                                     0.6 * birefringence, 1.4 * birefringence)};
     s.surround_index = b.fixed("surround", host);
     s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
     s.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
@@ -359,22 +393,24 @@ void check_bipolar(bool as_samples, int draws, double least_share) {
     BipolarDraw d(static_cast<unsigned>(i), as_samples);
     FitJob job;
     const ParameterRef gain = d.b.linear("gain", 900), offset = d.b.linear("offset", 5);
-    job.measurements.push_back(micrograph_of("droplet", as_samples ? d.sampled : d.droplet, d.counts, gain, offset, {d.noise, 0}));
+    job.measurements.push_back(
+        micrograph_of("droplet", as_samples ? d.sampled : d.droplet, d.counts, gain, offset, {d.noise, 0}));
     job.parameters = d.b.table;
     const FitResult r = fit(job);
     refused += !r.has_answer();
     for (const auto& [name, truth] : d.truth) {
       const ParameterEstimate* p = find_estimate(r, name);
       ASSERT_TRUE(p) << name;
-      std::printf("  %3d %-13s truth %8.5g: %+.4f +/- %.4f, %+.1f standard errors%s\n", i, name.c_str(), truth, p->value - truth, p->stderr_, (p->value - truth) / p->stderr_,
-                  r.has_answer() ? "" : "  (no answer)");
+      std::printf("  %3d %-13s truth %8.5g: %+.4f +/- %.4f, %+.1f standard errors%s\n", i, name.c_str(), truth,
+                  p->value - truth, p->stderr_, (p->value - truth) / p->stderr_, r.has_answer() ? "" : "  (no answer)");
       if (!r.has_answer()) continue;
       ++intervals;
       inside += p->interval95_low <= truth && truth <= p->interval95_high;
       wrong += std::abs(p->value - truth) > 5 * p->stderr_;
     }
   }
-  std::printf("  bipolar%s: %d refused; %d of %d intervals hold the truth, %d confidently wrong\n", as_samples ? ", sampled" : "", refused, inside, intervals, wrong);
+  std::printf("  bipolar%s: %d refused; %d of %d intervals hold the truth, %d confidently wrong\n",
+              as_samples ? ", sampled" : "", refused, inside, intervals, wrong);
   EXPECT_EQ(wrong, 0);
   EXPECT_LE(refused, draws / 10);
   EXPECT_GE(inside, least_share * intervals);
@@ -382,7 +418,8 @@ void check_bipolar(bool as_samples, int draws, double least_share) {
 TEST(BipolarWaveRecovery, TruthIsInsideTheInterval) { check_bipolar(false, 2, 0.6); }
 TEST(BipolarWaveRecovery, TruthIsInsideTheIntervalOfASampledOne) { check_bipolar(true, 1, 0.6); }
 TEST(LongBipolarWaveRecovery, TruthIsInsideTheInterval) { check_bipolar(false, problems_or(30), 0.85); }
-// A surface that lies anywhere between nodes makes the box's scale 0.1 to 0.4 % too large, more than a radial twin's surface does.
+// A surface that lies anywhere between nodes makes the box's scale 0.1 to 0.4 % too large, more than a radial twin's
+// surface does.
 TEST(LongBipolarWaveRecovery, TruthIsInsideTheIntervalOfASampledOne) { check_bipolar(true, problems_or(30), 0.8); }
 
 }  // namespace

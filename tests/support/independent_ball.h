@@ -1,5 +1,6 @@
 #pragma once
-// Permittivity of a uniaxial ball (or cylinder) in an isotropic host, for what needs eps(x, y, z). Shares nothing with src/.
+// Permittivity of a uniaxial ball (or cylinder) in an isotropic host, for what needs eps(x, y, z). Shares nothing with
+// src/.
 
 #include <algorithm>
 #include <array>
@@ -8,10 +9,11 @@
 
 namespace birefit::testing {
 
-/// director(x, y, z) -> (nx, ny, nz), unit. In a layer of ramp_um about the surface the medium's share falls linearly from 1 to 0, and
-/// the two are mixed as thin sheets along the surface, which keeps E along it and D across it continuous (G. W. Milton, The Theory of Composites, 9.2;
-/// for pixels: Kottke, Farjadpour, Johnson, Phys. Rev. E 77, 036611 (2008)). Measured with a radial ball: half the error of mixing eps itself on
-/// coarse pixels, and hardly any influence of ramp_um; one pixel is right.
+/// director(x, y, z) -> (nx, ny, nz), unit. In a layer of ramp_um about the surface the medium's share falls linearly
+/// from 1 to 0, and the two are mixed as thin sheets along the surface, which keeps E along it and D across it
+/// continuous (G. W. Milton, The Theory of Composites, 9.2; for pixels: Kottke, Farjadpour, Johnson, Phys. Rev. E 77,
+/// 036611 (2008)). Measured with a radial ball: half the error of mixing eps itself on coarse pixels, and hardly any
+/// influence of ramp_um; one pixel is right.
 template <class Director>
 struct IndependentBall {
   double radius_um, n_o, n_e, n_host, ramp_um;
@@ -26,7 +28,8 @@ struct IndependentBall {
     const std::array<double, 3> n = director(x, y, z), m{x / r, cylinder ? 0 : y / r, z / r};
     // <eps> - s (1 - s) d d / (m.((1 - s) eps + s host).m), d = (eps - host).m, m the normal.
     const double along = n_e * n_e - n_o * n_o, nm = n[0] * m[0] + n[1] * m[1] + n[2] * m[2];
-    const double across = n_o * n_o - host, less = share * (1 - share) / (host + (1 - share) * (across + along * nm * nm));
+    const double across = n_o * n_o - host,
+                 less = share * (1 - share) / (host + (1 - share) * (across + along * nm * nm));
     std::array<double, 3> d{};
     for (std::size_t i = 0; i < 3; ++i) d[i] = across * m[i] + along * nm * n[i];
     const auto entry = [&](std::size_t i, std::size_t j) {

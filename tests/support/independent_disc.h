@@ -1,6 +1,6 @@
 #pragma once
-// A disc under diametral load between polarizers, computed without a line of birefit: textbook stresses, principal stresses
-// and their azimuth, the textbook intensity of both polariscopes.
+// A disc under diametral load between polarizers, computed without a line of birefit: textbook stresses, principal
+// stresses and their azimuth, the textbook intensity of both polariscopes.
 
 #include <cmath>
 #include <numbers>
@@ -37,7 +37,8 @@ struct IndependentDisc {
     const Stress s = stress(x, y);
     const double difference = std::hypot(s.sxx - s.syy, 2 * s.sxy);
     const double alpha = 0.5 * std::atan2(2 * s.sxy, s.sxx - s.syy) + turn;
-    const double delta = 2 * std::numbers::pi / (wavelength_nm * 1e-9) * stress_optic_brewster * 1e-12 * thickness_um * 1e-6 * difference;
+    const double delta = 2 * std::numbers::pi / (wavelength_nm * 1e-9) * stress_optic_brewster * 1e-12 * thickness_um *
+                         1e-6 * difference;
     const double fringe = std::pow(std::sin(delta / 2), 2);
     if (circular) return fringe;
     return std::pow(std::sin(2 * (alpha - polarizer_deg * std::numbers::pi / 180)), 2) * fringe;

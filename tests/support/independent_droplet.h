@@ -3,10 +3,10 @@
 // with src/. Slow on purpose: bisection, adaptive Simpson, plain subpixels. Makes the shipped micrograph and the truth
 // of recovery tests.
 //
-// Ray of impact b: Snell at the sphere, sin psi = b/R, sin psi' = (n_host/n_o) sin psi, turned by 2 (psi - psi'), seen in
-// the mid plane at rho = b / cos(2 (psi - psi')). Extraordinary index on the chord: 1/n^2 = cos^2 g/n_o^2 + sin^2 g/n_e^2.
-// Fresnel: s on n_o; p on a uniaxial surface with its axis along the normal (Lekner, J. Phys. Condens. Matter 3, 6121
-// (1991)). Field in the focal plane: flux through the ray tube, transverse part of p.
+// Ray of impact b: Snell at the sphere, sin psi = b/R, sin psi' = (n_host/n_o) sin psi, turned by 2 (psi - psi'), seen
+// in the mid plane at rho = b / cos(2 (psi - psi')). Extraordinary index on the chord: 1/n^2 = cos^2 g/n_o^2 + sin^2
+// g/n_e^2. Fresnel: s on n_o; p on a uniaxial surface with its axis along the normal (Lekner, J. Phys. Condens. Matter
+// 3, 6121 (1991)). Field in the focal plane: flux through the ray tube, transverse part of p.
 
 #include <cmath>
 #include <functional>
@@ -21,21 +21,24 @@ struct IndependentDroplet {
 
   bool surfaces = true;  ///< reflect; without, all light goes through them
 
-  /// Angle of the director from the viewing axis at (rho, z) over the radius, upper half; the lower half mirrors it. Not
-  /// set: the radial hedgehog.
+  /// Angle of the director from the viewing axis at (rho, z) over the radius, upper half; the lower half mirrors it.
+  /// Not set: the radial hedgehog.
   std::function<double(double, double)> angle_from_axis;
 
   /// Along the refracted ray of impact b outside: Simpson's rule on 2,000 pieces.
   double retardance_of_field_um(double b) const {
-    const double radius = diameter_um / 2, outside = std::asin(b / radius), inside = std::asin(n_host / n_o * b / radius);
+    const double radius = diameter_um / 2, outside = std::asin(b / radius),
+                 inside = std::asin(n_host / n_o * b / radius);
     const double turn = outside - inside, length = 2 * radius * std::cos(inside);
     constexpr int kPieces = 2000;
     double sum = 0;
     for (int i = 0; i <= kPieces; ++i) {
       const double t = length * i / kPieces;
-      const double rho = (b - t * std::sin(turn)) / radius, z = (t * std::cos(turn) - radius * std::cos(outside)) / radius;
+      const double rho = (b - t * std::sin(turn)) / radius,
+                   z = (t * std::cos(turn) - radius * std::cos(outside)) / radius;
       const double angle = angle_from_axis(std::abs(rho), std::abs(z));
-      const double along = -std::sin(turn) * std::sin(angle) * (rho < 0 ? -1 : 1) + std::cos(turn) * std::cos(angle) * (z < 0 ? -1 : 1);
+      const double along =
+          -std::sin(turn) * std::sin(angle) * (rho < 0 ? -1 : 1) + std::cos(turn) * std::cos(angle) * (z < 0 ? -1 : 1);
       const double cos2 = along * along;
       const double n = 1 / std::sqrt(cos2 / (n_o * n_o) + (1 - cos2) / (n_e * n_e)) - n_o;
       sum += n * (i == 0 || i == kPieces ? 1 : i % 2 ? 4 : 2);

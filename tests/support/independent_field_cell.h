@@ -1,9 +1,10 @@
 #pragma once
-// A planar nematic cell with pretilt in a field along its normal, computed a second time, by quadrature: the first integral of
-// the tilt's equation at uniform D (Deuling, Mol. Cryst. Liq. Cryst. 19, 123 (1972), his integrals from the pretilt on). With
-// sin t = sqrt(m) sin psi, k = K33/K11 - 1, g = eps_par/eps_perp - 1:
+// A planar nematic cell with pretilt in a field along its normal, computed a second time, by quadrature: the first
+// integral of the tilt's equation at uniform D (Deuling, Mol. Cryst. Liq. Cryst. 19, 123 (1972), his integrals from the
+// pretilt on). With sin t = sqrt(m) sin psi, k = K33/K11 - 1, g = eps_par/eps_perp - 1:
 //   v = (2/pi) sqrt(1 + g m) Int sqrt((1 + k m s^2) / ((1 + g m s^2)(1 - m s^2))) dpsi,
-//   dzeta = dpsi sqrt((1 + k m s^2)(1 + g m s^2) / (1 - m s^2)) / (2 J),   J its integral from psi0 to pi/2, s = sin psi.
+//   dzeta = dpsi sqrt((1 + k m s^2)(1 + g m s^2) / (1 - m s^2)) / (2 J),   J its integral from psi0 to pi/2, s = sin
+//   psi.
 // Shares nothing with src/.
 
 #include <algorithm>
@@ -27,7 +28,11 @@ struct IndependentFieldCell {
     const double a = std::sqrt(rest) + 1e-3, end = std::asinh((M_PI / 2 - psi0) / a);
     constexpr int kPanels = 4000;
     for (int i = 0; i <= kPanels; ++i) {
-      const double x = end * i / kPanels, c = a * std::sinh(x), weight = (i == 0 || i == kPanels ? 1 : i % 2 ? 4 : 2) * a * std::cosh(x);
+      const double x = end * i / kPanels, c = a * std::sinh(x),
+                   weight = (i == 0 || i == kPanels ? 1
+                             : i % 2                ? 4
+                                                    : 2) *
+                            a * std::cosh(x);
       const double s2 = std::pow(std::cos(c), 2), below = rest + m * std::pow(std::sin(c), 2);  // 1 - m s^2
       const double bend = 1 + k * m * s2, dielectric = 1 + g * m * s2;
       i_v += weight * std::sqrt(bend / (dielectric * below));
@@ -47,7 +52,9 @@ struct IndependentFieldCell {
     return at(0.5 * (low + high)).retardance_um;
   }
   /// Director at 45 degrees between crossed polarizers.
-  double crossed(double v, double wavelength_um) const { return std::pow(std::sin(M_PI / wavelength_um * retardance_um(v)), 2); }
+  double crossed(double v, double wavelength_um) const {
+    return std::pow(std::sin(M_PI / wavelength_um * retardance_um(v)), 2);
+  }
 };
 
 }  // namespace birefit::testing

@@ -89,7 +89,10 @@ struct IndependentPlate {
     double path = 0;
     const std::size_t n = n_e.size() - 1;
     for (std::size_t i = 0; i <= n; ++i)
-      path += (i == 0 || i == n ? 1 : i % 2 ? 4 : 2) * extraordinary_q(kx, ky, n_e[i], 1) / (3.0 * static_cast<double>(n));
+      path += (i == 0 || i == n ? 1
+               : i % 2          ? 4
+                                : 2) *
+              extraordinary_q(kx, ky, n_e[i], 1) / (3.0 * static_cast<double>(n));
     const double k0d = 2 * M_PI / wavelength_um * thickness_um;
     const std::complex<double> delta = std::polar(1.0, k0d * (path - first[0].q));
     // polarizer into (s, p): the aplanatic unrolling is a turn by the azimuth
@@ -103,7 +106,8 @@ struct IndependentPlate {
   /// Mean over a pixel: n x n cells of 3 x 3 Gauss points (error of the fringe's mean: (phase change a cell)^6 / 2e6).
   double pixel(int column, int row, int n) const {
     const double scale = std::tan(half_angle_deg * M_PI / 180) * 2 / size_px, middle = 0.5 * (size_px - 1);
-    const double gauss[3] = {0.5 - 0.5 * std::sqrt(0.6), 0.5, 0.5 + 0.5 * std::sqrt(0.6)}, weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+    const double gauss[3] = {0.5 - 0.5 * std::sqrt(0.6), 0.5, 0.5 + 0.5 * std::sqrt(0.6)},
+                 weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
     double sum = 0;
     for (int j = 0; j < 3 * n; ++j)
       for (int i = 0; i < 3 * n; ++i) {

@@ -1,11 +1,13 @@
 #pragma once
-// Rays of geometrical optics through a nematic sphere, computed a second time from the textbook formulas alone, in three dimensions and Cartesian
-// coordinates: shares nothing with src/. Slow on purpose: fixed Runge-Kutta steps, differences for gradients, bisection for surfaces.
+// Rays of geometrical optics through a nematic sphere, computed a second time from the textbook formulas alone, in
+// three dimensions and Cartesian coordinates: shares nothing with src/. Slow on purpose: fixed Runge-Kutta steps,
+// differences for gradients, bisection for surfaces.
 //
-// Extraordinary wavevectors w (over k0) lie on H = eo w^2 + (ee - eo) (n.w)^2 - eo ee = 0; r' = dH/dw, w' = -dH/dr, the optical path grows by w.r'
-// (Kline & Kay, Electromagnetic Theory and Geometrical Optics; the ordinary ones on w^2 = eo). At a surface the tangential part of w stays, the normal part
-// is the root of H that runs on. Flux passes by 4 Y1 Y2 / (Y1 + Y2)^2, Y = H_t / E_t: eps/q of p waves where the axis is normal to the surface, q of s waves
-// (q: normal part of w).
+// Extraordinary wavevectors w (over k0) lie on H = eo w^2 + (ee - eo) (n.w)^2 - eo ee = 0; r' = dH/dw, w' = -dH/dr, the
+// optical path grows by w.r' (Kline & Kay, Electromagnetic Theory and Geometrical Optics; the ordinary ones on w^2 =
+// eo). At a surface the tangential part of w stays, the normal part is the root of H that runs on. Flux passes by 4 Y1
+// Y2 / (Y1 + Y2)^2, Y = H_t / E_t: eps/q of p waves where the axis is normal to the surface, q of s waves (q: normal
+// part of w).
 
 #include <array>
 #include <cmath>
@@ -17,20 +19,23 @@ namespace birefit::testing {
 struct IndependentRays {
   using Vector = std::array<double, 3>;
   double n_o = 1.52, n_e = 1.74, n_host = 1.52;
-  double core = 0, core_index = 1.52;             ///< radius 1, that of the sphere
+  double core = 0, core_index = 1.52;  ///< radius 1, that of the sphere
   bool extraordinary = true;
   std::function<Vector(const Vector&)> director;  ///< inside, outside the core; n and -n are one
   double step = 1e-3;
 
   struct Ray {
-    double image_radius, turn;  ///< mid plane, backwards along the outgoing ray; its angle from the view, > 0 away from the axis
-    double path;                ///< over that of the plane wave that the ray came with, both to the mid plane
-    double flux;                ///< that surfaces pass
+    /// mid plane, backwards along the outgoing ray; its angle from the view, > 0 away from the axis
+    double image_radius, turn;
+    double path;  ///< over that of the plane wave that the ray came with, both to the mid plane
+    double flux;  ///< that surfaces pass
     Vector exit;
   };
 
   static double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-  static Vector sum(const Vector& a, double f, const Vector& b) { return {a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2]}; }
+  static Vector sum(const Vector& a, double f, const Vector& b) {
+    return {a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2]};
+  }
 
   double hamiltonian(const Vector& r, const Vector& w) const {
     const double eo = n_o * n_o, ee = n_e * n_e;
@@ -60,11 +65,14 @@ struct IndependentRays {
     return out;
   }
   State stepped(const State& s, double h) const {
-    const auto plus = [](const State& a, double f, const State& b) { return State{sum(a.r, f, b.r), sum(a.w, f, b.w), a.path + f * b.path}; };
+    const auto plus = [](const State& a, double f, const State& b) {
+      return State{sum(a.r, f, b.r), sum(a.w, f, b.w), a.path + f * b.path};
+    };
     const State a = rate(s), b = rate(plus(s, h / 2, a)), c = rate(plus(s, h / 2, b)), d = rate(plus(s, h, c));
     return plus(plus(plus(plus(s, h / 6, a), h / 3, b), h / 3, c), h / 6, d);
   }
-  /// Into the liquid crystal (axis along the normal there): w with the tangential part of `w`, its normal part along `ahead`.
+  /// Into the liquid crystal (axis along the normal there): w with the tangential part of `w`, its normal part along
+  /// `ahead`.
   std::optional<Vector> into_crystal(const Vector& w, const Vector& ahead) const {
     const Vector along = sum(w, -dot(w, ahead), ahead);
     // The axis is +-ahead: eo (t^2 + q^2) + (ee - eo) q^2 = eo ee.

@@ -28,9 +28,9 @@ inline std::filesystem::path data_path(const std::string& relative) {
 ///   if (!image) GTEST_SKIP() << kRealDataMissing;
 inline std::optional<std::filesystem::path> real_data_path(const std::string& relative) {
   const char* given = std::getenv("BIREFIT_REAL_DATA");
-  const std::filesystem::path root = given != nullptr && *given != '\0'
-                                         ? std::filesystem::path(given)
-                                         : std::filesystem::path(BIREFIT_SOURCE_DIR) / ".." / "shared" / "data" / "real";
+  const std::filesystem::path root = given != nullptr && *given != '\0' ? std::filesystem::path(given)
+                                                                        : std::filesystem::path(BIREFIT_SOURCE_DIR) /
+                                                                              ".." / "shared" / "data" / "real";
   const std::filesystem::path path = (root / relative).lexically_normal();
   std::error_code ignored;
   if (std::filesystem::exists(path, ignored)) return path;
@@ -57,7 +57,8 @@ class ReferenceTable {
       }
       if (cells.size() != columns_.size())
         throw std::runtime_error(name_ + ": data row " + std::to_string(rows_.size() + 1) + " has " +
-                                 std::to_string(cells.size()) + " cells, the header " + std::to_string(columns_.size()));
+                                 std::to_string(cells.size()) + " cells, the header " +
+                                 std::to_string(columns_.size()));
       rows_.push_back(std::move(cells));
     }
     if (rows_.empty()) throw std::runtime_error(name_ + ": no rows");
@@ -132,7 +133,8 @@ inline Image read_pfm(const std::filesystem::path& path) {
     for (int column = 0; column < width; ++column) {
       std::array<unsigned char, 4> bytes{};
       if (!file.read(reinterpret_cast<char*>(bytes.data()), 4)) throw std::runtime_error(path.string() + ": truncated");
-      const std::uint32_t bits = bytes[0] | std::uint32_t(bytes[1]) << 8 | std::uint32_t(bytes[2]) << 16 | std::uint32_t(bytes[3]) << 24;
+      const std::uint32_t bits =
+          bytes[0] | std::uint32_t(bytes[1]) << 8 | std::uint32_t(bytes[2]) << 16 | std::uint32_t(bytes[3]) << 24;
       float value = 0;
       std::memcpy(&value, &bits, sizeof value);
       image(column, row) = value;

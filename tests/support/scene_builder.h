@@ -7,12 +7,13 @@
 #include <utility>
 #include <vector>
 
-#include "pictures.h"
 #include "birefit/fit.h"
+#include "pictures.h"
 
 namespace birefit::testing {
 
-/// How many random problems a long test solves, and from which on: BIREFIT_PROBLEMS takes another number, BIREFIT_FIRST_PROBLEM others than the first ones.
+/// How many random problems a long test solves, and from which on: BIREFIT_PROBLEMS takes another number,
+/// BIREFIT_FIRST_PROBLEM others than the first ones.
 inline int problems_or(int usual) {
   const char* n = std::getenv("BIREFIT_PROBLEMS");
   return n ? std::atoi(n) : usual;
@@ -51,7 +52,7 @@ inline Image image_of(const std::vector<double>& values, int width, int height) 
 }
 
 inline Picture micrograph_of(std::string name, Scene scene, const std::vector<double>& counts, ParameterRef gain,
-                                ParameterRef offset, NoiseModel noise) {
+                             ParameterRef offset, NoiseModel noise) {
   Picture m;
   m.name = std::move(name);
   m.values = image_of(counts, scene.view.width, scene.view.height);

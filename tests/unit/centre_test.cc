@@ -18,7 +18,8 @@ Image rings(int width, int height, double x, double y, double radius) {
   for (int row = 0; row < height; ++row)
     for (int column = 0; column < width; ++column) {
       const double dx = column - x, dy = row - y, r = std::hypot(dx, dy);
-      const double sine = r > 0 ? 2 * dx * dy / (r * r) : 0, retardance = 9 * std::sqrt(std::max(0.0, 1 - r * r / (radius * radius)));
+      const double sine = r > 0 ? 2 * dx * dy / (r * r) : 0,
+                   retardance = 9 * std::sqrt(std::max(0.0, 1 - r * r / (radius * radius)));
       image(column, row) = 120 + 800 * sine * sine * std::pow(std::sin(retardance), 2);
     }
   return image;
@@ -28,7 +29,8 @@ Image rings(int width, int height, double x, double y, double radius) {
 TEST(CentreOfSymmetry, IsTheMiddleOfTheRings) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise(0, 20);
-  for (const auto& [size, x, y, radius] : {std::array{64.0, 40.3, 27.8, 18.0}, std::array{300.0, 110.0, 140.5, 90.0}, std::array{200.0, 150.2, 60.9, 30.0}}) {
+  for (const auto& [size, x, y, radius] : {std::array{64.0, 40.3, 27.8, 18.0}, std::array{300.0, 110.0, 140.5, 90.0},
+                                           std::array{200.0, 150.2, 60.9, 30.0}}) {
     Image image = rings(static_cast<int>(size), static_cast<int>(0.9 * size), x, y, radius);
     for (double& value : image.values()) value += noise(random);
     Mask used(image.width(), image.height(), 1);

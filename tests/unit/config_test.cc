@@ -129,7 +129,8 @@ TEST_F(Config, NamesTheNearestKnownKey) {
 }
 
 TEST_F(Config, SuggestsTheKeyWithItsUnit) {
-  EXPECT_NE(mistakes(replaced(kRender, "diameter_um", "diameter")).find("did you mean diameter_um?"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kRender, "diameter_um", "diameter")).find("did you mean diameter_um?"),
+            std::string::npos);
 }
 
 TEST_F(Config, ReportsEveryMistakeOnceFromTopToBottom) {
@@ -145,32 +146,35 @@ TEST_F(Config, ReportsEveryMistakeOnceFromTopToBottom) {
 }
 
 TEST_F(Config, RefusesNumbersThatAreNone) {
-  for (const char* word : {".nan", "nan", ".inf", "-.inf", "1e999", "0x10", "1_000", "abc", "\"590\"", "true", "[590]", "", "5 90"})
+  for (const char* word :
+       {".nan", "nan", ".inf", "-.inf", "1e999", "0x10", "1_000", "abc", "\"590\"", "true", "[590]", "", "5 90"})
     EXPECT_NE(mistakes(replaced(kRender, "590", word)).find("wavelength_nm"), std::string::npos) << word;
 }
 
 TEST_F(Config, UnderstandsADecimalCommaAndAUnitInTheValue) {
-  EXPECT_NE(mistakes(replaced(kRender, "{light: {wavelength_nm: 590}", "{light: {wavelength_nm: 590nm}")).find("did you mean 590?"),
+  EXPECT_NE(mistakes(replaced(kRender, "{light: {wavelength_nm: 590}", "{light: {wavelength_nm: 590nm}"))
+                .find("did you mean 590?"),
             std::string::npos);
   const std::string block = "accuracy:\n  intensity: 0,01\n";
   EXPECT_NE(mistakes(kRender + block).find("did you mean 0.01? write a decimal point"), std::string::npos);
 }
 
 TEST_F(Config, RefusesBoundsThatExcludeTheStart) {
-  EXPECT_NE(mistakes(replaced(kRender, "value: 9.3", "value: 11")).find("diameter_um = 11 is outside its fit bounds [8.5, 10]"),
+  EXPECT_NE(mistakes(replaced(kRender, "value: 9.3", "value: 11"))
+                .find("diameter_um = 11 is outside its fit bounds [8.5, 10]"),
             std::string::npos);
 }
 
-TEST_F(Config, AllowsABoundAtThePhysicalLimit) {
-  EXPECT_EQ(mistakes(replaced(kRender, "[8.5, 10]", "[0, 10]")), "");
-}
+TEST_F(Config, AllowsABoundAtThePhysicalLimit) { EXPECT_EQ(mistakes(replaced(kRender, "[8.5, 10]", "[0, 10]")), ""); }
 
 TEST_F(Config, AsksForAFitWhereThereIsAPrior) {
-  EXPECT_NE(mistakes(replaced(kRender, "fit: [0.1, 0.3], ", "")).find("a prior needs a fitted parameter"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kRender, "fit: [0.1, 0.3], ", "")).find("a prior needs a fitted parameter"),
+            std::string::npos);
 }
 
 TEST_F(Config, RefusesAliases) {
-  EXPECT_NE(mistakes("a: &x 1\nb: *x\n").find("config.yaml:1:4: anchors and aliases are not supported"), std::string::npos);
+  EXPECT_NE(mistakes("a: &x 1\nb: *x\n").find("config.yaml:1:4: anchors and aliases are not supported"),
+            std::string::npos);
 }
 
 TEST_F(Config, RefusesDeepNestingOfEveryKind) {
@@ -189,9 +193,11 @@ TEST_F(Config, CountsNoBracketsInQuotesAndComments) {
 
 TEST_F(Config, WavesNeedAnApertureAndASphere) {
   const std::string without = replaced(kRender, ", objective_na: 0.8", ""), &with_objective = kRender;
-  EXPECT_NE(mistakes(without + "physics: {ceiling: wave}\n").find("ceiling: wave needs microscope.objective_na"), std::string::npos);
+  EXPECT_NE(mistakes(without + "physics: {ceiling: wave}\n").find("ceiling: wave needs microscope.objective_na"),
+            std::string::npos);
   EXPECT_EQ(mistakes(with_objective + "physics: {ceiling: wave}\n"), "");
-  EXPECT_NE(mistakes(with_objective + "physics: {ceiling: wave, rays: straight}\n").find("rays has no meaning"), std::string::npos);
+  EXPECT_NE(mistakes(with_objective + "physics: {ceiling: wave, rays: straight}\n").find("rays has no meaning"),
+            std::string::npos);
   EXPECT_NE(mistakes(with_objective + "physics: {max_seconds: -1}\n").find("max_seconds"), std::string::npos);
   const std::string defocused = replaced(with_objective, "objective_na: 0.8", "objective_na: 0.8, focus_um: 2");
   EXPECT_EQ(mistakes(defocused), "");
@@ -202,12 +208,15 @@ TEST_F(Config, WavesNeedAnApertureAndASphere) {
 TEST_F(Config, WavesOfASampledFieldNeedApertureAndSurround) {
   const std::string rays =
       "image_size_px: [8, 8]\nmicrograph: {pixel_size_um: 0.1}\n"
-      "sample:\n  volume: {file: none.npy, spacing_um: [0.1, 0.1, 0.1]}\n  material: {ordinary: 1.52, birefringence: 0.1}\n"
+      "sample:\n  volume: {file: none.npy, spacing_um: [0.1, 0.1, 0.1]}\n  material: {ordinary: 1.52, birefringence: "
+      "0.1}\n"
       "microscope: {light: {wavelength_nm: 590}, polarizer_deg: 0, analyzer_deg: 90}\n";
   const std::string told = mistakes(rays + "physics: {ceiling: wave}\n");
   EXPECT_NE(told.find("ceiling: wave needs sample.surround"), std::string::npos) << told;
   EXPECT_NE(told.find("ceiling: wave needs microscope.objective_na"), std::string::npos) << told;
-  const std::string complete = replaced(replaced(rays, "0.1}\nmicroscope", "0.1}\n  surround: {index: 1.5}\nmicroscope"), "analyzer_deg: 90}", "analyzer_deg: 90, objective_na: 0.5}");
+  const std::string complete =
+      replaced(replaced(rays, "0.1}\nmicroscope", "0.1}\n  surround: {index: 1.5}\nmicroscope"), "analyzer_deg: 90}",
+               "analyzer_deg: 90, objective_na: 0.5}");
   EXPECT_EQ(mistakes(complete + "physics: {ceiling: wave}\n").find("ceiling"), std::string::npos);
   EXPECT_EQ(mistakes(rays).find("surround"), std::string::npos);
   EXPECT_EQ(mistakes(complete).find("surround"), std::string::npos);  // rays leave it alone
@@ -223,7 +232,9 @@ TEST_F(Config, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
   EXPECT_EQ(ceiling(with_objective + "transport: {method: diagonal}\n"), Ceiling::one_way);
   // What only waves can do is no matter of cost.
   EXPECT_EQ(ceiling(with_objective + "transport: {method: split_step}\nphysics: {max_seconds: 0}\n"), Ceiling::wave);
-  EXPECT_EQ(ceiling(replaced(with_objective, "objective_na: 0.8", "objective_na: 0.8, focus_um: 2") + "physics: {max_seconds: 0}\n"), Ceiling::wave);
+  EXPECT_EQ(ceiling(replaced(with_objective, "objective_na: 0.8", "objective_na: 0.8, focus_um: 2") +
+                    "physics: {max_seconds: 0}\n"),
+            Ceiling::wave);
 }
 
 TEST_F(Config, SaysWhatComesLater) {
@@ -245,8 +256,10 @@ TEST_F(Config, NeedsAPixelSizeForADroplet) {
 }
 
 TEST_F(Config, RefusesADropletOfAnotherScaleThanTheImage) {
-  EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "9300")).find("did you mean 9.3?"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "0.0093")).find("did you mean 9.3?"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "9300")).find("did you mean 9.3?"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "0.0093")).find("did you mean 9.3?"),
+            std::string::npos);
 }
 
 TEST_F(Config, GivesTheCrystalItsSlowAxisHalfwayFromTheField) {
@@ -284,32 +297,42 @@ TEST_F(Config, SharesWhatNoMicrographSets) {
   EXPECT_EQ(a.outside_roi, 32 * 32 - 28 * 24);
 }
 
-// Two pictures of one droplet, each with a focus of its own: what a scene reads is an unknown where it is to be fitted, and may be set for an image.
+// Two pictures of one droplet, each with a focus of its own: what a scene reads is an unknown where it is to be fitted,
+// and may be set for an image.
 TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
-  const std::string one = replaced(kRender, "image_size_px: [64, 48]\n", ""), fitted = replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: {value: 0.5, fit: [-2, 2]}");
+  const std::string one = replaced(kRender, "image_size_px: [64, 48]\n", ""),
+                    fitted =
+                        replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: {value: 0.5, fit: [-2, 2]}");
   const auto alone = load(replaced(fitted, "{pixel_size_um", "{image: a.tif, pixel_size_um"), ConfigUse::fit);
   EXPECT_TRUE(alone.job.parameters[picture(alone.job, 0).scene.microscope.focus_um].free);
-  const auto two = load("micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" + fitted, ConfigUse::fit);
+  const auto two =
+      load("micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" + fitted,
+           ConfigUse::fit);
   const ParameterTable& table = two.job.parameters;
-  const ParameterRef a = picture(two.job, 0).scene.microscope.focus_um, b = picture(two.job, 1).scene.microscope.focus_um;
+  const ParameterRef a = picture(two.job, 0).scene.microscope.focus_um,
+                     b = picture(two.job, 1).scene.microscope.focus_um;
   EXPECT_TRUE(table[a].free);
   EXPECT_EQ(table[a].value, 0.5);
   EXPECT_FALSE(table[b].free);
   EXPECT_EQ(table[b].value, -1);
   // The shared one on the mid plane, one image's not: waves, or an error.
-  const std::string own = "micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" + replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: 0");
+  const std::string own = "micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" +
+                          replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: 0");
   EXPECT_EQ(picture(load(own + "physics: {max_seconds: 0}\n", ConfigUse::fit).job, 0).scene.ceiling, Ceiling::wave);
-  EXPECT_NE(mistakes(own + "physics: {ceiling: one_way}\n", ConfigUse::fit).find("defocus needs wave optics"), std::string::npos);
+  EXPECT_NE(mistakes(own + "physics: {ceiling: one_way}\n", ConfigUse::fit).find("defocus needs wave optics"),
+            std::string::npos);
 }
 
 TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   const auto with = [](const std::string& text) { return "micrograph: {roi_px: [2, 4, 30, 28], " + text + "}\n"; };
-  const std::string plain = "micrograph: {roi_px: [2, 4, 30, 28]}\n", uneven = with("illumination: {x: {fit: auto}, square: -20}, background: {y: {fit: auto}}");
-  const std::string frame = replaced(kCrystal, "set: {sample.crystal.bias_v: 200}", "set: {sample.crystal.bias_v: 200, micrograph.background.y: {fit: auto}}");
+  const std::string plain = "micrograph: {roi_px: [2, 4, 30, 28]}\n",
+                    uneven = with("illumination: {x: {fit: auto}, square: -20}, background: {y: {fit: auto}}");
+  const std::string frame = replaced(kCrystal, "set: {sample.crystal.bias_v: 200}",
+                                     "set: {sample.crystal.bias_v: 200, micrograph.background.y: {fit: auto}}");
   const auto config = load(replaced(frame, plain, uneven), ConfigUse::fit);
   const ParameterTable& table = config.job.parameters;
   const auto &a = picture(config.job, 0).uneven, &b = picture(config.job, 1).uneven;
@@ -325,13 +348,16 @@ TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
   EXPECT_EQ(a[0].coefficient, b[0].coefficient);
   // One of the frames has a background of its own, whichever `set` named it.
   EXPECT_FALSE(a[2].coefficient == b[2].coefficient);
-  EXPECT_NE(mistakes(replaced(frame, plain, with("background: {z: 1}")), ConfigUse::fit).find("unknown key z in micrograph.background"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(frame, plain, with("background: {z: 1}")), ConfigUse::fit)
+                .find("unknown key z in micrograph.background"),
+            std::string::npos);
 }
 
 TEST_F(Config, KnowsTheParametersThatSetMayName) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
-  EXPECT_NE(mistakes(replaced(kCrystal, "set: {sample.crystal.bias_v: 200}", "set: {sample.crystal.bias: 200}"), ConfigUse::fit)
+  EXPECT_NE(mistakes(replaced(kCrystal, "set: {sample.crystal.bias_v: 200}", "set: {sample.crystal.bias: 200}"),
+                     ConfigUse::fit)
                 .find("did you mean sample.crystal.bias_v?"),
             std::string::npos);
 }
@@ -339,7 +365,11 @@ TEST_F(Config, KnowsTheParametersThatSetMayName) {
 TEST_F(Config, TurnsCountsIntoTransmission) {
   Image dark(32, 32, 100), parallel(32, 32, 1100), crossed(32, 32, 120), image(32, 32, 600);
   parallel(10, 12) = 100;  // no light here
-  for (auto& [name, frame] : {std::pair<const char*, Image&>("d.tif", dark), {"p.tif", parallel}, {"c.tif", crossed}, {"a.tif", image}, {"b.tif", image}})
+  for (auto& [name, frame] : {std::pair<const char*, Image&>("d.tif", dark),
+                              {"p.tif", parallel},
+                              {"c.tif", crossed},
+                              {"a.tif", image},
+                              {"b.tif", image}})
     save(name, frame);
   const auto config = load(kCrystal + "calibration: {dark: d.tif, parallel: p.tif, crossed: c.tif}\n", ConfigUse::fit);
   const Picture& a = picture(config.job, 0);
@@ -387,7 +417,8 @@ TEST_F(Config, ReadsAJointPrior) {
     "micrograph.gain": {"value": 0.77}}, "interval_degrees_of_freedom": 4,
     "frame_scatter": {"intensity_sd": 0.01, "degrees_of_freedom": 3},
     "covariance": {"names": ["micrograph.gain", "sample.crystal.half_wave_voltage_v"], "matrix": [[1e-4, 0.9e-2], [0.9e-2, 1]]}})");
-  const std::string prior = "prior: {from: fit.json, parameters: [sample.crystal.half_wave_voltage_v, micrograph.gain]}\n";
+  const std::string prior =
+      "prior: {from: fit.json, parameters: [sample.crystal.half_wave_voltage_v, micrograph.gain]}\n";
   const auto config = load(kCrystal + prior, ConfigUse::fit);
   ASSERT_TRUE(config.job.prior);
   EXPECT_EQ(config.job.prior->mean[0], 1490);
@@ -475,10 +506,15 @@ TEST_F(Config, SaysWhereASignalIsWrong) {
   EXPECT_EQ(mistakes(kSignal, ConfigUse::fit),
             "config.yaml:3:12: b.csv has no column out; did you mean aut?\n"
             "a.csv:3:1: volts = -1 is outside [0, 100000], the range of sample.cell.director.freedericksz.voltage_v");
-  EXPECT_NE(mistakes(replaced(kSignal, "voltage_v: volts", "voltage: volts"), ConfigUse::fit).find("did you mean"), std::string::npos);
-  EXPECT_NE(mistakes("micrograph: {roi_px: [0, 0, 3, 3]}\n" + kSignal, ConfigUse::fit).find("1:22: micrograph.roi_px is of images"), std::string::npos);
-  EXPECT_NE(mistakes("image_size_px: [3, 3]\n" + kSignal, ConfigUse::fit).find("image_size_px is given beside signal"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kSignal, "columns: {sample.cell.director.freedericksz.voltage_v: volts}, set", "set"), ConfigUse::fit)
+  EXPECT_NE(mistakes(replaced(kSignal, "voltage_v: volts", "voltage: volts"), ConfigUse::fit).find("did you mean"),
+            std::string::npos);
+  EXPECT_NE(mistakes("micrograph: {roi_px: [0, 0, 3, 3]}\n" + kSignal, ConfigUse::fit)
+                .find("1:22: micrograph.roi_px is of images"),
+            std::string::npos);
+  EXPECT_NE(mistakes("image_size_px: [3, 3]\n" + kSignal, ConfigUse::fit).find("image_size_px is given beside signal"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kSignal, "columns: {sample.cell.director.freedericksz.voltage_v: volts}, set", "set"),
+                     ConfigUse::fit)
                 .find("columns"),
             std::string::npos);
 }
@@ -503,7 +539,8 @@ TEST(RingTable, IsReadingsOfOneSceneWithAnOutlook) {
   EXPECT_EQ(rings.observable.quantity, Quantity::ring_radius_cm);
   EXPECT_EQ(rings.rows.size(), 1u);
   ASSERT_EQ(static_cast<std::size_t>(rings.values.size()), rings.observable.ring_numbers.size());
-  for (Eigen::Index i = 1; i < rings.values.size(); ++i) EXPECT_GT(rings.values[i], rings.values[i - 1]);  // rings grow outwards
+  // rings grow outwards
+  for (Eigen::Index i = 1; i < rings.values.size(); ++i) EXPECT_GT(rings.values[i], rings.values[i - 1]);
   for (const ParameterEstimate& expected : outlook(config.job).parameters) {
     EXPECT_TRUE(std::isfinite(expected.stderr_)) << expected.name;
     EXPECT_GT(expected.stderr_, 0) << expected.name;
@@ -513,7 +550,9 @@ TEST(RingTable, IsReadingsOfOneSceneWithAnOutlook) {
 
 // No polarizer, no gain: the table has the birefringence itself. Rows of other kinds, texts and all, are left alone.
 TEST_F(Config, TakesTheRowsAndUnitsThatASignalAsksFor) {
-  write("a.csv", "kind,celsius,dn,remark\nnematic,20,0.1,ok\nisotropic,58,0,clear\nnematic,30,0.09,\nnematic,40.5,0.08,\nnematic,52,0.01,late\nother,none,x,\n");
+  write("a.csv",
+        "kind,celsius,dn,remark\nnematic,20,0.1,ok\nisotropic,58,0,clear\nnematic,30,0.09,\nnematic,40.5,0.08,"
+        "\nnematic,52,0.01,late\nother,none,x,\n");
   const auto config = load(kBirefringence, ConfigUse::fit);
   ASSERT_EQ(config.job.measurements.size(), 1u);
   EXPECT_EQ(config.signals[0].line, (std::vector<int>{2, 4, 5}));
@@ -527,13 +566,27 @@ TEST_F(Config, TakesTheRowsAndUnitsThatASignalAsksFor) {
   EXPECT_EQ(config.job.parameters[table.gain].value, 1);
   EXPECT_EQ(config.job.parameters[table.offset].value, 0);
 
-  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "sort: nematic"), ConfigUse::fit).find("a.csv has no column sort"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "kind: smectic"), ConfigUse::fit).find("fewer than three rows that `where` lets through"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kBirefringence, "[0, 50]", "[50, 0]"), ConfigUse::fit).find("range [low, high]"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic, ", ""), ConfigUse::fit).find("a.csv:7:7: celsius = none is not a finite number"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kBirefringence, "quantity: birefringence", "quantity: retardance"), ConfigUse::fit).find("retardance_um"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kBirefringence, "uniform: {azimuth_deg: 0}", "twisted: {twist_deg: 90, azimuth_deg: 0, pretilt_deg: 0}"), ConfigUse::fit).find("turns about the light"), std::string::npos);
-  EXPECT_NE(mistakes(replaced(kBirefringence, "  quantity: birefringence\n", ""), ConfigUse::fit).find("polarizer_deg"), std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "sort: nematic"), ConfigUse::fit)
+                .find("a.csv has no column sort"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "kind: smectic"), ConfigUse::fit)
+                .find("fewer than three rows that `where` lets through"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "[0, 50]", "[50, 0]"), ConfigUse::fit).find("range [low, high]"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic, ", ""), ConfigUse::fit)
+                .find("a.csv:7:7: celsius = none is not a finite number"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "quantity: birefringence", "quantity: retardance"), ConfigUse::fit)
+                .find("retardance_um"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "uniform: {azimuth_deg: 0}",
+                              "twisted: {twist_deg: 90, azimuth_deg: 0, pretilt_deg: 0}"),
+                     ConfigUse::fit)
+                .find("turns about the light"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "  quantity: birefringence\n", ""), ConfigUse::fit).find("polarizer_deg"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -11,8 +11,8 @@
 
 #include "birefit/fit.h"
 #include "birefit/render.h"
-#include "fit/problem/least_squares.h"
 #include "fit/problem/frame.h"
+#include "fit/problem/least_squares.h"
 #include "fit/search/phases.h"
 #include "fit/search/scan.h"
 #include "scene_builder.h"
@@ -302,7 +302,8 @@ TEST(Fit, FramesThatAgreeWidenTheirIntervalsByLessThanAThird) {
       EXPECT_EQ(result.covariance_kind.rfind("white noise", 0), 0u) << result.covariance_kind;
     }
   }
-  // Frames that agree to their noise look as if they scattered in one of a hundred: five in 200 more would be one in 1,000.
+  // Frames that agree to their noise look as if they scattered in one of a hundred: five in 200 more would be one in
+  // 1,000.
   EXPECT_LE(wider, 7);
 }
 
@@ -403,8 +404,9 @@ TEST(Fit, MisfitSharedByRowsWidensTheErrors) {
       squares += std::pow(half_wave.value - kHalfWave, 2);
       variances += std::pow(half_wave.stderr_, 2);
     }
-    // A spread of 60 draws is known to 9 %, and with 80 rows of a correlation of 0.8 the number of rows that share a misfit is hardly
-    // known better than to a factor of 1.5. Errors that took rows for independent ones would be too small by a factor of 2 to 3.
+    // A spread of 60 draws is known to 9 %, and with 80 rows of a correlation of 0.8 the number of rows that share a
+    // misfit is hardly known better than to a factor of 1.5. Errors that took rows for independent ones would be too
+    // small by a factor of 2 to 3.
     const double ratio = std::sqrt(variances / squares);
     EXPECT_GT(ratio, 0.7) << rho;
     EXPECT_LT(ratio, rho > 0 ? 1.8 : 1.35) << rho;
@@ -428,8 +430,9 @@ TEST(Fit, MirrorMinimaInsideTheBoundsAreAmbiguous) {
   EXPECT_FALSE(result.has_answer());
 }
 
-// sin^2(phase / 2) is the same at phase and 2 pi - phase, the phase goes as 1/V of the half-wave voltage V: two minima as likely as each other, of which the one at the lower voltage
-// is narrower by the square of the phases' ratio. So are its odds.
+// sin^2(phase / 2) is the same at phase and 2 pi - phase, the phase goes as 1/V of the half-wave voltage V: two minima
+// as likely as each other, of which the one at the lower voltage is narrower by the square of the phases' ratio. So are
+// its odds.
 TEST(Fit, OddsOfANarrowMinimumAreSmaller) {
   Bar bar(700, 0);
   bar.free(bar.half_wave, kHalfWave, 400, 3000);
@@ -491,7 +494,8 @@ TEST(Fit, NoiseAloneIsNoSignal) {
   }
 }
 
-// Stripes that the model cannot draw, orthogonal to all it can: their part of the picture's sum of squares is what it leaves over, noise aside.
+// Stripes that the model cannot draw, orthogonal to all it can: their part of the picture's sum of squares is what it
+// leaves over, noise aside.
 TEST(Fit, WhatTheModelLeavesOverIsItsShareOfThePicture) {
   for (const double stripes : {0.0, 250.0, 800.0}) {
     Bar bar;
@@ -501,21 +505,24 @@ TEST(Fit, WhatTheModelLeavesOverIsItsShareOfThePicture) {
     constexpr double kNoise = 10;
     micrograph.noise = NoiseModel{kNoise, 0, false};
     Gaussian gaussian(7);
-    expose(micrograph, 3000, 100, 700, 0.4, [&](int x, int, double) { return (x % 2 ? stripes : -stripes) + kNoise * gaussian(); });
+    expose(micrograph, 3000, 100, 700, 0.4,
+           [&](int x, int, double) { return (x % 2 ? stripes : -stripes) + kNoise * gaussian(); });
     const FitResult result = fit(bar.job);
     double mean = 0, variance = 0;
     for (const double v : result.micrographs[0].fitted.values()) mean += v / 1600;
     for (const double v : result.micrographs[0].fitted.values()) variance += (v - mean) * (v - mean) / 1600;
     const double share = stripes * stripes / (variance + stripes * stripes);
     // Noise is as large as stripes on the average of 1600 pixels to this.
-    EXPECT_NEAR(result.left_over, share, 5 * 2 * kNoise * std::max(stripes, kNoise) / 40 / (variance + stripes * stripes));
+    EXPECT_NEAR(result.left_over, share,
+                5 * 2 * kNoise * std::max(stripes, kNoise) / 40 / (variance + stripes * stripes));
     EXPECT_EQ(result.described, share < 0.5);
     EXPECT_EQ(result.has_answer(), share < 0.5) << result.verdict;
     EXPECT_EQ(result.verdict.find("not that of the image") != std::string::npos, share > 0.5) << result.verdict;
   }
 }
 
-// phase = pi V/V_half (1 + c): linear in V, fastest at the least V_half; along V_half fastest at the largest V and next to the least V_half, so that steps have to be unequal.
+// phase = pi V/V_half (1 + c): linear in V, fastest at the least V_half; along V_half fastest at the largest V and next
+// to the least V_half, so that steps have to be unequal.
 TEST(Scan, FringePhasesAreThoseOfTheFastestFringes) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 650, 100, 1400);
@@ -525,13 +532,15 @@ TEST(Scan, FringePhasesAreThoseOfTheFastestFringes) {
   const estimation::Task task(bar.job);
   const estimation::Unknowns& unknowns = task.unknowns;
   const Theta theta = bar.job.parameters.values();
-  const std::unique_ptr<estimation::LeastSquares> problem = estimation::problem_of(task, estimation::prepare(task).frames, {{}});
+  const std::unique_ptr<estimation::LeastSquares> problem =
+      estimation::problem_of(task, estimation::prepare(task).frames, {{}});
   const std::vector<estimation::PicturePhase> fringes = estimation::picture_phases(*problem, task, theta);
   ASSERT_EQ(fringes.size(), 2u);
   for (std::size_t j = 0; j < 2; ++j) {
     const Parameter& parameter = bar.job.parameters[unknowns.searched[j]];
     const auto exact = [&](double from, double to) {
-      return std::numbers::pi * 1.4 * (unknowns.searched[j] == bar.bias.index ? (to - from) / 800 : 1400 * (1 / from - 1 / to));
+      return std::numbers::pi * 1.4 *
+             (unknowns.searched[j] == bar.bias.index ? (to - from) / 800 : 1400 * (1 / from - 1 / to));
     };
     EXPECT_EQ(fringes[j].at(parameter.lower), 0);
     const double step = (parameter.upper - parameter.lower) / 50;
@@ -544,8 +553,9 @@ TEST(Scan, FringePhasesAreThoseOfTheFastestFringes) {
   }
 }
 
-// Of what forms no fringes the pictures say how often they turn: a planar cell between crossed polarizers is sin^2(2 azimuth), which goes through
-// twice its range of 1 a turn, and 1/sqrt(8) is its standard deviation: 4 sqrt(2) a turn of 90 degrees, nearly 2 pi.
+// Of what forms no fringes the pictures say how often they turn: a planar cell between crossed polarizers is sin^2(2
+// azimuth), which goes through twice its range of 1 a turn, and 1/sqrt(8) is its standard deviation: 4 sqrt(2) a turn
+// of 90 degrees, nearly 2 pi.
 TEST(Scan, AnglesTurnThePictureAsMalusSays) {
   testing::TableBuilder b;
   Scene s;
@@ -568,7 +578,8 @@ TEST(Scan, AnglesTurnThePictureAsMalusSays) {
   job.measurements.push_back(testing::micrograph_of("cell", s, std::vector<double>(4, 0.5), gain, offset, {0.01, 0}));
   job.parameters = b.table;
   const estimation::Task task(job);
-  const std::unique_ptr<estimation::LeastSquares> problem = estimation::problem_of(task, estimation::prepare(task).frames, {{}});
+  const std::unique_ptr<estimation::LeastSquares> problem =
+      estimation::problem_of(task, estimation::prepare(task).frames, {{}});
   const estimation::PicturePhase phase = estimation::picture_phases(*problem, task, b.table.values()).front();
   // Both ends of the range are counted in the standard deviation, where 24 intervals should have 24 places.
   const double exact = 2 * 4 * std::sqrt(2.0);
@@ -617,8 +628,10 @@ TEST(Scan, NoStepIsLongerThanARadian) {
       theta[static_cast<std::size_t>(droplet.diameter_um.index)] = 16;
       const double step = scan.value[i] - scan.value[i - 1];
       theta[static_cast<std::size_t>(index)] = 0.5 * (scan.value[i] + scan.value[i - 1]);
-      // The rate in the middle for the step. It may be a little larger between two of the 17 places where the scan asks for it.
-      EXPECT_LT(fringe_phase_per_unit(m.scene, theta, index) * step, 1.05) << scan.name << ' ' << theta[static_cast<std::size_t>(index)];
+      // The rate in the middle for the step. It may be a little larger between two of the 17 places where the scan asks
+      // for it.
+      EXPECT_LT(fringe_phase_per_unit(m.scene, theta, index) * step, 1.05)
+          << scan.name << ' ' << theta[static_cast<std::size_t>(index)];
       widest = std::max(widest, step), narrowest = std::min(narrowest, step);
     }
     if (index == axial.reduced_field.index) {
@@ -689,9 +702,11 @@ TEST(Fit, GainBoundsAreHonouredByTheExactSolution) {
 
 TEST(Fit, UnevenLightIsSolvedExactlyBesideGainAndOffset) {
   using Shape = UnevenLight::Shape;
-  const std::vector<std::pair<Shape, bool>> shapes{{Shape::x, true}, {Shape::y, true}, {Shape::square, true}, {Shape::x, false}, {Shape::y, false}};
+  const std::vector<std::pair<Shape, bool>> shapes{
+      {Shape::x, true}, {Shape::y, true}, {Shape::square, true}, {Shape::x, false}, {Shape::y, false}};
   const std::vector<double> truth{3000, 150, 200, -120, -500, 60, -40};  // gain, offset, then the shapes
-  const auto coordinates = [](int x, int y) { return std::pair((x - 29.5) / 30, (19.5 - y) / 30); };  // of 60 x 40 pixels
+  // of 60 x 40 pixels
+  const auto coordinates = [](int x, int y) { return std::pair((x - 29.5) / 30, (19.5 - y) / 30); };
   const auto shape_at = [&](Shape shape, int column, int row) {
     const auto [x, y] = coordinates(column, row);
     return shape == Shape::x ? x : shape == Shape::y ? y : x * x + y * y;
@@ -711,7 +726,8 @@ TEST(Fit, UnevenLightIsSolvedExactlyBesideGainAndOffset) {
   for (int y = 0; y < 40; ++y)
     for (int x = 0; x < 60; ++x) {
       double gain = truth[0], offset = truth[1];
-      for (std::size_t k = 0; k < shapes.size(); ++k) (shapes[k].second ? gain : offset) += truth[k + 2] * shape_at(shapes[k].first, x, y);
+      for (std::size_t k = 0; k < shapes.size(); ++k)
+        (shapes[k].second ? gain : offset) += truth[k + 2] * shape_at(shapes[k].first, x, y);
       m.values(x, y) = gain * intensity(700, 0.4, y, 40) + offset + 20 * gaussian();
     }
   const FitResult result = fit(bar.job);
@@ -719,8 +735,10 @@ TEST(Fit, UnevenLightIsSolvedExactlyBesideGainAndOffset) {
   EXPECT_NEAR(result.reduced_chi_square, 1, 0.15);
   const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
   EXPECT_NEAR(bias.value, 700, 4 * bias.stderr_);
-  // At the voltage found, ordinary least squares of all seven. Pixels are means over their area, the model's own: from the fitted image.
-  const std::vector<std::string> names{"micrograph.gain", "micrograph.offset", "uneven 0", "uneven 1", "uneven 2", "uneven 3", "uneven 4"};
+  // At the voltage found, ordinary least squares of all seven. Pixels are means over their area, the model's own: from
+  // the fitted image.
+  const std::vector<std::string> names{"micrograph.gain", "micrograph.offset", "uneven 0", "uneven 1",
+                                       "uneven 2",        "uneven 3",          "uneven 4"};
   std::vector<double> found;
   for (const std::string& name : names) found.push_back(estimate(result, name).value);
   Eigen::MatrixXd design(2400, 7);
@@ -729,10 +747,12 @@ TEST(Fit, UnevenLightIsSolvedExactlyBesideGainAndOffset) {
     for (int x = 0; x < 60; ++x) {
       const int i = y * 60 + x;
       double gain = found[0], offset = found[1];
-      for (std::size_t k = 0; k < shapes.size(); ++k) (shapes[k].second ? gain : offset) += found[k + 2] * shape_at(shapes[k].first, x, y);
+      for (std::size_t k = 0; k < shapes.size(); ++k)
+        (shapes[k].second ? gain : offset) += found[k + 2] * shape_at(shapes[k].first, x, y);
       const double light = (result.micrographs[0].fitted(x, y) - offset) / gain;
       design(i, 0) = light, design(i, 1) = 1;
-      for (std::size_t k = 0; k < shapes.size(); ++k) design(i, static_cast<int>(k) + 2) = (shapes[k].second ? light : 1) * shape_at(shapes[k].first, x, y);
+      for (std::size_t k = 0; k < shapes.size(); ++k)
+        design(i, static_cast<int>(k) + 2) = (shapes[k].second ? light : 1) * shape_at(shapes[k].first, x, y);
       values[i] = picture(bar.job, 0).values(x, y);
     }
   const Eigen::VectorXd expected = design.colPivHouseholderQr().solve(values);
@@ -781,9 +801,9 @@ TEST(Fit, GivesTheSameBitsWithOneAndTwoThreads) {
   EXPECT_EQ(one.evaluations, two.evaluations);
 }
 
-// Three parts of some thousand pixels. Whitened, the residual's generalised mean has its own variance and what lies across it another
-// (Misfit): chi-square is the sum of both, its gradient the difference of two chi-squares, the triangular factor has the same chi-square and
-// gradient, and the gain is where its own vanishes.
+// Three parts of some thousand pixels. Whitened, the residual's generalised mean has its own variance and what lies
+// across it another (Misfit): chi-square is the sum of both, its gradient the difference of two chi-squares, the
+// triangular factor has the same chi-square and gradient, and the gain is where its own vanishes.
 TEST(LeastSquares, WeightsMeanAndShapeApartOverAllParts) {
   Bar bar(700, 0.4);
   bar.free(bar.bias, 690, 100, 4000);
@@ -817,12 +837,15 @@ TEST(LeastSquares, WeightsMeanAndShapeApartOverAllParts) {
   const Theta& theta = problem.theta();
   Eigen::VectorXd noise(set.value.size());
   for (Eigen::Index i = 0; i < noise.size(); ++i) {
-    const double signal = theta[bar.gain.index] * intensity(690, 0.38, set.pixels[static_cast<std::size_t>(i)][1], 100) + theta[bar.offset.index];
+    const double signal =
+        theta[bar.gain.index] * intensity(690, 0.38, set.pixels[static_cast<std::size_t>(i)][1], 100) +
+        theta[bar.offset.index];
     noise[i] = (signal - set.value[i]) / set.sigma[i];
   }
   const Eigen::VectorXd along = set.sigma.cwiseInverse().normalized();
   const double mean = along.dot(noise), ratio = misfit.mean_sd * set.sigma.cwiseInverse().norm();
-  const double chi_square = (noise - mean * along).squaredNorm() / misfit.shape_variance + mean * mean / (1 + ratio * ratio);
+  const double chi_square =
+      (noise - mean * along).squaredNorm() / misfit.shape_variance + mean * mean / (1 + ratio * ratio);
   // Pixel means of the intensity are within 1e-4 of the formula's points.
   EXPECT_GT(mean * mean / (1 + ratio * ratio), 0.1 * chi_square);
   EXPECT_NEAR(problem.objective(), chi_square, 1e-3 * chi_square);
@@ -833,11 +856,13 @@ TEST(LeastSquares, WeightsMeanAndShapeApartOverAllParts) {
   EXPECT_LT(std::abs(gradient[2]), 1e-9 * all.col(2).norm() * std::sqrt(chi_square));
   const Eigen::MatrixXd reduced = problem.projected_factor(Eigen::Vector2d::Ones());
   EXPECT_NEAR(reduced.col(2).squaredNorm(), problem.objective(), 1e-11 * chi_square);
-  for (int j = 0; j < 2; ++j) EXPECT_NEAR(2 * reduced.col(j).dot(reduced.col(2)), gradient[j], 1e-9 * std::abs(gradient[j]));
+  for (int j = 0; j < 2; ++j)
+    EXPECT_NEAR(2 * reduced.col(j).dot(reduced.col(2)), gradient[j], 1e-9 * std::abs(gradient[j]));
 }
 
 TEST(Fit, FramesWithVoltagesOfTheirOwnGiveTheSameBitsWithOneAndTwoThreads) {
-  // Ten frames, one voltage each and a tilt they share: rendered a frame a core, each with derivatives by what its own scene reads.
+  // Ten frames, one voltage each and a tilt they share: rendered a frame a core, each with derivatives by what its own
+  // scene reads.
   const auto run = [](int threads) {
     Bar bar(0, 0.4);
     bar.job.options.threads = threads;
@@ -864,7 +889,8 @@ TEST(Fit, FramesWithVoltagesOfTheirOwnGiveTheSameBitsWithOneAndTwoThreads) {
   for (int frame = 0; frame < 10; ++frame) {
     const ParameterEstimate& bias = estimate(one, "bias " + std::to_string(frame));
     EXPECT_NEAR(bias.value, 500 + 40 * frame, 5 * bias.stderr_) << frame;
-    EXPECT_LT(bias.stderr_, 20) << frame;  // a derivative that went to another frame's column would leave it undetermined
+    // a derivative that went to another frame's column would leave it undetermined
+    EXPECT_LT(bias.stderr_, 20) << frame;
   }
 }
 
@@ -876,7 +902,8 @@ TEST(Fit, AnImageWithoutUsablePixelsIsTheUsersMistake) {
   EXPECT_THROW(fit(bar.job), UserError);
 }
 
-/// A uniform bar: every pixel sin^2(pi/2 V/V_half), known gain and offset. One unknown, and a likelihood in closed form.
+/// A uniform bar: every pixel sin^2(pi/2 V/V_half), known gain and offset. One unknown, and a likelihood in closed
+/// form.
 struct OneVoltage {
   static constexpr int kSide = 16;
   static constexpr double kSd = 0.8;
@@ -901,7 +928,8 @@ TEST(Fit, IntervalOfABentLikelihoodIsWhereItFallsNotPlusMinus) {
   const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
   ASSERT_TRUE(result.has_answer()) << result.verdict;
   EXPECT_NEAR(bias.value, OneVoltage::volts(mean), 1e-3);
-  // chi-square = pixels (mean - I)^2/sd^2 + const rises by t^2 where |I - mean| = t sd/sqrt(pixels); t for 255 degrees of freedom is 1.969.
+  // chi-square = pixels (mean - I)^2/sd^2 + const rises by t^2 where |I - mean| = t sd/sqrt(pixels); t for 255 degrees
+  // of freedom is 1.969.
   const double reach = 1.9693 * OneVoltage::kSd / OneVoltage::kSide;
   const double low = OneVoltage::volts(mean - reach), high = OneVoltage::volts(mean + reach), width = high - low;
   EXPECT_TRUE(bias.profiled);
@@ -918,8 +946,9 @@ TEST(Fit, IntervalOfABentLikelihoodIsWhereItFallsNotPlusMinus) {
 }
 
 TEST(Fit, ProfileFollowsAValleyThatBends) {
-  // The other parameters must follow: with one image of a tilted field, V and tilt are both seen; with `tilt` held the interval of V would be its
-  // conditional one. Where nothing bends the profile's crossing is the marginal standard error, whatever the correlation.
+  // The other parameters must follow: with one image of a tilted field, V and tilt are both seen; with `tilt` held the
+  // interval of V would be its conditional one. Where nothing bends the profile's crossing is the marginal standard
+  // error, whatever the correlation.
   Bar bar(1400, 0.4);
   bar.free(bar.bias, 1400, 900, 1900);
   bar.free(bar.tilt, 0.4, 0.1, 0.8);
@@ -944,7 +973,8 @@ TEST(Fit, ProfileFollowsAValleyThatBends) {
       fixed.value = end;
       const double t = 1.9619;  // 1,198 degrees of freedom
       // Within a tenth the normal interval is kept; a profiled one is exact to 2 % in the rise.
-      EXPECT_NEAR(fit(held).chi_square - result.chi_square, t * t, (p.profiled ? 0.03 : 0.12) * t * t) << name << " at " << end;
+      EXPECT_NEAR(fit(held).chi_square - result.chi_square, t * t, (p.profiled ? 0.03 : 0.12) * t * t)
+          << name << " at " << end;
     }
   }
   EXPECT_GT(profiled, 0);
@@ -969,7 +999,8 @@ TEST(Inputs, ShiftTheEstimateAsAFitWithAnotherInputDoes) {
   const InputEffect half_wave = effect("sample.crystal.half_wave_voltage_v");
   ASSERT_EQ(half_wave.shift.size(), result.parameters.size());
   EXPECT_NEAR(half_wave.shift[0], 0.01 * result.parameters[0].value, 1e-6 * result.parameters[0].value);
-  // The field's tilt, by fitting again with another one: the same but for what noise makes of the difference of two curvatures.
+  // The field's tilt, by fitting again with another one: the same but for what noise makes of the difference of two
+  // curvatures.
   const InputEffect tilt = effect("sample.crystal.field_legendre.c1");
   EXPECT_NEAR(tilt.step, 0.01 * 0.4, 1e-12);
   FitJob other = bar.job;
@@ -979,7 +1010,8 @@ TEST(Inputs, ShiftTheEstimateAsAFitWithAnotherInputDoes) {
     EXPECT_NEAR(there.parameters[j].value - result.parameters[j].value, tilt.shift[j],
                 0.01 * std::abs(tilt.shift[j]) + 0.01 * result.parameters[j].stderr_)
         << result.parameters[j].name;
-  EXPECT_NE(result.verdict.find("1 % more of sample.crystal.half_wave_voltage_v makes bias_v +1 %"), std::string::npos) << result.verdict;
+  EXPECT_NE(result.verdict.find("1 % more of sample.crystal.half_wave_voltage_v makes bias_v +1 %"), std::string::npos)
+      << result.verdict;
 }
 
 TEST(Coverage, OfAPlainFitIsNominalAndTheSameTwice) {
@@ -1015,8 +1047,9 @@ TEST(Coverage, OfAPlainFitIsNominalAndTheSameTwice) {
 }
 
 TEST(Coverage, SeesAnIntervalThatIsTooNarrow) {
-  // A noise model that says half the truth, and says it so that the fit believes it: the audit simulates what the fit's result says.
-  // Told the true noise of the result but refitted with weights of a fifth, intervals hold a third of the time.
+  // A noise model that says half the truth, and says it so that the fit believes it: the audit simulates what the fit's
+  // result says. Told the true noise of the result but refitted with weights of a fifth, intervals hold a third of the
+  // time.
   Bar bar(700, 0.4);
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
@@ -1025,12 +1058,14 @@ TEST(Coverage, SeesAnIntervalThatIsTooNarrow) {
   Gaussian gaussian(12);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
   FitResult result = fit(bar.job);
-  // 3 % more noise than the refits believe is below what the misfit test of 480 pixels can see; 15 % would be seen and paid for.
+  // 3 % more noise than the refits believe is below what the misfit test of 480 pixels can see; 15 % would be seen and
+  // paid for.
   result.micrographs[0].noise.read_counts = 20 * 1.03;
   const Coverage audit = measure_coverage(bar.job, result, 200);
   for (const Coverage::Of& p : audit.parameters) EXPECT_NEAR(p.spread, 1.03, 4 * 0.05) << p.name;
   // Another truth than the one simulated: nothing holds, and it is counted as confidently wrong.
-  result.parameters[index_of(result, "sample.crystal.bias_v")].value += 50 * estimate(result, "sample.crystal.bias_v").stderr_;
+  result.parameters[index_of(result, "sample.crystal.bias_v")].value +=
+      50 * estimate(result, "sample.crystal.bias_v").stderr_;
   const Coverage wrong = measure_coverage(bar.job, result, 20);
   EXPECT_EQ(wrong.wrong, 20);
   EXPECT_EQ(wrong.parameters[0].inside95, 0);
@@ -1044,18 +1079,20 @@ TEST(Coverage, TakesResidualsForNoiseWhereTheModelDoesNotFit) {
   m.noise = NoiseModel{20, 0, false};
   Gaussian gaussian(13);
   // Stray fringes three times the noise.
-  expose(m, 3000, 150, 700, 0.4, [&](int x, int y, double) { return 20 * gaussian() + 85 * std::sin(0.9 * x + 0.4 * y); });
+  expose(m, 3000, 150, 700, 0.4,
+         [&](int x, int y, double) { return 20 * gaussian() + 85 * std::sin(0.9 * x + 0.4 * y); });
   const FitResult result = fit(bar.job);
   ASSERT_GT(result.reduced_chi_square, 3);
   const Coverage audit = measure_coverage(bar.job, result, 60);
   EXPECT_TRUE(audit.of_residuals);
-  // The intervals were widened for it: they hold at least as often as they say, within three deviations of a binomial of 60.
+  // The intervals were widened for it: they hold at least as often as they say, within three deviations of a binomial
+  // of 60.
   for (const Coverage::Of& p : audit.parameters) EXPECT_GT(p.inside95, 0.95 - 3 * 0.028) << p.name;
 }
 
 TEST(Coverage, HoldsForAParameterKnownByItsPriorAlone) {
-  // The half-wave voltage is known to 3 % from elsewhere, and one image of the ratio V/V_half adds nothing: estimate and error are the prior's. Held
-  // at its centre for every draw it would not scatter at all.
+  // The half-wave voltage is known to 3 % from elsewhere, and one image of the ratio V/V_half adds nothing: estimate
+  // and error are the prior's. Held at its centre for every draw it would not scatter at all.
   Bar bar(700, 0.4);
   bar.free(bar.bias, 650, 300, 1400);
   bar.free(bar.half_wave, kHalfWave, 1000, 2000);
@@ -1076,7 +1113,8 @@ TEST(Coverage, HoldsForAParameterKnownByItsPriorAlone) {
 }
 
 TEST(Coverage, OfAMaskedImageHasItsNoise) {
-  // Residuals serve as noise; three quarters of the image are masked. Were noise lost to the mask, the refits would scatter less than they say.
+  // Residuals serve as noise; three quarters of the image are masked. Were noise lost to the mask, the refits would
+  // scatter less than they say.
   Bar bar(700, 0.4);
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
@@ -1090,7 +1128,8 @@ TEST(Coverage, OfAMaskedImageHasItsNoise) {
   const FitResult result = fit(bar.job);
   const Coverage audit = measure_coverage(bar.job, result, 200);
   EXPECT_TRUE(audit.of_residuals);
-  for (const Coverage::Of& p : audit.parameters) EXPECT_NEAR(p.spread, 1, 4 * 0.05 + 0.05) << p.name;  // one residual image stands for all
+  // one residual image stands for all
+  for (const Coverage::Of& p : audit.parameters) EXPECT_NEAR(p.spread, 1, 4 * 0.05 + 0.05) << p.name;
 }
 
 TEST(Outlook, IsTheStandardErrorThatTheFitThenHas) {
@@ -1115,7 +1154,9 @@ TEST(Outlook, IsTheStandardErrorThatTheFitThenHas) {
     for (std::size_t j = 0; j < result.parameters.size(); ++j) {
       EXPECT_EQ(expected.parameters[j].name, result.parameters[j].name);
       // With the image, its level is read off its darkest and brightest pixels, noise and all.
-      EXPECT_NEAR(expected.parameters[j].stderr_ / result.parameters[j].stderr_, 1, picture(job, 0).values.empty() ? 0.02 : 0.1) << result.parameters[j].name;
+      EXPECT_NEAR(expected.parameters[j].stderr_ / result.parameters[j].stderr_, 1,
+                  picture(job, 0).values.empty() ? 0.02 : 0.1)
+          << result.parameters[j].name;
     }
   }
 }
@@ -1126,7 +1167,8 @@ TEST(Outlook, SaysWhatThePlannedImageWillNotTell) {
   one.bar.free_linear();
   const Outlook expected = outlook(one.job);
   EXPECT_FALSE(expected.identifiable);
-  EXPECT_TRUE(std::any_of(expected.directions.begin(), expected.directions.end(), [](const FisherDirection& d) { return !d.identifiable && !d.words.empty(); }));
+  EXPECT_TRUE(std::any_of(expected.directions.begin(), expected.directions.end(),
+                          [](const FisherDirection& d) { return !d.identifiable && !d.words.empty(); }));
 }
 
 TEST(NextShot, IsWorthWhatTheFitWithItThenShows) {
@@ -1143,7 +1185,8 @@ TEST(NextShot, IsWorthWhatTheFitWithItThenShows) {
   const double alone = outlook(bar.job).parameters[0].stderr_;
   const std::vector<Shot> shots = next_shots(bar.job, "bias_v");
   ASSERT_GT(shots.size(), 5u);
-  EXPECT_TRUE(std::is_sorted(shots.begin(), shots.end(), [](const Shot& a, const Shot& b) { return a.stderr_ < b.stderr_; }));
+  EXPECT_TRUE(
+      std::is_sorted(shots.begin(), shots.end(), [](const Shot& a, const Shot& b) { return a.stderr_ < b.stderr_; }));
   const auto same = std::find_if(shots.begin(), shots.end(), [](const Shot& s) { return s.words == "the same again"; });
   ASSERT_NE(same, shots.end());
   // Two equal images with a gain and offset each.
@@ -1152,7 +1195,8 @@ TEST(NextShot, IsWorthWhatTheFitWithItThenShows) {
     const auto found = std::find_if(shots.begin(), shots.end(), [&](const Shot& s) { return s.words == words; });
     return found == shots.end() ? std::numeric_limits<double>::quiet_NaN() : found->stderr_;
   };
-  // Parallel polarizers show 1 - I: as much, where the noise does not depend on the light. A polarizer along the axis shows nothing.
+  // Parallel polarizers show 1 - I: as much, where the noise does not depend on the light. A polarizer along the axis
+  // shows nothing.
   EXPECT_NEAR(worth("analyser turned by 90 deg") / same->stderr_, 1, 1e-6);
   EXPECT_NEAR(worth("polarizer and analyser turned together by 45 deg") / alone, 1, 1e-6);
   // At 22.5 degrees to the axis half the light is modulated: information 1 + 1/4.
@@ -1177,7 +1221,9 @@ TEST(NextShot, IsWorthWhatTheFitWithItThenShows) {
     image->mask = Mask(30, 20, 1);
     const bool crossed = image == &first;
     for (int y = 0; y < 20; ++y)
-      for (int x = 0; x < 30; ++x) image->values(x, y) = 150 + 3000 * (crossed ? intensity(1450, 0.1, y, 20) : 1 - intensity(1450, 0.1, y, 20)) + 20 * gaussian();
+      for (int x = 0; x < 30; ++x)
+        image->values(x, y) =
+            150 + 3000 * (crossed ? intensity(1450, 0.1, y, 20) : 1 - intensity(1450, 0.1, y, 20)) + 20 * gaussian();
   }
   job.measurements = {first, second};
   const FitResult both = fit(job);

@@ -91,7 +91,7 @@ TEST(NoiseEstimate, IsInCountsWhenValuesAreTransmission) {
 /// One camera and one picture: what is random about them, and what the noise of a pixel then is.
 struct Camera {
   double step, black, read, counts_per_photon, low, high, period, bright = 0;  // counts; bright: parallel - dark
-  bool clipped = false;                                                          // at code 0
+  bool clipped = false;                                                        // at code 0
   double signal(int x, int y) const {
     const double s = std::sin(std::numbers::pi * (0.8 * x + 0.6 * y) / period);
     return low + (high - low) * s * s;
@@ -251,8 +251,7 @@ TEST(NoiseEstimate, IsThatOfTheOthersWhereHalfOfThePixelsAreCutOff) {
     const NoiseModel noise = estimate_noise(micrograph);
     for (const double s : {200.0, 1000.0, 2000.0})
       // The fringes of 10 pixels' period at the edge add to the median: 10 % of noise, 5 % of fringes.
-      EXPECT_NEAR(std::sqrt(variance_at(noise, s)), 20, 0.15 * 20)
-          << background << ' ' << s;
+      EXPECT_NEAR(std::sqrt(variance_at(noise, s)), 20, 0.15 * 20) << background << ' ' << s;
   }
 }
 

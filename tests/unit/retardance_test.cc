@@ -36,7 +36,9 @@ struct TiltedCell {
     observable.quantity = quantity;
   }
   double value() const { return value(b.table.values()); }
-  double value(const Theta& theta) const { return render(scene, plan(scene, theta, observable), theta, {}, 1).intensity(0, 0); }
+  double value(const Theta& theta) const {
+    return render(scene, plan(scene, theta, observable), theta, {}, 1).intensity(0, 0);
+  }
 };
 
 /// (n_eff - n_o) d of an axis at `tilt` to the layer: 1/n_eff^2 = cos^2 / n_e^2 + sin^2 / n_o^2.
@@ -72,7 +74,8 @@ TEST(Retardance, HasItsDerivatives) {
 
 TEST(Retardance, IsNotOneNumberWhereTheAxisTurns) {
   TiltedCell cell(1.52, 0.2, 0, Quantity::retardance_um);
-  std::get<Cell>(cell.scene.sample).director = TwistedDirector{cell.b.fixed("twist_deg", 90), cell.b.fixed("azimuth", 0), cell.b.fixed("pretilt_deg", 0)};
+  std::get<Cell>(cell.scene.sample).director =
+      TwistedDirector{cell.b.fixed("twist_deg", 90), cell.b.fixed("azimuth", 0), cell.b.fixed("pretilt_deg", 0)};
   EXPECT_THROW(plan(cell.scene, cell.b.table.values(), cell.observable), UserError);
 }
 
@@ -103,14 +106,16 @@ FitResult fitted_with_prior(double prior, double noise) {
   return fit(job);
 }
 
-// What is known beforehand and what the data say: in accord, at odds with the data the stronger, at odds with the prior the stronger.
+// What is known beforehand and what the data say: in accord, at odds with the data the stronger, at odds with the prior
+// the stronger.
 TEST(Retardance, APriorThatTheDataContradictIsNamed) {
   const FitResult right = fitted_with_prior(43, 0.01);
   EXPECT_TRUE(right.has_answer());
   EXPECT_EQ(right.verdict.find("contradict"), std::string::npos) << right.verdict;
   EXPECT_NEAR(right.parameters[0].value, 40, 4 * right.parameters[0].stderr_);
   const FitResult by_data = fitted_with_prior(90, 0.01);
-  EXPECT_NE(by_data.verdict.find("thickness_um contradicts what was known of it"), std::string::npos) << by_data.verdict;
+  EXPECT_NE(by_data.verdict.find("thickness_um contradicts what was known of it"), std::string::npos)
+      << by_data.verdict;
   EXPECT_NEAR(by_data.parameters[0].value, 40, 2);
   const FitResult by_prior = fitted_with_prior(700, 0.03);
   EXPECT_NE(by_prior.verdict.find("contradict"), std::string::npos) << by_prior.verdict;

@@ -1,4 +1,5 @@
-// Series: what several fits know together about what they share, and how frames are found, ordered and joined to their table.
+// Series: what several fits know together about what they share, and how frames are found, ordered and joined to their
+// table.
 
 #include <cmath>
 #include <filesystem>
@@ -31,7 +32,8 @@ TEST(Combine, OneNumberIsTheWeightedMean) {
   const double weights = 1 + 4 + 0.25, mean = (1 * 1 + 3 * 4 + 2 * 0.25) / weights;
   EXPECT_NEAR(shared.posterior.mean[0], mean, 1e-12);
   EXPECT_NEAR(shared.posterior.covariance(0, 0), 1 / weights, 1e-12);
-  EXPECT_NEAR(shared.chi_square, std::pow(1 - mean, 2) + 4 * std::pow(3 - mean, 2) + 0.25 * std::pow(2 - mean, 2), 1e-12);
+  EXPECT_NEAR(shared.chi_square, std::pow(1 - mean, 2) + 4 * std::pow(3 - mean, 2) + 0.25 * std::pow(2 - mean, 2),
+              1e-12);
   EXPECT_EQ(shared.chi_square_degrees, 2);
   EXPECT_TRUE(shared.consistent);
 }
@@ -53,7 +55,8 @@ TEST(Combine, APriorCountsOnce) {
 
 // Fits that hold next to nothing but the prior change nothing and are no observations.
 TEST(Combine, FitsWithoutInformationOfTheirOwnAreNoObservations) {
-  const SharedEstimate shared = combine({scalar(5, 0.5 * (1 - 1e-13)), scalar(5, 0.5), scalar(6, 0.25)}, scalar(5, 0.5));
+  const SharedEstimate shared =
+      combine({scalar(5, 0.5 * (1 - 1e-13)), scalar(5, 0.5), scalar(6, 0.25)}, scalar(5, 0.5));
   EXPECT_NEAR(shared.posterior.mean[0], 6, 1e-9);
   EXPECT_NEAR(shared.posterior.covariance(0, 0), 0.25, 1e-9);
   EXPECT_EQ(shared.chi_square_degrees, 1);
@@ -67,7 +70,8 @@ TEST(Combine, FitsThatDisagreeWidenTheCommonError) {
   EXPECT_EQ(shared.posterior.degrees_of_freedom, 1);
 }
 
-// y_i = a x + b_i + noise, a shared: the combination of lines fitted one by one is the least-squares solution of all at once.
+// y_i = a x + b_i + noise, a shared: the combination of lines fitted one by one is the least-squares solution of all at
+// once.
 TEST(Combine, LinearFitsOneByOneAreTheJointFit) {
   constexpr int kFits = 4, kRows = 12;
   std::mt19937_64 random(3);
@@ -123,7 +127,8 @@ class SeriesFiles : public ::testing::Test {
     for (int y = 0; y < 32; ++y)
       for (int x = 0; x < 32; ++x) {
         const double t = 2 * (y + 0.5) / 32 - 1;
-        image(x, y) = 1000 * std::pow(std::sin(std::numbers::pi / 2 * volts / kHalfWave * (1 + kTilt * t)), 2) + 100 + 2 * normal(random);
+        image(x, y) = 1000 * std::pow(std::sin(std::numbers::pi / 2 * volts / kHalfWave * (1 + kTilt * t)), 2) + 100 +
+                      2 * normal(random);
       }
     save_image(image, folder_ / "frames" / name);
   }
@@ -140,7 +145,8 @@ sample:
     bias_v: 700
     field_along: y
     electrodes_px: [-0.5, 31.5]
-    field_legendre: [)" + tilt_ + R"(]
+    field_legendre: [)" +
+           tilt_ + R"(]
 microscope:
   light: {wavelength_nm: 1550}
   polarizer_deg: 0
@@ -193,12 +199,16 @@ void SeriesFiles::compare_with_the_joint_fit(bool gains) {
     const std::string name = fmt::format("f{}.tif", i);
     expose(name, volts[i], 10 + static_cast<unsigned>(i));
     rows += fmt::format("{},{}\n", name, volts[i]);
-    joint += fmt::format("  - {{image: frames/{}, set: {{sample.crystal.bias_v: {}, micrograph.gain: {{fit: auto}}, micrograph.offset: {{fit: auto}},"
-                         " sample.crystal.half_wave_voltage_v: {{value: 1400, fit: [1000, 2500]}}}}}}\n", name, volts[i]);
+    joint += fmt::format(
+        "  - {{image: frames/{}, set: {{sample.crystal.bias_v: {}, micrograph.gain: {{fit: auto}}, micrograph.offset: "
+        "{{fit: auto}},"
+        " sample.crystal.half_wave_voltage_v: {{value: 1400, fit: [1000, 2500]}}}}}}\n",
+        name, volts[i]);
   }
   const std::string tilt = "sample.crystal.field_legendre[1]", half_wave = "sample.crystal.half_wave_voltage_v";
   write("table.csv", rows);
-  write("series.yaml", config(fmt::format("micrographs: {{files: \"frames/*.tif\", set_from: table.csv, shared: [\"{}\"]}}", tilt)));
+  write("series.yaml",
+        config(fmt::format("micrographs: {{files: \"frames/*.tif\", set_from: table.csv, shared: [\"{}\"]}}", tilt)));
   write("joint.yaml", config(joint));
   const ImageSeries series = load_series(folder_ / "series.yaml");
   std::vector<std::optional<FitResult>> fits;
@@ -219,14 +229,18 @@ void SeriesFiles::compare_with_the_joint_fit(bool gains) {
   };
   const ParameterEstimate exact = estimate(all, tilt);
   for (std::size_t i = 0; i < volts.size(); ++i) {
-    // Posteriors are Gaussian to lowest order: here two hundredths of an error and of its size are left, five times that with five times the noise.
+    // Posteriors are Gaussian to lowest order: here two hundredths of an error and of its size are left, five times
+    // that with five times the noise.
     const ParameterEstimate shared = estimate(*result.frames[i], tilt), own = estimate(*result.frames[i], half_wave),
-                            joint_own = estimate(all, fmt::format("micrographs[{}].{}", i, half_wave)), alone = estimate(*result.alone[i], half_wave);
+                            joint_own = estimate(all, fmt::format("micrographs[{}].{}", i, half_wave)),
+                            alone = estimate(*result.alone[i], half_wave);
     EXPECT_NEAR(shared.value, exact.value, 0.1 * exact.stderr_);
     EXPECT_NEAR(shared.stderr_ / exact.stderr_, 1, 0.05);
     EXPECT_NEAR(own.value, joint_own.value, 0.1 * joint_own.stderr_);
     EXPECT_NEAR(own.stderr_ / joint_own.stderr_, 1, 0.05);
-    if (gains && i == 0) { EXPECT_LT(own.stderr_, 0.9 * alone.stderr_); }
+    if (gains && i == 0) {
+      EXPECT_LT(own.stderr_, 0.9 * alone.stderr_);
+    }
   }
 }
 
@@ -240,7 +254,8 @@ TEST_F(SeriesFiles, SharedParametersWithAPriorAreThoseOfTheJointFit) {
 
 TEST_F(SeriesFiles, WhatIsNotFittedCannotBeShared) {
   expose("f1.tif", 700, 1);
-  EXPECT_THAT(problem_of(config("micrographs: {files: \"frames/*.tif\", shared: [sample.crystal.bias_v]}")), HasSubstr("bias_v is not fitted here"));
+  EXPECT_THAT(problem_of(config("micrographs: {files: \"frames/*.tif\", shared: [sample.crystal.bias_v]}")),
+              HasSubstr("bias_v is not fitted here"));
   EXPECT_THAT(problem_of(config("micrographs: {files: \"frames/*.tif\", shared: [sample.crystal.half_wave_voltage]}")),
               HasSubstr("did you mean sample.crystal.half_wave_voltage_v?"));
 }

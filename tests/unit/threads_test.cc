@@ -35,7 +35,11 @@ TEST(Threads, LoopsInsideLoopsAndFromSeveralThreadsEnd) {
 
 TEST(Threads, AFailureOfAnyIndexIsThrownAndTheNextLoopWorks) {
   for (const int bad : {0, 57, 99})
-    EXPECT_THROW(parallel_for(100, 4, [&](int i) { if (i == bad) throw std::runtime_error("bad"); }), std::runtime_error);
+    EXPECT_THROW(parallel_for(100, 4,
+                              [&](int i) {
+                                if (i == bad) throw std::runtime_error("bad");
+                              }),
+                 std::runtime_error);
   std::atomic<int> total{0};
   parallel_for(100, 4, [&](int i) { total += i; });
   EXPECT_EQ(total, 4950);

@@ -43,8 +43,12 @@ class VolumeFile : public ::testing::Test {
     request.bulk_order = bulk_order;
     return load_volume(request);
   }
-  std::string npy_error(const std::string& content) const { return error_of([&] { npy(content); }); }
-  std::string vti_error(const std::string& content) const { return error_of([&] { vti(content); }); }
+  std::string npy_error(const std::string& content) const {
+    return error_of([&] { npy(content); });
+  }
+  std::string vti_error(const std::string& content) const {
+    return error_of([&] { vti(content); });
+  }
   static std::string error_of(const std::function<void()>& body) {
     try {
       body();
@@ -77,12 +81,14 @@ std::string npy_text(const std::string& header, const std::string& data, int ver
   return text + header + data;
 }
 std::string header(const std::string& type, bool fortran, const std::string& shape) {
-  return "{'descr': '" + type + "', 'fortran_order': " + (fortran ? "True" : "False") + ", 'shape': " + shape + ", }   \n";
+  return "{'descr': '" + type + "', 'fortran_order': " + (fortran ? "True" : "False") + ", 'shape': " + shape +
+         ", }   \n";
 }
 
 /// Values of the node's components in the order of the array.
 template <class T>
-std::string npy_data(bool x_first, bool fortran, int components, const std::function<double(int, int, int, int)>& value) {
+std::string npy_data(bool x_first, bool fortran, int components,
+                     const std::function<double(int, int, int, int)>& value) {
   const int n[4] = {x_first ? kNx : kNz, kNy, x_first ? kNz : kNx, components};
   std::vector<T> all(static_cast<std::size_t>(kNodes * components));
   for (int a = 0; a < n[0]; ++a)
@@ -107,7 +113,9 @@ void expect_field(const LoadedVolume& volume, double tolerance, double order = 1
       for (int x = 0; x < kNx; ++x) {
         const auto n = director(x, y, z);
         const auto expected = director_tensor(n[0], n[1], n[2], order);
-        for (std::size_t c = 0; c < 6; ++c) ASSERT_NEAR(volume.grid->nodes[volume.grid->at(x, y, z)][c], expected[c], tolerance) << x << y << z << " " << c;
+        for (std::size_t c = 0; c < 6; ++c)
+          ASSERT_NEAR(volume.grid->nodes[volume.grid->at(x, y, z)][c], expected[c], tolerance)
+              << x << y << z << " " << c;
       }
 }
 
@@ -116,13 +124,19 @@ TEST_F(VolumeFile, NumpyInEveryLayout) {
   for (bool x_first : {false, true})
     for (bool fortran : {false, true}) {
       const std::string shape = x_first ? "(2, 3, 4, 3)" : "(4, 3, 2, 3)";
-      const LoadedVolume single = npy(npy_text(header("<f4", fortran, shape), npy_data<float>(x_first, fortran, 3, component)), x_first);
+      const LoadedVolume single =
+          npy(npy_text(header("<f4", fortran, shape), npy_data<float>(x_first, fortran, 3, component)), x_first);
       expect_field(single, 3e-7);
       EXPECT_EQ(single.grid->spacing_um, (std::array<double, 3>{0.2, 0.3, 0.4}));
       EXPECT_TRUE(single.warnings.empty());
-      expect_field(npy(npy_text(header("<f8", fortran, shape), npy_data<double>(x_first, fortran, 3, component)), x_first), 1e-15);
+      expect_field(
+          npy(npy_text(header("<f8", fortran, shape), npy_data<double>(x_first, fortran, 3, component)), x_first),
+          1e-15);
     }
-  for (int version : {2, 3}) expect_field(npy(npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, component), version)), 1e-15);
+  for (int version : {2, 3})
+    expect_field(
+        npy(npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, component), version)),
+        1e-15);
 }
 
 // Q = S (n n - 1/3) with one S: relative order 1 whatever S is. Eigenvectors to rounding.
@@ -136,7 +150,8 @@ TEST_F(VolumeFile, NumpyTensors) {
     return q(x, y, z, i[c], j[c]);
   };
   const auto nine = [&](int x, int y, int z, int c) { return q(x, y, z, c / 3, c % 3); };
-  const LoadedVolume volume = npy(npy_text(header("<f8", false, "(4, 3, 2, 6)"), npy_data<double>(false, false, 6, six)));
+  const LoadedVolume volume =
+      npy(npy_text(header("<f8", false, "(4, 3, 2, 6)"), npy_data<double>(false, false, 6, six)));
   expect_field(volume, 1e-13);
   EXPECT_NEAR(volume.bulk_order, 0.6, 1e-13);
   expect_field(npy(npy_text(header("<f8", false, "(4, 3, 2, 3, 3)"), npy_data<double>(false, false, 9, nine))), 1e-13);
@@ -146,19 +161,27 @@ TEST_F(VolumeFile, NumpyTensors) {
     const int i[6] = {0, 0, 0, 1, 1, 2}, j[6] = {0, 1, 2, 1, 2, 2};
     return q(x, y, z, i[c], j[c]);
   };
-  EXPECT_THAT(npy_error(npy_text(header("<f8", false, "(4, 3, 2, 6)"), npy_data<double>(false, false, 6, triangle))), HasSubstr("has the trace"));
+  EXPECT_THAT(npy_error(npy_text(header("<f8", false, "(4, 3, 2, 6)"), npy_data<double>(false, false, 6, triangle))),
+              HasSubstr("has the trace"));
 }
 
 // n and -n are one state: not a bit changes.
 TEST_F(VolumeFile, TheSignOfADirectorHasNoMeaning) {
-  const auto flipped = [](int x, int y, int z, int c) { return ((x + 2 * y + 3 * z) % 2 ? -1 : 1) * component(x, y, z, c); };
-  const LoadedVolume a = npy(npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, component)));
-  const LoadedVolume b = npy(npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, flipped)));
+  const auto flipped = [](int x, int y, int z, int c) {
+    return ((x + 2 * y + 3 * z) % 2 ? -1 : 1) * component(x, y, z, c);
+  };
+  const LoadedVolume a =
+      npy(npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, component)));
+  const LoadedVolume b =
+      npy(npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, flipped)));
   EXPECT_EQ(a.grid->nodes, b.grid->nodes);
 }
 
 TEST_F(VolumeFile, LongDirectorsAreNormalisedWithAWarning) {
-  const LoadedVolume volume = npy(npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, [](int x, int y, int z, int c) { return (x + y + z ? 1.0 : 1.5) * component(x, y, z, c); })));
+  const LoadedVolume volume = npy(
+      npy_text(header("<f8", false, "(4, 3, 2, 3)"), npy_data<double>(false, false, 3, [](int x, int y, int z, int c) {
+                 return (x + y + z ? 1.0 : 1.5) * component(x, y, z, c);
+               })));
   expect_field(volume, 1e-15);
   ASSERT_EQ(volume.warnings.size(), 1u);
   EXPECT_THAT(volume.warnings[0], HasSubstr("off by up to 0.5, at [x, y, z] = [0, 0, 0]"));
@@ -173,11 +196,15 @@ TEST_F(VolumeFile, BadNumpyFiles) {
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(4, 3, 2)"), good)), HasSubstr("expected (nz, ny, nx, 3)"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(3, 4, 3, 2)"), good)), HasSubstr("moveaxis"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(1, 3, 8, 3)"), good)), HasSubstr("at least 2"));
-  EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(99999, 99999, 99999, 3)"), good)), HasSubstr("every second node"));
-  EXPECT_THAT(npy_error(npy_text(header("<f4", false, shape), good.substr(4))), HasSubstr("has 284 bytes of data, its shape needs 288"));
+  EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(99999, 99999, 99999, 3)"), good)),
+              HasSubstr("every second node"));
+  EXPECT_THAT(npy_error(npy_text(header("<f4", false, shape), good.substr(4))),
+              HasSubstr("has 284 bytes of data, its shape needs 288"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, shape), good).substr(0, 40)), HasSubstr("is cut short"));
   const auto spoilt = [&](double value) {
-    return npy_text(header("<f8", false, shape), npy_data<double>(false, false, 3, [&](int x, int y, int z, int c) { return x == 1 && y == 2 && z == 0 ? value : component(x, y, z, c); }));
+    return npy_text(header("<f8", false, shape), npy_data<double>(false, false, 3, [&](int x, int y, int z, int c) {
+                      return x == 1 && y == 2 && z == 0 ? value : component(x, y, z, c);
+                    }));
   };
   EXPECT_THAT(npy_error(spoilt(0)), HasSubstr("the director is zero at node [x, y, z] = [1, 2, 0]"));
   EXPECT_THAT(npy_error(spoilt(std::nan(""))), HasSubstr("is not a finite number at node [x, y, z] = [1, 2, 0]"));
@@ -190,14 +217,15 @@ TEST_F(VolumeFile, BadNumpyFiles) {
   EXPECT_THAT(error_of([&] { load_volume(request); }), HasSubstr("neither .npy nor .vti"));
 }
 
-// ---- .vti --------------------------------------------------------------------------------------------------------------
+// ---- .vti ----------------------------------------------------------------------------------------------------------
 
 std::string base64(const std::string& bytes) {
   static const char* const letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string out;
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     unsigned group = 0;
-    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
     for (std::size_t k = 0; k < 4; ++k) out += k > bytes.size() - i ? '=' : letters[group >> (18 - 6 * k) & 63];
   }
   return out;
@@ -208,13 +236,18 @@ std::string with_length(const std::string& data) {
   return std::string(reinterpret_cast<const char*>(&length), sizeof length) + data;
 }
 
-std::string vti_text(const std::string& arrays, const std::string& appended = "", const std::string& attributes = "byte_order=\"LittleEndian\" header_type=\"UInt32\"",
-                     const std::string& image = "WholeExtent=\"3 4 0 2 0 3\" Origin=\"9 9 9\" Spacing=\"0.2 0.3 0.4\"", const std::string& data = "PointData") {
-  return "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" " + attributes + ">\n<ImageData " + image + ">\n<Piece Extent=\"3 4 0 2 0 3\">\n<" + data + ">\n" + arrays +
-         "</" + data + ">\n</Piece>\n</ImageData>\n" + appended + "</VTKFile>\n";
+std::string vti_text(const std::string& arrays, const std::string& appended = "",
+                     const std::string& attributes = "byte_order=\"LittleEndian\" header_type=\"UInt32\"",
+                     const std::string& image = "WholeExtent=\"3 4 0 2 0 3\" Origin=\"9 9 9\" Spacing=\"0.2 0.3 0.4\"",
+                     const std::string& data = "PointData") {
+  return "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" " + attributes + ">\n<ImageData " +
+         image + ">\n<Piece Extent=\"3 4 0 2 0 3\">\n<" + data + ">\n" + arrays + "</" + data +
+         ">\n</Piece>\n</ImageData>\n" + appended + "</VTKFile>\n";
 }
-std::string array_text(const std::string& name, int components, const std::string& type, const std::string& format, const std::string& content, const std::string& more = "") {
-  return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" NumberOfComponents=\"" + std::to_string(components) + "\" format=\"" + format + "\" " + more + ">" + content + "</DataArray>\n";
+std::string array_text(const std::string& name, int components, const std::string& type, const std::string& format,
+                       const std::string& content, const std::string& more = "") {
+  return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" NumberOfComponents=\"" + std::to_string(components) +
+         "\" format=\"" + format + "\" " + more + ">" + content + "</DataArray>\n";
 }
 template <class T>
 std::vector<T> nodes(int components, const std::function<double(int, int, int, int)>& value) {
@@ -240,19 +273,31 @@ TEST_F(VolumeFile, VtkInEveryFormat) {
   const LoadedVolume volume = vti(vti_text(array_text("n", 3, "Float64", "ascii", ascii(3, component))));
   expect_field(volume, 1e-15);
   EXPECT_EQ(volume.grid->spacing_um, (std::array<double, 3>{0.2, 0.3, 0.4}));
-  expect_field(vti(vti_text(array_text("n", 3, "Float64", "binary", "\n  " + base64(with_length<std::uint32_t>(doubles)) + "\n"))), 1e-15);
-  expect_field(vti(vti_text(array_text("n", 3, "Float32", "binary", base64(with_length<std::uint64_t>(floats))), "", "byte_order=\"LittleEndian\" header_type=\"UInt64\"")), 3e-7);
+  expect_field(vti(vti_text(array_text("n", 3, "Float64", "binary",
+                                       "\n  " + base64(with_length<std::uint32_t>(doubles)) + "\n"))),
+               1e-15);
+  expect_field(vti(vti_text(array_text("n", 3, "Float32", "binary", base64(with_length<std::uint64_t>(floats))), "",
+                            "byte_order=\"LittleEndian\" header_type=\"UInt64\"")),
+               3e-7);
   // Some writers pad the length for itself.
   const std::uint32_t length = static_cast<std::uint32_t>(floats.size());
-  expect_field(vti(vti_text(array_text("n", 3, "Float32", "binary", base64(std::string(reinterpret_cast<const char*>(&length), 4)) + base64(floats)))), 3e-7);
+  expect_field(
+      vti(vti_text(array_text("n", 3, "Float32", "binary",
+                              base64(std::string(reinterpret_cast<const char*>(&length), 4)) + base64(floats)))),
+      3e-7);
   // Appended, behind another array; raw data look like XML here and there.
   const std::string other = with_length<std::uint32_t>("</AppendedData> < & _ >");
   const std::string at = "offset=\"" + std::to_string(other.size()) + "\"";
-  expect_field(vti(vti_text(array_text("n", 3, "Float64", "appended", "", at), "<AppendedData encoding=\"raw\">\n  _" + other + with_length<std::uint32_t>(doubles) + "\n</AppendedData>\n")), 1e-15);
+  expect_field(vti(vti_text(array_text("n", 3, "Float64", "appended", "", at),
+                            "<AppendedData encoding=\"raw\">\n  _" + other + with_length<std::uint32_t>(doubles) +
+                                "\n</AppendedData>\n")),
+               1e-15);
   const std::string first = base64(with_length<std::uint32_t>("xy"));
-  expect_field(vti(vti_text(array_text("n", 3, "Float32", "appended", "", "offset=\"" + std::to_string(first.size()) + "\""),
-                            "<AppendedData encoding=\"base64\">_" + first + base64(with_length<std::uint32_t>(floats)) + "</AppendedData>\n")),
-               3e-7);
+  expect_field(
+      vti(vti_text(array_text("n", 3, "Float32", "appended", "", "offset=\"" + std::to_string(first.size()) + "\""),
+                   "<AppendedData encoding=\"base64\">_" + first + base64(with_length<std::uint32_t>(floats)) +
+                       "</AppendedData>\n")),
+      3e-7);
 }
 
 TEST_F(VolumeFile, VtkTensorsOrderAndMask) {
@@ -264,41 +309,67 @@ TEST_F(VolumeFile, VtkTensorsOrderAndMask) {
   expect_field(vti(vti_text(array_text("Q", 6, "Float64", "ascii", ascii(6, q)))), 1e-13);
   expect_field(vti(vti_text(array_text("Q", 6, "Float64", "ascii", ascii(6, q))), 1.0), 1e-13, 0.5);
   const std::string n = array_text("n", 3, "Float64", "ascii", ascii(3, component));
-  const LoadedVolume volume = vti(vti_text(n + array_text("S", 1, "Float64", "ascii", ascii(1, [](int x, int, int, int) { return x ? 0.3 : 0.6; }))));
+  const LoadedVolume volume = vti(vti_text(
+      n + array_text("S", 1, "Float64", "ascii", ascii(1, [](int x, int, int, int) { return x ? 0.3 : 0.6; }))));
   EXPECT_NEAR(volume.bulk_order, 0.6, 1e-15);
   const auto trace = [](const std::array<double, 6>& t) { return t[0] + t[1] + t[2]; };
   EXPECT_NEAR(trace(volume.grid->nodes[0]), 1, 1e-14);
   EXPECT_NEAR(trace(volume.grid->nodes[1]), 0.5, 1e-14);
   // Behind the mask anything may stand.
-  const auto holed = [](int x, int y, int z, int c) { return x == 0 && y == 0 ? std::numeric_limits<double>::quiet_NaN() : component(x, y, z, c); };
+  const auto holed = [](int x, int y, int z, int c) {
+    return x == 0 && y == 0 ? std::numeric_limits<double>::quiet_NaN() : component(x, y, z, c);
+  };
   const auto mask = nodes<std::uint8_t>(1, [](int x, int y, int, int) { return x == 0 && y == 0 ? 0 : 1; });
-  const LoadedVolume masked = vti(vti_text(array_text("n", 3, "Float64", "ascii", ascii(3, holed)) + array_text("domain_mask", 1, "UInt8", "binary", base64(with_length<std::uint32_t>(bytes_of(mask))))));
+  const LoadedVolume masked = vti(
+      vti_text(array_text("n", 3, "Float64", "ascii", ascii(3, holed)) +
+               array_text("domain_mask", 1, "UInt8", "binary", base64(with_length<std::uint32_t>(bytes_of(mask))))));
   EXPECT_EQ(trace(masked.grid->nodes[0]), 0);
   EXPECT_NEAR(trace(masked.grid->nodes[1]), 1, 1e-14);
 }
 
 TEST_F(VolumeFile, BadVtkFiles) {
-  const std::string floats = bytes_of(nodes<float>(3, component)), good = array_text("n", 3, "Float64", "ascii", ascii(3, component));
+  const std::string floats = bytes_of(nodes<float>(3, component)),
+                    good = array_text("n", 3, "Float64", "ascii", ascii(3, component));
   const std::string binary = array_text("n", 3, "Float32", "binary", base64(with_length<std::uint32_t>(floats)));
   EXPECT_THAT(vti_error("# vtk DataFile Version 3.0\nASCII\n"), HasSubstr("legacy .vtk files are not"));
   EXPECT_THAT(vti_error("<VTKFile type=\"UnstructuredGrid\"></VTKFile>"), HasSubstr("Resample To Image"));
-  EXPECT_THAT(vti_error(vti_text(binary, "", "compressor=\"vtkZLibDataCompressor\" byte_order=\"LittleEndian\"")), HasSubstr("is compressed (vtkZLibDataCompressor)"));
+  EXPECT_THAT(vti_error(vti_text(binary, "", "compressor=\"vtkZLibDataCompressor\" byte_order=\"LittleEndian\"")),
+              HasSubstr("is compressed (vtkZLibDataCompressor)"));
   EXPECT_THAT(vti_error(vti_text(binary, "", "byte_order=\"BigEndian\"")), HasSubstr("is BigEndian"));
-  EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"3 4 0 2 0 3\" Spacing=\"0.2 0.3 0.4\"", "CellData")), HasSubstr("Cell Data To Point Data"));
-  EXPECT_THAT(vti_error(vti_text(array_text("velocity", 3, "Float64", "ascii", ascii(3, component)))), HasSubstr("it has velocity"));
+  EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"3 4 0 2 0 3\" Spacing=\"0.2 0.3 0.4\"", "CellData")),
+              HasSubstr("Cell Data To Point Data"));
+  EXPECT_THAT(vti_error(vti_text(array_text("velocity", 3, "Float64", "ascii", ascii(3, component)))),
+              HasSubstr("it has velocity"));
   EXPECT_THAT(vti_error(vti_text(good + array_text("Q", 9, "Float64", "ascii", ""))), HasSubstr("both n and Q"));
-  EXPECT_THAT(vti_error(vti_text(array_text("n", 2, "Float64", "ascii", ""))), HasSubstr("n has 2 components, expected 3"));
-  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float64", "ascii", "1 0 0"))), HasSubstr("n has 3 numbers, its 2 x 3 x 4 nodes need 72"));
-  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float64", "ascii", "1 0 zero"))), HasSubstr("value 3 is no number"));
-  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float32", "binary", base64(with_length<std::uint32_t>(floats)).substr(0, 100)))), HasSubstr("n is cut short"));
-  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float32", "binary", base64(with_length<std::uint32_t>(floats.substr(12)))))), HasSubstr("nodes need 72"));
-  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float32", "appended", "", "offset=\"5000\""), "<AppendedData encoding=\"raw\">_abc</AppendedData>")), HasSubstr("behind the end of the file"));
-  EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"0 9 0 2 0 3\" Spacing=\"1 1 1\"")), HasSubstr("not the WholeExtent"));
-  EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"3 4 0 2 0 3\" Spacing=\"1 0 1\"")), HasSubstr("three positive numbers"));
-  EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"3 4 0 2 0 3\" Spacing=\"1 1 1\" Direction=\"0 1 0 1 0 0 0 0 1\"")), HasSubstr("rotation_deg"));
-  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float64", "ascii", ascii(3, [](int x, int y, int z, int c) { return z == 3 ? 0.0 : component(x, y, z, c); })))),
+  EXPECT_THAT(vti_error(vti_text(array_text("n", 2, "Float64", "ascii", ""))),
+              HasSubstr("n has 2 components, expected 3"));
+  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float64", "ascii", "1 0 0"))),
+              HasSubstr("n has 3 numbers, its 2 x 3 x 4 nodes need 72"));
+  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float64", "ascii", "1 0 zero"))),
+              HasSubstr("value 3 is no number"));
+  EXPECT_THAT(vti_error(vti_text(
+                  array_text("n", 3, "Float32", "binary", base64(with_length<std::uint32_t>(floats)).substr(0, 100)))),
+              HasSubstr("n is cut short"));
+  EXPECT_THAT(vti_error(vti_text(
+                  array_text("n", 3, "Float32", "binary", base64(with_length<std::uint32_t>(floats.substr(12)))))),
+              HasSubstr("nodes need 72"));
+  EXPECT_THAT(vti_error(vti_text(array_text("n", 3, "Float32", "appended", "", "offset=\"5000\""),
+                                 "<AppendedData encoding=\"raw\">_abc</AppendedData>")),
+              HasSubstr("behind the end of the file"));
+  EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"0 9 0 2 0 3\" Spacing=\"1 1 1\"")),
+              HasSubstr("not the WholeExtent"));
+  EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"3 4 0 2 0 3\" Spacing=\"1 0 1\"")),
+              HasSubstr("three positive numbers"));
+  EXPECT_THAT(vti_error(vti_text(good, "", "",
+                                 "WholeExtent=\"3 4 0 2 0 3\" Spacing=\"1 1 1\" Direction=\"0 1 0 1 0 0 0 0 1\"")),
+              HasSubstr("rotation_deg"));
+  EXPECT_THAT(vti_error(vti_text(array_text(
+                  "n", 3, "Float64", "ascii",
+                  ascii(3, [](int x, int y, int z, int c) { return z == 3 ? 0.0 : component(x, y, z, c); })))),
               HasSubstr("n is zero at node [x, y, z] = [0, 0, 3]"));
-  EXPECT_THAT(vti_error(vti_text(good + array_text("domain_mask", 1, "Float64", "ascii", ascii(1, [](int, int, int, int) { return 0.0; })))), HasSubstr("leaves no node"));
+  EXPECT_THAT(vti_error(vti_text(good + array_text("domain_mask", 1, "Float64", "ascii",
+                                                   ascii(1, [](int, int, int, int) { return 0.0; })))),
+              HasSubstr("leaves no node"));
   VolumeRequest request;
   request.path = write("field.vti", vti_text(good));
   request.spacing_um = {{1, 1, 1}};

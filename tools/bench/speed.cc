@@ -28,8 +28,8 @@
 #include "transport/one_way.h"
 
 namespace birefit {
-/// A double that counts the arithmetic done on it, functions by what the lanes spend on them: multiplications and additions of
-/// their polynomials and Newton steps (core/scalar.h).
+/// A double that counts the arithmetic done on it, functions by what the lanes spend on them: multiplications and
+/// additions of their polynomials and Newton steps (core/scalar.h).
 struct Counted {
   double v = 0;
   Counted() = default;
@@ -61,10 +61,12 @@ using namespace birefit;
 
 namespace {
 
-/// Of one call, in a row of them that lasts some ten milliseconds and follows another one: a fit makes pictures one after the other, and a core that
-/// had nothing to do takes as long to wake as the shortest picture.
+/// Of one call, in a row of them that lasts some ten milliseconds and follows another one: a fit makes pictures one
+/// after the other, and a core that had nothing to do takes as long to wake as the shortest picture.
 double seconds_of(const std::function<void()>& work) {
-  const auto since = [](auto start) { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  const auto since = [](auto start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
   const auto first = std::chrono::steady_clock::now();
   work();
   if (const double seconds = since(first); seconds >= 0.01) return seconds;
@@ -104,20 +106,25 @@ DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
   s.four = {droplet.diameter_um.index, material.birefringence.index, s.scene.view.center_x_px.index,
             s.scene.view.center_y_px.index};
   s.eight = s.four;
-  for (const ParameterRef& more : {material.ordinary, s.scene.surround_index, s.scene.microscope.wavelength_nm, s.scene.microscope.analyzer_deg})
+  for (const ParameterRef& more :
+       {material.ordinary, s.scene.surround_index, s.scene.microscope.wavelength_nm, s.scene.microscope.analyzer_deg})
     s.eight.push_back(more.index);
   return s;
 }
 
-/// Points inside the droplet's image (refraction makes it larger than the droplet) of which a picture's rays are traced.
-double rays_in_picture(const Scene& scene, const RenderPlan& plan, double radius_um, double index_ratio, double host_index) {
-  const double radius_px = radius_um * RimTable(index_ratio, host_index, scene.microscope.objective_na).rho_max() / scene.view.pixel_size_um;
+/// Points inside the droplet's image (refraction makes it larger than the droplet) of which a picture's rays are
+/// traced.
+double rays_in_picture(const Scene& scene, const RenderPlan& plan, double radius_um, double index_ratio,
+                       double host_index) {
+  const double radius_px =
+      radius_um * RimTable(index_ratio, host_index, scene.microscope.objective_na).rho_max() / scene.view.pixel_size_um;
   double rays = 0;
   for (int r = 0; r < scene.view.height; ++r)
     for (int c = 0; c < scene.view.width; ++c) {
       const double distance = std::hypot(c - plan.sampling_center_x_px, r - plan.sampling_center_y_px);
       if (distance > radius_px) continue;
-      const int n = plan.samples[std::min(plan.samples.size() - 1, static_cast<std::size_t>(distance / plan.sampling_bin_px))];
+      const int n =
+          plan.samples[std::min(plan.samples.size() - 1, static_cast<std::size_t>(distance / plan.sampling_bin_px))];
       rays += n * n;
     }
   return rays;
@@ -128,15 +135,16 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// How many times `other` a thing takes: of measurements that were made one after the other, since a machine with neighbours is not as fast all the time.
+/// How many times `other` a thing takes: of measurements that were made one after the other, since a machine with
+/// neighbours is not as fast all the time.
 double ratio(const std::vector<double>& thing, const std::vector<double>& other) {
   std::vector<double> each;
   for (std::size_t i = 0; i < std::min(thing.size(), other.size()); ++i) each.push_back(thing[i] / other[i]);
   return median(each);
 }
 
-/// Arithmetic operations of the medium, the generators and the exponentials along one ray of the twisted droplet; the ray
-/// itself, its surfaces and the commutators, about a tenth, are left out.
+/// Arithmetic operations of the medium, the generators and the exponentials along one ray of the twisted droplet; the
+/// ray itself, its surfaces and the commutators, about a tenth, are left out.
 long operations_of_a_ray(int steps, int samples_a_step) {
   const Chord<Counted> chord(2.1, 4.1, 4.65);
   const LawColumn<Counted, TwistedRadialLaw<Counted>> column({chord, 0.1, 0.99, 1.0, 2.3, 3.0});
@@ -148,7 +156,8 @@ long operations_of_a_ray(int steps, int samples_a_step) {
   Su2<Counted> total = Su2<Counted>::identity();
   for (int i = 0; i < steps; ++i) {
     Vec3<Counted> v{};
-    for (int k = 0; k < samples_a_step; ++k) v = su2_generator_e_and_h(points[static_cast<std::size_t>(i * samples_a_step + k)], Counted(10.6));
+    for (int k = 0; k < samples_a_step; ++k)
+      v = su2_generator_e_and_h(points[static_cast<std::size_t>(i * samples_a_step + k)], Counted(10.6));
     total = su2_exp(v) * total;
   }
   return Counted::operations;
@@ -163,13 +172,13 @@ double peak_operations_per_second() {
   double best = 1e9;
   for (int i = 0; i < 3; ++i)
     best = std::min(best, seconds_of([&] {
-      Pack t0 = s0, t1 = s1, t2 = s2, t3 = s3, t4 = s4, t5 = s5, t6 = s6, t7 = s7, t8 = s8, t9 = s9;
-      for (long k = 0; k < kRounds; ++k) {
-        t0 = t0 * a + b, t1 = t1 * a + b, t2 = t2 * a + b, t3 = t3 * a + b, t4 = t4 * a + b;
-        t5 = t5 * a + b, t6 = t6 * a + b, t7 = t7 * a + b, t8 = t8 * a + b, t9 = t9 * a + b;
-      }
-      s0 = t0, s1 = t1, s2 = t2, s3 = t3, s4 = t4, s5 = t5, s6 = t6, s7 = t7, s8 = t8, s9 = t9;
-    }));
+                      Pack t0 = s0, t1 = s1, t2 = s2, t3 = s3, t4 = s4, t5 = s5, t6 = s6, t7 = s7, t8 = s8, t9 = s9;
+                      for (long k = 0; k < kRounds; ++k) {
+                        t0 = t0 * a + b, t1 = t1 * a + b, t2 = t2 * a + b, t3 = t3 * a + b, t4 = t4 * a + b;
+                        t5 = t5 * a + b, t6 = t6 * a + b, t7 = t7 * a + b, t8 = t8 * a + b, t9 = t9 * a + b;
+                      }
+                      s0 = t0, s1 = t1, s2 = t2, s3 = t3, s4 = t4, s5 = t5, s6 = t6, s7 = t7, s8 = t8, s9 = t9;
+                    }));
   const double used = lane(s0 + s1 + s2 + s3 + s4 + s5 + s6 + s7 + s8 + s9, 0);
   return used > 0 ? 2.0 * kLanes * 10 * kRounds / best : 0;
 }
@@ -200,12 +209,16 @@ void time_waves(int rounds) {
       four_light.push_back(seconds_of([&] { render(s.scene, propagated, theta, of_light, 0, derivatives); }));
     }
     std::printf("500 x 500 radial droplet of %g um, NA 0.8, as waves:\n", diameter);
-    std::printf("  exact series                  %8.2f ms   %.2f times rays; with four derivatives %.2f ms, %.2f times\n", 1e3 * median(by_series),
-                ratio(by_series, by_rays), 1e3 * median(by_series_four), ratio(by_series_four, by_series));
-    std::printf("  propagation                   %8.2f ms   %.1f times rays; one thread %.2f ms, %.2f times\n", 1e3 * median(by_waves), ratio(by_waves, by_rays), 1e3 * median(one),
-                ratio(one, by_waves));
-    std::printf("    four derivatives            %8.2f ms   %.2f times the image; all four by what light meets %.2f ms, %.2f times\n", 1e3 * median(four), ratio(four, by_waves),
-                1e3 * median(four_light), ratio(four_light, by_waves));
+    std::printf(
+        "  exact series                  %8.2f ms   %.2f times rays; with four derivatives %.2f ms, %.2f times\n",
+        1e3 * median(by_series), ratio(by_series, by_rays), 1e3 * median(by_series_four),
+        ratio(by_series_four, by_series));
+    std::printf("  propagation                   %8.2f ms   %.1f times rays; one thread %.2f ms, %.2f times\n",
+                1e3 * median(by_waves), ratio(by_waves, by_rays), 1e3 * median(one), ratio(one, by_waves));
+    std::printf(
+        "    four derivatives            %8.2f ms   %.2f times the image; all four by what light meets %.2f ms, %.2f "
+        "times\n",
+        1e3 * median(four), ratio(four, by_waves), 1e3 * median(four_light), ratio(four_light, by_waves));
   }
 }
 
@@ -225,9 +238,11 @@ void time_cones(int rounds) {
       by_all.push_back(seconds_of([&] { render(f.scene, p, theta, f.parameters, 0, out_all); }));
     }
     std::printf("500 x 500 %s (%s):\n", f.name.c_str(), p.method.c_str());
-    std::printf("  image, all threads            %8.2f ms   one thread %.2f ms, %.2f times\n", 1e3 * median(both), 1e3 * median(one), ratio(one, both));
-    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image; %zu: %.2f ms, %.2f times\n", 1e3 * median(by_four), ratio(by_four, both),
-                f.parameters.size(), 1e3 * median(by_all), ratio(by_all, both));
+    std::printf("  image, all threads            %8.2f ms   one thread %.2f ms, %.2f times\n", 1e3 * median(both),
+                1e3 * median(one), ratio(one, both));
+    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image; %zu: %.2f ms, %.2f times\n",
+                1e3 * median(by_four), ratio(by_four, both), f.parameters.size(), 1e3 * median(by_all),
+                ratio(by_all, both));
   }
 }
 
@@ -250,7 +265,10 @@ void time_curved(int rounds) {
     const char* name;
     double wall_um, field, ring;
   };
-  for (const auto& [name, wall_um, field, ring] : {Sample{"hedgehog", 0, 0, 0}, {"shell, wall 1.3 um", 1.3, 0, 0}, {"hedgehog in a field, e = 3", 0, 3, 0}, {"ring in a field, e = 8", 0, 8, 0.85}}) {
+  for (const auto& [name, wall_um, field, ring] : {Sample{"hedgehog", 0, 0, 0},
+                                                   {"shell, wall 1.3 um", 1.3, 0, 0},
+                                                   {"hedgehog in a field, e = 3", 0, 3, 0},
+                                                   {"ring in a field, e = 8", 0, 8, 0.85}}) {
     DropletScene s = droplet_scene(false, 128, 0.1);
     Droplet& droplet = std::get<Droplet>(s.scene.sample);
     if (wall_um > 0) {
@@ -272,13 +290,16 @@ void time_curved(int rounds) {
       image.push_back(seconds_of([&] { render(s.scene, p, theta, {}, 0, out); }));
       four.push_back(seconds_of([&] { render(s.scene, p, theta, s.four, 0, out_four); }));
     }
-    std::printf("128 x 128 by curved rays, %s: %.2f ms   with four derivatives %.2f ms, %.2f times\n", name, 1e3 * median(image), 1e3 * median(four), ratio(four, image));
+    std::printf("128 x 128 by curved rays, %s: %.2f ms   with four derivatives %.2f ms, %.2f times\n", name,
+                1e3 * median(image), 1e3 * median(four), ratio(four, image));
   }
 }
 
-/// Droplets that look different from all sides: full transport, tables over squares of the disc or a ray for every point.
+/// Droplets that look different from all sides: full transport, tables over squares of the disc or a ray for every
+/// point.
 void time_unsymmetric(int rounds) {
-  for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 3", "with a ring under a field across the view, e = 12", "eccentric shell"}) {
+  for (const char* name : {"bipolar, poles 20 deg out of the image plane", "under a field across the view, e = 3",
+                           "with a ring under a field across the view, e = 12", "eccentric shell"}) {
     DropletScene s = droplet_scene(false, 500, 0.025);
     Droplet& droplet = std::get<Droplet>(s.scene.sample);
     if (name[0] == 'b') {
@@ -295,7 +316,8 @@ void time_unsymmetric(int rounds) {
     } else {
       ShellDirector shell;
       shell.wall_um = s.table.add_constant("wall_um", 1.3);
-      shell.offset_um = {s.table.add_constant("offset_x", 0.4), s.table.add_constant("offset_y", -0.2), s.table.add_constant("offset_z", 0.3)};
+      shell.offset_um = {s.table.add_constant("offset_x", 0.4), s.table.add_constant("offset_y", -0.2),
+                         s.table.add_constant("offset_z", 0.3)};
       droplet.director = shell;
     }
     const Theta theta = s.table.values();
@@ -313,11 +335,15 @@ void time_unsymmetric(int rounds) {
       rays_four.push_back(seconds_of([&] { render(s.scene, every, theta, s.four, 0, direct_four); }));
     }
     double error = 0;
-    for (std::size_t i = 0; i < image.intensity.values().size(); ++i) error = std::max(error, std::abs(image.intensity.values()[i] - direct.intensity.values()[i]));
-    std::printf("500 x 500 droplet, %s (%s, %d steps), planned in %.0f ms:\n", name, p.method.c_str(), p.steps, 1e3 * planned);
-    std::printf("  image                         %8.2f ms   with four derivatives %.2f ms, %.2f times\n", 1e3 * median(table), 1e3 * median(table_four), ratio(table_four, table));
-    std::printf("  a ray for every point         %8.2f ms   with four derivatives %.2f ms, %.2f times; differs by %.1e\n", 1e3 * median(rays), 1e3 * median(rays_four),
-                ratio(rays_four, rays), error);
+    for (std::size_t i = 0; i < image.intensity.values().size(); ++i)
+      error = std::max(error, std::abs(image.intensity.values()[i] - direct.intensity.values()[i]));
+    std::printf("500 x 500 droplet, %s (%s, %d steps), planned in %.0f ms:\n", name, p.method.c_str(), p.steps,
+                1e3 * planned);
+    std::printf("  image                         %8.2f ms   with four derivatives %.2f ms, %.2f times\n",
+                1e3 * median(table), 1e3 * median(table_four), ratio(table_four, table));
+    std::printf(
+        "  a ray for every point         %8.2f ms   with four derivatives %.2f ms, %.2f times; differs by %.1e\n",
+        1e3 * median(rays), 1e3 * median(rays_four), ratio(rays_four, rays), error);
   }
 }
 
@@ -351,8 +377,8 @@ FitJob job_of(DropletScene s, Image values, const std::array<Range, 4>& ranges, 
   return job;
 }
 
-/// The equilibrium of a droplet under a field, and what it makes of a fit in the field against one in the birefringence: as many unknowns
-/// and pixels, the first run of each, when no equilibrium is known yet, and one more.
+/// The equilibrium of a droplet under a field, and what it makes of a fit in the field against one in the
+/// birefringence: as many unknowns and pixels, the first run of each, when no equilibrium is known yet, and one more.
 void time_field() {
   for (const double ring : {0.0, 0.9}) {
     double alone = 0, near = 0;
@@ -368,7 +394,10 @@ void time_field() {
       if (i == 0) known_axial_equilibrium(e - 0.001, ring, false);
       near += seconds([&] { known_axial_equilibrium(e, ring, true); });
     }
-    std::printf("equilibrium of a droplet under a field, %s, with slopes: %.1f ms from the start, %.1f ms from the nearest kept\n", ring > 0 ? "ring" : "hedgehog", 1e3 * alone, 1e3 * near);
+    std::printf(
+        "equilibrium of a droplet under a field, %s, with slopes: %.1f ms from the start, %.1f ms from the nearest "
+        "kept\n",
+        ring > 0 ? "ring" : "hedgehog", 1e3 * alone, 1e3 * near);
   }
   double first[2], second[2];
   for (const bool field : {true, false}) {
@@ -381,7 +410,9 @@ void time_field() {
     std::normal_distribution<double> noise(0, 20);
     for (double& value : values.values()) value = 150 + 3200 * value + noise(random);
     if (field) s.four[1] = axial.reduced_field.index;
-    const FitJob job = job_of(s, std::move(values), {{{9.0, 8.5, 10}, field ? Range{12, 0, 40} : Range{0.15, 0.05, 0.4}, {66, 58, 70}, {62, 58, 70}}});
+    const FitJob job =
+        job_of(s, std::move(values),
+               {{{9.0, 8.5, 10}, field ? Range{12, 0, 40} : Range{0.15, 0.05, 0.4}, {66, 58, 70}, {62, 58, 70}}});
     for (double* seconds : {&first[field], &second[field]}) {
       const auto start = std::chrono::steady_clock::now();
       const FitResult result = fit(job);
@@ -389,8 +420,10 @@ void time_field() {
       if (!result.has_answer()) std::printf("NO ANSWER\n");
     }
   }
-  std::printf("fit of a 128 x 128 droplet under a field: the field %.2f s (again %.2f), the birefringence %.2f s (again %.2f): %.1f times\n", first[1], second[1], first[0], second[0],
-              first[1] / first[0]);
+  std::printf(
+      "fit of a 128 x 128 droplet under a field: the field %.2f s (again %.2f), the birefringence %.2f s (again %.2f): "
+      "%.1f times\n",
+      first[1], second[1], first[0], second[0], first[1] / first[0]);
 }
 
 /// A fit by propagation, the search for the fringe order included: a bipolar droplet, 160 x 160 pixels, noise of 0.2 %.
@@ -411,14 +444,18 @@ void time_fit_by_waves() {
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0, 0.002);
   for (double& value : values.values()) value += noise(random);
-  const FitJob job = job_of(s, std::move(values), {{{8.8, 8.4, 9.6}, {0.1, 0.06, 0.2}, {80, 77, 83}, {80, 77, 83}}}, NoiseModel{0.002, 0, false});
+  const FitJob job = job_of(s, std::move(values), {{{8.8, 8.4, 9.6}, {0.1, 0.06, 0.2}, {80, 77, 83}, {80, 77, 83}}},
+                            NoiseModel{0.002, 0, false});
   FitResult result;
   const double seconds = seconds_of([&] { result = fit(job); });
-  std::printf("fit by propagation, bipolar droplet of 9 um, 160 x 160 pixels, four parameters, orders searched: %.1f s, %d evaluations, %s\n", seconds, result.evaluations,
-              result.has_answer() ? "answer" : "NO ANSWER");
+  std::printf(
+      "fit by propagation, bipolar droplet of 9 um, 160 x 160 pixels, four parameters, orders searched: %.1f s, %d "
+      "evaluations, %s\n",
+      seconds, result.evaluations, result.has_answer() ? "answer" : "NO ANSWER");
 }
 
-/// A whole fit: size x size pixels, six free parameters, the scan included; by rays to an image of a program that shares no code with the fit, by waves to one of the exact series.
+/// A whole fit: size x size pixels, six free parameters, the scan included; by rays to an image of a program that
+/// shares no code with the fit, by waves to one of the exact series.
 void time_fit(int size, int rounds, bool by_waves) {
   const double scale = 256.0 / size;
   testing::IndependentDroplet truth;
@@ -441,11 +478,16 @@ void time_fit(int size, int rounds, bool by_waves) {
   }
   Image values(size, size);
   values.values() = testing::camera(mean, 0.5, 4.0, 7);
-  const FitJob job = job_of(s, std::move(values), {{{9.0, 8.0, 10.5}, {0.15, 0.05, 0.4}, {130 / scale, 110 / scale, 150 / scale}, {126 / scale, 106 / scale, 146 / scale}}});
+  const FitJob job = job_of(s, std::move(values),
+                            {{{9.0, 8.0, 10.5},
+                              {0.15, 0.05, 0.4},
+                              {130 / scale, 110 / scale, 150 / scale},
+                              {126 / scale, 106 / scale, 146 / scale}}});
   std::vector<double> times;
   FitResult result;
   for (int i = 0; i < rounds; ++i) times.push_back(seconds_of([&] { result = fit(job); }));
-  std::printf("fit of a %d x %d droplet%s, six parameters, scan included: %.2f s, %d evaluations, %s\n", size, size, by_waves ? " by waves" : "", median(times), result.evaluations,
+  std::printf("fit of a %d x %d droplet%s, six parameters, scan included: %.2f s, %d evaluations, %s\n", size, size,
+              by_waves ? " by waves" : "", median(times), result.evaluations,
               result.has_answer() ? "converged" : "NO ANSWER");
   std::printf("  %s\n", result.verdict.c_str());
 }
@@ -454,7 +496,8 @@ void time_fit(int size, int rounds, bool by_waves) {
 
 int main(int argc, char** argv) {
   const int rounds = argc > 1 ? std::atoi(argv[1]) : 11;
-  std::printf("%u threads, %d doubles a lane pack, %d rounds, medians; ratios are medians of each round's\n", std::thread::hardware_concurrency(), kLanes, rounds);
+  std::printf("%u threads, %d doubles a lane pack, %d rounds, medians; ratios are medians of each round's\n",
+              std::thread::hardware_concurrency(), kLanes, rounds);
   for (const bool twisted : {false, true}) {
     const DropletScene s = droplet_scene(twisted, 500, 0.025);
     const Theta theta = s.table.values();
@@ -475,24 +518,34 @@ int main(int argc, char** argv) {
       if (i < 3) scalar.push_back(seconds_of([&] { render_scalar(s.scene, p, theta); }));
       if (i < 3) rays_scalar.push_back(seconds_of([&] { render_scalar(s.scene, every, theta); }));
     }
-    std::printf("500 x 500 %s droplet (%s, %d steps, accuracy %.0e):\n", twisted ? "twisted" : "radial", p.method.c_str(), p.steps,
-                s.scene.intensity_accuracy);
+    std::printf("500 x 500 %s droplet (%s, %d steps, accuracy %.0e):\n", twisted ? "twisted" : "radial",
+                p.method.c_str(), p.steps, s.scene.intensity_accuracy);
     std::printf("  image, all threads            %8.2f ms\n", 1e3 * median(both));
-    std::printf("  image, one thread             %8.2f ms   %.2f times all threads\n", 1e3 * median(one), ratio(one, both));
-    std::printf("  image, one thread, no lanes   %8.2f ms   %.2f times the lanes\n", 1e3 * median(scalar), ratio(scalar, one));
-    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image\n", 1e3 * median(four), ratio(four, both));
-    std::printf("  image and eight derivatives   %8.2f ms   %.2f times the image\n", 1e3 * median(eight), ratio(eight, both));
-    std::printf("  a ray for every point         %8.2f ms   %8.2f ms with four derivatives, %.2f times\n", 1e3 * median(rays),
-                1e3 * median(rays_four), ratio(rays_four, rays));
-    std::printf("    one thread                  %8.2f ms   %.2f times all threads\n", 1e3 * median(rays_one), ratio(rays_one, rays));
+    std::printf("  image, one thread             %8.2f ms   %.2f times all threads\n", 1e3 * median(one),
+                ratio(one, both));
+    std::printf("  image, one thread, no lanes   %8.2f ms   %.2f times the lanes\n", 1e3 * median(scalar),
+                ratio(scalar, one));
+    std::printf("  image and four derivatives    %8.2f ms   %.2f times the image\n", 1e3 * median(four),
+                ratio(four, both));
+    std::printf("  image and eight derivatives   %8.2f ms   %.2f times the image\n", 1e3 * median(eight),
+                ratio(eight, both));
+    std::printf("  a ray for every point         %8.2f ms   %8.2f ms with four derivatives, %.2f times\n",
+                1e3 * median(rays), 1e3 * median(rays_four), ratio(rays_four, rays));
+    std::printf("    one thread                  %8.2f ms   %.2f times all threads\n", 1e3 * median(rays_one),
+                ratio(rays_one, rays));
     std::printf("    one thread, no lanes        %8.2f ms   %.2f times the lanes\n", 1e3 * median(rays_scalar),
                 ratio(rays_scalar, rays_one));
     if (twisted && p.method == "magnus6") {
       // Three samples a step; points beside the droplet have no ray, some pixels several.
-      const double rays_traced = rays_in_picture(s.scene, every, 0.5 * theta[static_cast<std::size_t>(s.four[0])], 1.43 / 1.52, 1.43), operations = static_cast<double>(operations_of_a_ray(p.steps, 3)), peak = peak_operations_per_second();
+      const double rays_traced = rays_in_picture(s.scene, every, 0.5 * theta[static_cast<std::size_t>(s.four[0])],
+                                                 1.43 / 1.52, 1.43),
+                   operations = static_cast<double>(operations_of_a_ray(p.steps, 3)),
+                   peak = peak_operations_per_second();
       const double achieved = rays_traced * operations / median(rays_one);
-      std::printf("    %.0f rays of %.0f operations: %.1f GFLOP/s of the core's %.1f (fused multiplications and additions alone), %.0f %%\n", rays_traced, operations,
-                  1e-9 * achieved, 1e-9 * peak, 100 * achieved / peak);
+      std::printf(
+          "    %.0f rays of %.0f operations: %.1f GFLOP/s of the core's %.1f (fused multiplications and additions "
+          "alone), %.0f %%\n",
+          rays_traced, operations, 1e-9 * achieved, 1e-9 * peak, 100 * achieved / peak);
     }
   }
 

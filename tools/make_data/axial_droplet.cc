@@ -1,8 +1,9 @@
 // Makes the image of data/axial_droplet: run from the repository's root,
 //   g++ -std=c++20 -O2 -Itests/support tools/make_data/axial_droplet.cc -o make_axial && ./make_axial
 //   oiiotool --nosoftwareattrib axial_droplet.pgm -o axial_droplet.png
-// The equilibrium of a hedgehog in a field along its axis, by finite differences and successive over-relaxation on a grid of
-// radius and polar angle: theta_rr + 2/r theta_r + (theta_vv + cot v theta_v)/r^2 = sin theta cos theta (1/(r sin v)^2 + e^2).
+// The equilibrium of a hedgehog in a field along its axis, by finite differences and successive over-relaxation on a
+// grid of radius and polar angle: theta_rr + 2/r theta_r + (theta_vv + cot v theta_v)/r^2 = sin theta cos theta (1/(r
+// sin v)^2 + e^2).
 
 #include "independent_droplet.h"
 #include "pgm.h"
@@ -23,9 +24,11 @@ std::vector<double> hedgehog(double e) {
       for (int j = 1; j < kCells; ++j) {
         const double r = i * h, v = j * k, well = 1 / std::pow(r * std::sin(v), 2) + e * e;
         double& t = theta[at(i, j)];
-        const double up = theta[at(i + 1, j)], down = theta[at(i - 1, j)], left = theta[at(i, j - 1)], right = theta[at(i, j + 1)];
+        const double up = theta[at(i + 1, j)], down = theta[at(i - 1, j)], left = theta[at(i, j - 1)],
+                     right = theta[at(i, j + 1)];
         const double rest = (up - 2 * t + down) / (h * h) + (up - down) / (h * r) +
-                            ((right - 2 * t + left) / (k * k) + (right - left) / (2 * k * std::tan(v))) / (r * r) - 0.5 * std::sin(2 * t) * well;
+                            ((right - 2 * t + left) / (k * k) + (right - left) / (2 * k * std::tan(v))) / (r * r) -
+                            0.5 * std::sin(2 * t) * well;
         const double slope = -2 / (h * h) - 2 / (k * k * r * r) - std::cos(2 * t) * well;
         const double step = -1.9 * rest / slope;
         t += step;
@@ -69,7 +72,8 @@ int main() {
         const double place = std::hypot(x, y) / reach * kRadii;
         if (place >= kRadii) continue;
         const std::size_t i = static_cast<std::size_t>(place);
-        sum += (ring[i] + (place - static_cast<double>(i)) * (ring[i + 1] - ring[i])) * std::pow(std::sin(2 * std::atan2(y, x)), 2);
+        sum += (ring[i] + (place - static_cast<double>(i)) * (ring[i + 1] - ring[i])) *
+               std::pow(std::sin(2 * std::atan2(y, x)), 2);
       }
       mean.push_back(120 + 3500 * sum / (kSub * kSub));
     }

@@ -1,5 +1,6 @@
 // Makes the table of data/freedericksz_sweep: run from the repository's root,
-//   g++ -std=c++20 -O2 -Itests/support tools/make_data/freedericksz_sweep.cc -o make_sweep && ./make_sweep > data/freedericksz_sweep/sweep.csv
+//   g++ -std=c++20 -O2 -Itests/support tools/make_data/freedericksz_sweep.cc -o make_sweep && ./make_sweep >
+//   data/freedericksz_sweep/sweep.csv
 
 #include <cstdio>
 #include <random>
@@ -17,6 +18,7 @@ int main() {
   std::puts("voltage_v,signal_v");
   for (int i = 0; i < 48; ++i) {
     const double volts = 0.2 + 0.1 * i;
-    std::printf("%.2f,%.5f\n", volts, kOffset + kGain * cell.crossed(volts / kThreshold, kWavelengthUm) + noise(random));
+    std::printf("%.2f,%.5f\n", volts,
+                kOffset + kGain * cell.crossed(volts / kThreshold, kWavelengthUm) + noise(random));
   }
 }

@@ -1,8 +1,9 @@
 // Makes the images of data/bipolar_droplet and data/eccentric_shell: run from the repository's root,
 //   g++ -std=c++20 -O2 -Itests/support tools/make_data/unsymmetric.cc -o make_unsymmetric && ./make_unsymmetric
 //   for i in bipolar_droplet eccentric_shell; do oiiotool --nosoftwareattrib $i.pgm -o $i.png; done
-// Brute force: every subpixel's ray refracts at the sphere (tests/support/independent_droplet.h has the geometry and its sources) and crosses 400
-// homogeneous retarders. Directors from their definitions: circles through two poles (Williams, J. Phys. A 19, 3211 (1986)), normals of nested spheres.
+// Brute force: every subpixel's ray refracts at the sphere (tests/support/independent_droplet.h has the geometry and
+// its sources) and crosses 400 homogeneous retarders. Directors from their definitions: circles through two poles
+// (Williams, J. Phys. A 19, 3211 (1986)), normals of nested spheres.
 
 #include <array>
 #include <complex>
@@ -38,13 +39,18 @@ double light(const Droplet& d, double x, double y) {
     const double middle = 0.5 * (low + high);
     (seen_at(middle) < rho ? low : high) = middle;
   }
-  const double b = 0.5 * (low + high), h = 1e-6 * std::min(b, radius - b) + 1e-13, slope = (seen_at(b + h) - seen_at(b - h)) / (2 * h);
-  const double outside = std::asin(b / radius), inside = std::asin(m * b / radius), turn = outside - inside, c = x / rho, s = y / rho;
+  const double b = 0.5 * (low + high), h = 1e-6 * std::min(b, radius - b) + 1e-13,
+               slope = (seen_at(b + h) - seen_at(b - h)) / (2 * h);
+  const double outside = std::asin(b / radius), inside = std::asin(m * b / radius), turn = outside - inside,
+               c = x / rho, s = y / rho;
   // The ray's frame inside: p in the plane of incidence, s across it, the ray itself.
-  const Vec p{c * std::cos(turn), s * std::cos(turn), std::sin(turn)}, across{-s, c, 0}, ray{-c * std::sin(turn), -s * std::sin(turn), std::cos(turn)};
+  const Vec p{c * std::cos(turn), s * std::cos(turn), std::sin(turn)}, across{-s, c, 0},
+      ray{-c * std::sin(turn), -s * std::sin(turn), std::cos(turn)};
   const Vec entry{b * c / radius, b * s / radius, -std::cos(outside)};
   const double chord = 2 * std::cos(inside);
-  const auto place = [&](double share) { return Vec{entry[0] + share * chord * ray[0], entry[1] + share * chord * ray[1], entry[2] + share * chord * ray[2]}; };
+  const auto place = [&](double share) {
+    return Vec{entry[0] + share * chord * ray[0], entry[1] + share * chord * ray[1], entry[2] + share * chord * ray[2]};
+  };
   // The ray's part in the core, in shares of the chord.
   double core_from = 2, core_to = 2;
   const Vec off{entry[0] - d.core[0], entry[1] - d.core[1], entry[2] - d.core[2]};
@@ -57,30 +63,37 @@ double light(const Droplet& d, double x, double y) {
   for (int i = 0; i < kLayers; ++i) {
     const double through_crystal = (i + 0.5) / kLayers * crystal;
     // A layer that the core cuts in two is sampled in its middle, on one side of it: second order in its thickness.
-    const Vec n = d.director(place(through_crystal < core_from ? through_crystal : through_crystal - core_from + core_to));
-    const double np = dot(n, p), ns = dot(n, across), along = dot(n, ray), cos2 = along * along, beside = np * np + ns * ns;
+    const Vec n =
+        d.director(place(through_crystal < core_from ? through_crystal : through_crystal - core_from + core_to));
+    const double np = dot(n, p), ns = dot(n, across), along = dot(n, ray), cos2 = along * along,
+                 beside = np * np + ns * ns;
     if (beside < 1e-20) continue;
-    const double delta = k0 * radius * chord * crystal / kLayers * (1 / std::sqrt(cos2 / (d.n_o * d.n_o) + (1 - cos2) / (d.n_e * d.n_e)) - d.n_o);
+    const double delta = k0 * radius * chord * crystal / kLayers *
+                         (1 / std::sqrt(cos2 / (d.n_o * d.n_o) + (1 - cos2) / (d.n_e * d.n_e)) - d.n_o);
     const double c2 = (np * np - ns * ns) / beside, s2 = 2 * np * ns / beside;
     const Complex a(std::cos(delta / 2), std::sin(delta / 2) * c2), cross(0, std::sin(delta / 2) * s2);
-    jones = {a * jones[0] + cross * jones[2], a * jones[1] + cross * jones[3], cross * jones[0] + std::conj(a) * jones[2], cross * jones[1] + std::conj(a) * jones[3]};
+    jones = {a * jones[0] + cross * jones[2], a * jones[1] + cross * jones[3],
+             cross * jones[0] + std::conj(a) * jones[2], cross * jones[1] + std::conj(a) * jones[3]};
   }
   const double eo = d.n_o * d.n_o, ee = d.n_e * d.n_e, cos_out = std::cos(outside), cos_in = std::cos(inside);
   double t_p[2], t_s[2];
   if (d.core_radius > 0) {  // the director is normal to the surface: as in IndependentDroplet::ring
     const double q = d.n_host * std::sqrt(ee - std::pow(d.n_host * b / radius, 2));
-    const double rs = (d.n_host * cos_out - d.n_o * cos_in) / (d.n_host * cos_out + d.n_o * cos_in), rp = (d.n_o * d.n_e * cos_out - q) / (d.n_o * d.n_e * cos_out + q);
+    const double rs = (d.n_host * cos_out - d.n_o * cos_in) / (d.n_host * cos_out + d.n_o * cos_in),
+                 rp = (d.n_o * d.n_e * cos_out - q) / (d.n_o * d.n_e * cos_out + q);
     t_p[0] = t_p[1] = std::sqrt(1 - rp * rp), t_s[0] = t_s[1] = std::sqrt(1 - rs * rs);
   }
   // Elsewhere each polarization passes by its own index along the ray.
   for (int end = 0; end < 2 && d.core_radius == 0; ++end) {
     const Vec n = d.director(place(end == 0 ? 1e-9 : 1 - 1e-9));
-    const double np = dot(n, p), ns = dot(n, across), along = dot(n, ray), shared = (ee - eo) * eo / (eo + (ee - eo) * along * along);
+    const double np = dot(n, p), ns = dot(n, across), along = dot(n, ray),
+                 shared = (ee - eo) * eo / (eo + (ee - eo) * along * along);
     t_p[end] = through(d.n_host / cos_out, std::sqrt(eo + shared * np * np) / cos_in);
     t_s[end] = through(d.n_host * cos_out, std::sqrt(eo + shared * ns * ns) * cos_in);
   }
   const double tip = std::cos(2 * turn);  // of the field in the plane of incidence, what lies in the picture
-  const Complex pp = tip * t_p[1] * t_p[0] * jones[0], ps = tip * t_p[1] * t_s[0] * jones[1], sp = t_s[1] * t_p[0] * jones[2], ss = t_s[1] * t_s[0] * jones[3];
+  const Complex pp = tip * t_p[1] * t_p[0] * jones[0], ps = tip * t_p[1] * t_s[0] * jones[1],
+                sp = t_s[1] * t_p[0] * jones[2], ss = t_s[1] * t_s[0] * jones[3];
   // Polarizer along x: (c, -s) in (p, s); analyser along y: (s, c).
   const Complex out = s * (c * pp - s * ps) + c * (c * sp - s * ss);
   return b / (rho * slope) / tip * std::norm(out);
@@ -94,7 +107,8 @@ void write(const char* path, const Droplet& d, double center_x, double center_y,
     for (int column = 0; column < kSize; ++column) {
       double sum = 0;
       for (int i = 0; i < kSub * kSub; ++i)
-        sum += light(d, (column - 0.5 + (i % kSub + 0.5) / kSub - center_x) * kPixel, (center_y - (row - 0.5 + (i / kSub + 0.5) / kSub)) * kPixel);
+        sum += light(d, (column - 0.5 + (i % kSub + 0.5) / kSub - center_x) * kPixel,
+                     (center_y - (row - 0.5 + (i / kSub + 0.5) / kSub)) * kPixel);
       mean.push_back(120 + 3500 * sum / (kSub * kSub));
     }
   write_pgm(path, kSize, kSize, birefit::testing::camera(mean, 0.5, 4.0, seed));

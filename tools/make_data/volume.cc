@@ -32,11 +32,15 @@ int main() {
   append_block(data, v.director.data(), static_cast<std::uint32_t>(v.director.size() * 12));
   const std::size_t second = data.size();
   append_block(data, v.inside.data(), static_cast<std::uint32_t>(v.inside.size()));
-  file << "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n<ImageData WholeExtent=" << extent
-       << " Origin=\"0 0 0\" Spacing=\"" << spacing << " " << spacing << " " << spacing << "\">\n<Piece Extent=" << extent
-       << ">\n<PointData>\n<DataArray type=\"Float32\" Name=\"n\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\n"
+  file << "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\" "
+          "header_type=\"UInt32\">\n<ImageData WholeExtent="
+       << extent << " Origin=\"0 0 0\" Spacing=\"" << spacing << " " << spacing << " " << spacing
+       << "\">\n<Piece Extent=" << extent
+       << ">\n<PointData>\n<DataArray type=\"Float32\" Name=\"n\" NumberOfComponents=\"3\" format=\"appended\" "
+          "offset=\"0\"/>\n"
        << "<DataArray type=\"UInt8\" Name=\"domain_mask\" format=\"appended\" offset=\"" << second
-       << "\"/>\n</PointData>\n</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_" << data << "\n</AppendedData>\n</VTKFile>\n";
+       << "\"/>\n</PointData>\n</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_" << data
+       << "\n</AppendedData>\n</VTKFile>\n";
   std::vector<double> mean;
   for (int row = 0; row < kSize; ++row)
     for (int column = 0; column < kSize; ++column) mean.push_back(90 + 3300 * v.pixel(column, row, 8));

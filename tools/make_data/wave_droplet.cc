@@ -2,8 +2,8 @@
 //   g++ -std=c++20 -O2 -Itests/support tools/make_data/wave_droplet.cc -o make_wave && ./make_wave
 //   oiiotool --nosoftwareattrib wave_droplet.pgm -o wave_droplet.png
 // A ball whose optic axis is radial, as Maxwell's equations show it: Mie's series with TM waves of order nu inside,
-// nu (nu + 1) = n (n + 1) n_o^2/n_e^2 (Roth & Dignam, J. Opt. Soc. Am. 63, 308 (1973); Bohren & Huffman, chapter 4), then the
-// objective's aperture. Bessel functions are the standard library's.
+// nu (nu + 1) = n (n + 1) n_o^2/n_e^2 (Roth & Dignam, J. Opt. Soc. Am. 63, 308 (1973); Bohren & Huffman, chapter 4),
+// then the objective's aperture. Bessel functions are the standard library's.
 
 #include <cmath>
 #include <complex>
@@ -42,7 +42,8 @@ struct RadialDrop {
       b.push_back((te.psi * out.psi_slope - m * out.psi * te.psi_slope) / (te.psi * xi_slope - m * xi * te.psi_slope));
     }
   }
-  /// The field between crossed polarizers at this distance from the middle, focused on the mid plane, is this times sin 2 (azimuth - polarizer).
+  /// The field between crossed polarizers at this distance from the middle, focused on the mid plane, is this times sin
+  /// 2 (azimuth - polarizer).
   Cplx crossed(double rho_um) const {
     const double k = 2 * kPi * host / wavelength_um, most = k * aperture / host;
     constexpr int kPoints = 1500;
@@ -52,7 +53,8 @@ struct RadialDrop {
       Cplx s1 = 0, s2 = 0;
       double before = 0, pi = 1;
       for (std::size_t j = 0; j < a.size(); ++j) {
-        const double n = static_cast<double>(j + 1), tau = n * cosine * pi - (n + 1) * before, weight = (2 * n + 1) / (n * (n + 1));
+        const double n = static_cast<double>(j + 1), tau = n * cosine * pi - (n + 1) * before,
+                     weight = (2 * n + 1) / (n * (n + 1));
         s1 += weight * (a[j] * pi + b[j] * tau);
         s2 += weight * (a[j] * tau + b[j] * pi);
         const double next = ((2 * n + 1) * cosine * pi - (n + 1) * before) / n;
@@ -80,7 +82,8 @@ int main() {
       double sum = 0;
       for (int i = 0; i < kFine; ++i)
         for (int j = 0; j < kFine; ++j) {
-          const double x = (column + (i + 0.5) / kFine - 0.5 - kCentreX) * kPixel, y = (kCentreY - row - (j + 0.5) / kFine + 0.5) * kPixel;
+          const double x = (column + (i + 0.5) / kFine - 0.5 - kCentreX) * kPixel,
+                       y = (kCentreY - row - (j + 0.5) / kFine + 0.5) * kPixel;
           const double at = std::hypot(x, y) / kStep, turn = std::sin(2 * (std::atan2(y, x) - kPolarizer));
           const auto cell = static_cast<std::size_t>(at);
           sum += std::lerp(brightness[cell], brightness[cell + 1], at - static_cast<double>(cell)) * turn * turn;

@@ -139,10 +139,9 @@ const Eigen::VectorXd& Profile::lowest_place() const {
 }
 
 const Eigen::VectorXd& Profile::place_nearest(double value) const {
-  return std::min_element(places_.begin(), places_.end(),
-                          [&](const Place& a, const Place& b) {
-                            return std::abs(a.value - value) < std::abs(b.value - value);
-                          })
+  return std::min_element(
+             places_.begin(), places_.end(),
+             [&](const Place& a, const Place& b) { return std::abs(a.value - value) < std::abs(b.value - value); })
       ->searched;
 }
 

@@ -111,9 +111,8 @@ void warn_of_misfit(const std::string& name, const Rows& rows, FitResult& result
 std::vector<std::string> with_shared_lines(const Task& task, const std::vector<std::string>& warnings) {
   std::vector<std::pair<std::string, std::vector<std::string>>> said;  // words, of whom; of nobody: a line as it is
   for (const std::string& warning : warnings) {
-    const auto of = std::find_if(task.sights.begin(), task.sights.end(), [&](const Sight& sight) {
-      return warning.starts_with(sight.picture->name + ": ");
-    });
+    const auto of = std::find_if(task.sights.begin(), task.sights.end(),
+                                 [&](const Sight& sight) { return warning.starts_with(sight.picture->name + ": "); });
     const bool named = of != task.sights.end();
     const std::string name = named ? of->picture->name : "";
     const std::string words = named ? warning.substr(name.size() + 2) : warning;

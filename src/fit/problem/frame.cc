@@ -106,8 +106,7 @@ Image fitted_image(const Task& task, const Frames& frames, int frame, const Thet
 }
 
 Frames replanned(const Task& task, Frames frames, const Theta& theta) {
-  for (int g = 0; g < task.frames(); ++g)
-    frames[static_cast<std::size_t>(g)].plan = task.planned(g, theta);
+  for (int g = 0; g < task.frames(); ++g) frames[static_cast<std::size_t>(g)].plan = task.planned(g, theta);
   return frames;
 }
 

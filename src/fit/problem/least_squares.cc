@@ -78,15 +78,13 @@ LeastSquares::LeastSquares(const Task& task, std::vector<RenderPlan> plans, std:
       if (term.shape) {
         term.at_pixels.resize(frame.count);
         for (Eigen::Index i = 0; i < frame.count; ++i)
-          term.at_pixels[i] =
-              term.shape_at(picture.scene.view, frame.set.pixels[static_cast<std::size_t>(i)][0],
-                            frame.set.pixels[static_cast<std::size_t>(i)][1]);
+          term.at_pixels[i] = term.shape_at(picture.scene.view, frame.set.pixels[static_cast<std::size_t>(i)][0],
+                                            frame.set.pixels[static_cast<std::size_t>(i)][1]);
       }
       frame.terms.push_back(std::move(term));
     }
     std::set<int> read;
-    for_each_ref(picture.scene,
-                 [&](const ParameterRef& ref) { read.insert(position(unknowns_.searched, ref.index)); });
+    for_each_ref(picture.scene, [&](const ParameterRef& ref) { read.insert(position(unknowns_.searched, ref.index)); });
     frame.read.assign(read.lower_bound(0), read.end());
     for (Eigen::Index begin = 0; begin < frame.count; begin += kTileRows)
       tiles_.push_back({static_cast<int>(g), begin, std::min(kTileRows, frame.count - begin)});

@@ -22,11 +22,13 @@ std::shared_ptr<Picture> as_picture(const Readings& readings, const Scene& scene
 
 void add_sights(const Readings& readings, std::vector<Sight>& sights) {
   if (readings.observable.quantity == Quantity::ring_radius_cm) {
-    sights.push_back({as_picture(readings, readings.rows.front(), readings.values), readings.observable, readings.name});
+    sights.push_back(
+        {as_picture(readings, readings.rows.front(), readings.values), readings.observable, readings.name});
     return;
   }
   for (std::size_t i = 0; i < readings.rows.size(); ++i) {
-    const auto picture = as_picture(readings, readings.rows[i], readings.values.segment(static_cast<Eigen::Index>(i), 1));
+    const auto picture =
+        as_picture(readings, readings.rows[i], readings.values.segment(static_cast<Eigen::Index>(i), 1));
     if (i < readings.lines.size()) picture->name += ":" + std::to_string(readings.lines[i]);
     sights.push_back({picture, readings.observable, readings.name});
   }
@@ -56,7 +58,8 @@ std::vector<Sight> sights_of(const FitJob& job) {
   std::vector<Sight> sights;
   for (const Measurement& measurement : job.measurements) {
     if (const Picture* picture = std::get_if<Picture>(&measurement))
-      sights.push_back({std::shared_ptr<const Picture>(std::shared_ptr<void>(), picture), {}, picture->name});  // the job keeps it
+      // the job keeps it
+      sights.push_back({std::shared_ptr<const Picture>(std::shared_ptr<void>(), picture), {}, picture->name});
     else
       add_sights(std::get<Readings>(measurement), sights);
   }

@@ -52,8 +52,7 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
   const std::size_t share =
       static_cast<std::size_t>(std::max(50, task.job.options.scan_pixels / std::max(1, task.frames())));
   const Frame& frame = frames[static_cast<std::size_t>(g)];
-  const bool own_rays =
-      std::holds_alternative<Droplet>(task.picture(g).scene.sample) && frame.plan.radial_panels == 0;
+  const bool own_rays = std::holds_alternative<Droplet>(task.picture(g).scene.sample) && frame.plan.radial_panels == 0;
   if (!own_rays) return share;
   // kEnough: units of chi-square by which a constant image is then off; a wrong order is by a good part of that.
   // kFewest: pixels that lie where the image is not flat, however much of it is background.
@@ -111,7 +110,7 @@ std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, co
     sets.push_back(is_one_number(micrograph)
                        ? mean_of(micrograph, frame)
                        : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g))));
-    plans.push_back(is_one_number(micrograph)  ? rough_plan(micrograph.scene, task.observable(g), theta)
+    plans.push_back(is_one_number(micrograph)      ? rough_plan(micrograph.scene, task.observable(g), theta)
                     : has_own_rays(task, frame, g) ? rougher_plan(micrograph.scene, theta)
                                                    : frame.plan);
   }

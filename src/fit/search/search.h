@@ -15,8 +15,8 @@ struct Minima {
   double rows = 0;      ///< pixels that were looked at
   int evaluations = 0;  ///< of pictures, all problems together
   bool stopped = false;
-  bool hopeless =
-      false;  ///< no place that was looked at describes what there is to see, or is better than a constant image
+  /// No place that was looked at describes what there is to see, or is better than a constant image.
+  bool hopeless = false;
 
   double lowest_per_pixel() const { return scan.candidates.front().objective / std::max(1.0, rows); }
 };

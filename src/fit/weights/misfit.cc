@@ -100,8 +100,8 @@ std::vector<double> lamp_over_noise(const Task& task, const Frames& setup, const
   std::vector<double> ratio;
   for (int g = 0; g < task.frames(); ++g) {
     const auto& frame = frames[static_cast<std::size_t>(g)];
-    const bool known =
-        task.observable(g).quantity == Quantity::intensity && !(rows && setup[static_cast<std::size_t>(g)].noise.estimated);
+    const bool known = task.observable(g).quantity == Quantity::intensity &&
+                       !(rows && setup[static_cast<std::size_t>(g)].noise.estimated);
     ratio.push_back(known ? std::abs(frame.mean_light) / frame.mean_noise_sd : 0);
   }
   return ratio;
@@ -165,7 +165,8 @@ double row_correlation(const Task& task, const Theta& theta, const FrameSums& fr
   for (int g = 0; g < task.frames(); ++g) {
     const auto& frame = frames[static_cast<std::size_t>(g)];
     const double ratio = frame_sd * std::abs(task.gain_of(g, theta)) / frame.mean_noise_sd;
-    tables[task.sights[static_cast<std::size_t>(g)].table].push_back(frame.mean_whitened / std::sqrt(1 + ratio * ratio));
+    tables[task.sights[static_cast<std::size_t>(g)].table].push_back(frame.mean_whitened /
+                                                                     std::sqrt(1 + ratio * ratio));
   }
   double squares = 0, products = 0, rows = 0, pairs = 0;
   for (const auto& [name, residual] : tables)
@@ -292,12 +293,11 @@ Optimum with_settled_misfit(const Task& task, Optimum optimum) {
     }
     solve_again(task, optimum, "misfit weighed");
     // Against a prior a shape's weight may take the fit to where the shape is another.
-    const bool shapes_still =
-        optimum.problem->prior_rows() == 0 ||
-        std::equal(weights.begin(), weights.end(), optimum.problem->misfit().begin(),
-                   [&](const Misfit& then, const Misfit& now) {
-                     return still(now.shape_variance, then.shape_variance, kShapeSettled);
-                   });
+    const bool shapes_still = optimum.problem->prior_rows() == 0 ||
+                              std::equal(weights.begin(), weights.end(), optimum.problem->misfit().begin(),
+                                         [&](const Misfit& then, const Misfit& now) {
+                                           return still(now.shape_variance, then.shape_variance, kShapeSettled);
+                                         });
     if (pass > 0 && shapes_still && still(optimum.misfit.frame_sd, before.frame_sd, kSettled) &&
         still(optimum.misfit.lamp_jitter, before.lamp_jitter, kSettled))
       break;

@@ -96,8 +96,8 @@ class Codes {
 };
 
 struct Sample {
-  double signal, difference;   // counts; difference has the variance of one pixel
-  double slope_x, slope_y;     // counts a pixel
+  double signal, difference;  // counts; difference has the variance of one pixel
+  double slope_x, slope_y;    // counts a pixel
 };
 
 /// Differences that cancel smooth structure. The tensor product of (1 -4 6 -4 1) with itself answers to a fringe of

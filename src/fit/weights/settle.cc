@@ -61,8 +61,8 @@ Optimum with_settled_weights(const Task& task, Optimum optimum) {
     const bool by_signal = std::any_of(optimum.frames.begin(), optimum.frames.end(),
                                        [](const Frame& f) { return f.noise.counts_per_photon != 0; });
     if (pass > 0 && !by_signal) break;  // the weights do not depend on the signal
-    // Nor do they matter to what a model misses by many times its noise, once they are the fitted signal's; where one of
-    // several frames seems missed, its own weights may be all that is wrong.
+    // Nor do they matter to what a model misses by many times its noise, once they are the fitted signal's; where one
+    // of several frames seems missed, its own weights may be all that is wrong.
     constexpr double kMissed = 10;
     const bool missed = task.frames() == 1 && optimum.per_pixel > kMissed;
     if (pass > 0 && missed) break;

@@ -13,7 +13,8 @@
 
 namespace birefit {
 
-/// The director's angle at a place in the upper half with what bends a ray there and what moves with the field's N directions of derivatives.
+/// The director's angle at a place in the upper half with what bends a ray there and what moves with the field's N
+/// directions of derivatives.
 template <int N>
 struct AxialBend {
   double theta, by_rho, by_z, by_rho2, by_rho_z, by_z2;
@@ -26,12 +27,17 @@ class AxialField {
  public:
   using P = PlainOf<S>;
   AxialField(const S& e, const S& ring, bool has_ring)
-      : e_(e), ring_(ring), has_ring_(has_ring), table_(*known_axial_equilibrium(lane(plain(e), 0), has_ring ? lane(plain(ring), 0) : 0.0, kDerivatives > 0), has_ring, kDerivatives > 0) {}
+      : e_(e),
+        ring_(ring),
+        has_ring_(has_ring),
+        table_(*known_axial_equilibrium(lane(plain(e), 0), has_ring ? lane(plain(ring), 0) : 0.0, kDerivatives > 0),
+               has_ring, kDerivatives > 0) {}
   const S& e() const { return e_; }
   bool has_ring() const { return has_ring_; }
   const S& ring() const { return ring_; }
 
-  /// Sine and cosine of the director's angle from the field at (rho, z), rho >= 0, z > 0, inside the unit sphere; T = S or Slope<S>.
+  /// Sine and cosine of the director's angle from the field at (rho, z), rho >= 0, z > 0, inside the unit sphere; T = S
+  /// or Slope<S>.
   template <class T>
   void director(const T& rho, const T& z, T& n_rho, T& n_z) const {
     const T polar = angle_of(rho, z), change = change_at(T(root(T(rho * rho + z * z))), polar);
@@ -43,18 +49,22 @@ class AxialField {
     n_z = cosine * c - sine * s;
   }
 
-  /// The angle itself with first and second slopes at once, term by term: a tenth of the work of duals of duals. S = double or Dual<double, N>; r > 0.
+  /// The angle itself with first and second slopes at once, term by term: a tenth of the work of duals of duals. S =
+  /// double or Dual<double, N>; r > 0.
   AxialBend<ScalarTraits<S>::derivatives> bend(double rho, double z) const {
     constexpr std::size_t n = kDerivatives;
-    const double r = std::sqrt(rho * rho + z * z), inverse_r = 1 / r, polar = std::atan2(rho, z), s = rho * inverse_r, c = z * inverse_r;
-    const auto change = table_.template read<double, n == 0 ? 1 : 2>(r, polar);
-    const double fr = change.by_r, fp = has_ring_ ? change.by_polar : change.by_polar + 1;  // the hedgehog's boundary angle is the polar angle itself; a ring's comes below
+    const double r = std::sqrt(rho * rho + z * z), inverse_r = 1 / r, polar = std::atan2(rho, z), s = rho * inverse_r,
+                 c = z * inverse_r;
+    const auto change = table_.template read < double, n == 0 ? 1 : 2 > (r, polar);
+    // the hedgehog's boundary angle is the polar angle itself; a ring's comes below
+    const double fr = change.by_r, fp = has_ring_ ? change.by_polar : change.by_polar + 1;
     AxialBend<static_cast<int>(n)> out;
     out.theta = has_ring_ ? change.value : change.value + polar;
     out.by_rho = fr * s + fp * c * inverse_r;
     out.by_z = fr * c - fp * s * inverse_r;
     if constexpr (n > 0) {
-      const double frr = change.by_r2, frp = change.by_r_polar, fpp = change.by_polar2, q = inverse_r * inverse_r, sc = s * c, both = (c * c - s * s) * inverse_r;
+      const double frr = change.by_r2, frp = change.by_r_polar, fpp = change.by_polar2, q = inverse_r * inverse_r,
+                   sc = s * c, both = (c * c - s * s) * inverse_r;
       out.by_rho2 = frr * s * s + 2 * frp * sc * inverse_r + fpp * c * c * q + fr * c * c * inverse_r - 2 * fp * sc * q;
       out.by_rho_z = frr * sc + frp * both - fpp * sc * q - fr * sc * inverse_r - fp * both * inverse_r;
       out.by_z2 = frr * c * c - 2 * frp * sc * inverse_r + fpp * s * s * q + fr * s * s * inverse_r + 2 * fp * sc * q;
@@ -78,7 +88,8 @@ class AxialField {
       if constexpr (n > 0) {
         out.by_rho2 += angle.d[0].d[0], out.by_rho_z += angle.d[0].d[1], out.by_z2 += angle.d[1].d[1];
         for (std::size_t k = 0; k < n; ++k)
-          out.by[k] += angle.value.d[2] * ring_.d[k], out.by_rho_and[k] += angle.d[0].d[2] * ring_.d[k], out.by_z_and[k] += angle.d[1].d[2] * ring_.d[k];
+          out.by[k] += angle.value.d[2] * ring_.d[k], out.by_rho_and[k] += angle.d[0].d[2] * ring_.d[k],
+              out.by_z_and[k] += angle.d[1].d[2] * ring_.d[k];
       }
     }
     return out;
@@ -87,18 +98,21 @@ class AxialField {
  private:
   static constexpr std::size_t kDerivatives = static_cast<std::size_t>(ScalarTraits<S>::derivatives);
   /// Slopes by e and ring along S's direction k.
-  P along(const std::array<P, 2>& by, std::size_t k) const { return has_ring_ ? P(by[0] * e_.d[k] + by[1] * ring_.d[k]) : P(by[0] * e_.d[k]); }
+  P along(const std::array<P, 2>& by, std::size_t k) const {
+    return has_ring_ ? P(by[0] * e_.d[k] + by[1] * ring_.d[k]) : P(by[0] * e_.d[k]);
+  }
   template <class T>
   T change_at(const T& r, const T& polar) const {
     if constexpr (std::is_same_v<T, S>) {
-      const auto change = table_.template read<P, kDerivatives == 0 ? 0 : 1>(plain(r), plain(polar));
+      const auto change = table_.template read < P, kDerivatives == 0 ? 0 : 1 > (plain(r), plain(polar));
       S out(change.value);
       if constexpr (kDerivatives > 0)
-        for (std::size_t k = 0; k < kDerivatives; ++k) out.d[k] = change.by_r * r.d[k] + change.by_polar * polar.d[k] + along(change.by, k);
+        for (std::size_t k = 0; k < kDerivatives; ++k)
+          out.d[k] = change.by_r * r.d[k] + change.by_polar * polar.d[k] + along(change.by, k);
       return out;
     } else {
       static_assert(std::is_same_v<T, Slope<S>>);
-      const auto change = table_.template read<P, kDerivatives == 0 ? 1 : 2>(plain(r), plain(polar));
+      const auto change = table_.template read < P, kDerivatives == 0 ? 1 : 2 > (plain(r), plain(polar));
       S value(change.value), by_r(change.by_r), by_polar(change.by_polar);
       if constexpr (kDerivatives > 0)
         for (std::size_t k = 0; k < kDerivatives; ++k) {
@@ -118,15 +132,23 @@ class AxialField {
   AxialTable table_;
 };
 
-/// u in [0, 1/2] runs from the entry to the equator (z = 0), the rest to the exit; nodes crowd at the equator, where the
-/// wall and the defect are, and at the sphere, each over the coherence length or what the ray's distance makes of it.
+/// u in [0, 1/2] runs from the entry to the equator (z = 0), the rest to the exit; nodes crowd at the equator, where
+/// the wall and the defect are, and at the sphere, each over the coherence length or what the ray's distance makes of
+/// it.
 template <class S>
 class AxialColumn final : public Column<S> {
  public:
-  /// impact_um, half_um: distance and half length of the chord; deflection of the ray inside, > 0 turns towards the axis.
-  AxialColumn(const AxialField<S>& field, const S& impact_um, const S& half_um, const S& radius_um, const S& sin_deflection,
-              const S& cos_deflection, const S& ordinary, const S& extraordinary)
-      : field_(field), b_(impact_um), radius_(radius_um), sd_(sin_deflection), cd_(cos_deflection), eo_(ordinary), ee_(extraordinary) {
+  /// impact_um, half_um: distance and half length of the chord; deflection of the ray inside, > 0 turns towards the
+  /// axis.
+  AxialColumn(const AxialField<S>& field, const S& impact_um, const S& half_um, const S& radius_um,
+              const S& sin_deflection, const S& cos_deflection, const S& ordinary, const S& extraordinary)
+      : field_(field),
+        b_(impact_um),
+        radius_(radius_um),
+        sd_(sin_deflection),
+        cd_(cos_deflection),
+        eo_(ordinary),
+        ee_(extraordinary) {
     this->planar = true;
     this->breaks = {0.5};
     // Where the ray meets the equator; some near the rim never do.
@@ -140,7 +162,8 @@ class AxialColumn final : public Column<S> {
     q_ = 4.0 * b_ * inverse(half_um) + 0.01;
   }
   void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
-    for (std::size_t i = 0; i < u.size(); ++i) ::new (static_cast<void*>(out + i)) OpticalPoint<S>(at<S>(S(u[i]), u[i]));
+    for (std::size_t i = 0; i < u.size(); ++i)
+      ::new (static_cast<void*>(out + i)) OpticalPoint<S>(at<S>(S(u[i]), u[i]));
   }
   void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
     for (std::size_t i = 0; i < u.size(); ++i) {

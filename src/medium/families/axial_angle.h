@@ -23,10 +23,10 @@ BIREFIT_INLINE Dual<B, N> angle_of(const Dual<B, N>& y, const Dual<B, N>& x) {
 ///   theta_s = 2 atan(tan(polar angle / 2) tan(pi q / 4)),
 /// q the harmonic function that is 1 on the sphere and on the equator outside the ring and 0 on the equator inside it:
 ///   pi q = arg(ring^2 - r^2 + 2 i ring z) + arg(1 - ring^2 r^2 + 2 i ring z)
-/// (images of the ring in the sphere). On the sphere theta_s is the polar angle (normal anchoring), on the axis 0, on the
-/// equator pi/2 outside the ring and 0 inside; around the ring it grows by half the angle about it: a line of strength
-/// +1/2. ring = 0 gives the polar angle everywhere, the hedgehog.
-/// As sine and cosine of theta_s: with tan(a / 2) = y / (|w| + x), a = arg(x + i y), no angle is needed on the way. R = T, or a base of it.
+/// (images of the ring in the sphere). On the sphere theta_s is the polar angle (normal anchoring), on the axis 0, on
+/// the equator pi/2 outside the ring and 0 inside; around the ring it grows by half the angle about it: a line of
+/// strength +1/2. ring = 0 gives the polar angle everywhere, the hedgehog. As sine and cosine of theta_s: with tan(a /
+/// 2) = y / (|w| + x), a = arg(x + i y), no angle is needed on the way. R = T, or a base of it.
 template <class T, class R>
 void axial_boundary_direction(const T& rho, const T& z, const R& ring, T& sine, T& cosine) {
   const T r2 = rho * rho + z * z, y = 2.0 * (ring * z);

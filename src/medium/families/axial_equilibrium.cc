@@ -16,8 +16,8 @@
 namespace birefit {
 namespace {
 
-/// Closed-form start (fits to the solutions of this file; within 0.15 rad everywhere): the boundary angle's tangent, less
-/// what the field turns away from sphere and equator.
+/// Closed-form start (fits to the solutions of this file; within 0.15 rad everywhere): the boundary angle's tangent,
+/// less what the field turns away from sphere and equator.
 double ansatz(double field, double ring, double rho, double z) {
   const double e = std::abs(field);  // differences around no field ask for e < 0: the equations know its square
   const double r = std::hypot(rho, z), half = rho / (r + z);
@@ -26,19 +26,24 @@ double ansatz(double field, double ring, double rho, double z) {
     const double b = e * e / (e + 2.167 + 2.386 / (1 + std::pow(e / 5.080, 2.153)));
     return 2 * std::atan(half * (1 - (1 - std::exp(-a * (1 - r))) * (1 - std::exp(-b * z))));
   }
-  const double q = (std::atan2(2 * ring * z, ring * ring - r * r) + std::atan2(2 * ring * z, 1 - ring * ring * r * r)) / std::numbers::pi;
+  const double q = (std::atan2(2 * ring * z, ring * ring - r * r) + std::atan2(2 * ring * z, 1 - ring * ring * r * r)) /
+                   std::numbers::pi;
   const double a = std::max(0.0, e - 0.79 * (1 + std::log(std::max(e, 1.0)))), b = 0.85 * e;
   const double zr = std::hypot(z, std::max(0.0, ring - rho));
-  return 2 * std::atan(half * std::pow(std::max(q, 0.0), 1.25) * (1 - (1 - std::exp(-a * (1 - r))) * (1 - std::exp(-b * zr))));
+  return 2 * std::atan(half * std::pow(std::max(q, 0.0), 1.25) *
+                       (1 - (1 - std::exp(-a * (1 - r))) * (1 - std::exp(-b * zr))));
 }
 
-/// theta_s (axial_boundary_angle()) and its Laplacian (around the ring it grows like the inverse distance): with v the polar angle and Q = pi q / 2, both harmonic in the
-/// plane (rho, z), theta_s = 2 atan exp u, u = ln tan(v/2) + ln tan(Q/2), and
-///   laplacian theta = sin theta {laplacian_2D u + cos theta |grad u|^2 + u_rho / rho},   laplacian_2D ln tan(Q/2) = -cos Q |grad Q|^2 / sin^2 Q.
+/// theta_s (axial_boundary_angle()) and its Laplacian (around the ring it grows like the inverse distance): with v the
+/// polar angle and Q = pi q / 2, both harmonic in the plane (rho, z), theta_s = 2 atan exp u, u = ln tan(v/2) + ln
+/// tan(Q/2), and
+///   laplacian theta = sin theta {laplacian_2D u + cos theta |grad u|^2 + u_rho / rho},   laplacian_2D ln tan(Q/2) =
+///   -cos Q |grad Q|^2 / sin^2 Q.
 struct BoundaryAngle {
   double value, laplacian;
 };
-BoundaryAngle boundary_angle(double r, double polar, double s, double c, double ring) {  // s, c: sine and cosine of the polar angle
+// s, c: sine and cosine of the polar angle
+BoundaryAngle boundary_angle(double r, double polar, double s, double c, double ring) {
   if (ring == 0) return {polar, c / (s * r * r)};
   const double rho = r * s, z = r * c, ring2 = ring * ring, b = 2 * ring * z;
   // a + i b: the two factors whose arguments make 2 Q.
@@ -80,7 +85,8 @@ Line make_line(const AxialGrid& grid, const std::vector<double>& edges, const We
     for (int i = 0; i <= p; ++i)
       for (int j = 0; j <= p; ++j) {
         double sum = 0;
-        for (int q = 0; q <= p; ++q) sum += rule.w[q] * weight(middle + half * rule.x[q]) * rule.derivative(q, i) * rule.derivative(q, j);
+        for (int q = 0; q <= p; ++q)
+          sum += rule.w[q] * weight(middle + half * rule.x[q]) * rule.derivative(q, i) * rule.derivative(q, j);
         line.stiffness(k * p + i, k * p + j) += sum / std::abs(half);
       }
   }
@@ -116,7 +122,10 @@ const LobattoRule& lobatto_rule(int degree) {
   rule.derivative.resize(n, n);
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
-      rule.derivative(i, j) = i != j ? legendre[i] / (legendre[j] * (rule.x[i] - rule.x[j])) : i == 0 ? -p * n / 4.0 : i == p ? p * n / 4.0 : 0.0;
+      rule.derivative(i, j) = i != j   ? legendre[i] / (legendre[j] * (rule.x[i] - rule.x[j]))
+                              : i == 0 ? -p * n / 4.0
+                              : i == p ? p * n / 4.0
+                                       : 0.0;
   return rule;
 }
 
@@ -127,7 +136,8 @@ using Field = Eigen::Array<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 using Factors = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
 /// Weak form with Gauss-Lobatto quadrature in the nodes, change = 0 on every boundary:
-///   (K_r w_v sin v + w_r K_v) change + w_r w_v {sin theta cos theta (1/sin v + e^2 r^2 sin v) - r^2 sin v laplacian theta_s} = 0.
+///   (K_r w_v sin v + w_r K_v) change + w_r w_v {sin theta cos theta (1/sin v + e^2 r^2 sin v) - r^2 sin v laplacian
+///   theta_s} = 0.
 struct Equations {
   int inner, degree;
   Line r, polar;
@@ -171,17 +181,21 @@ struct Equations {
     return change;
   }
   Field stiffness(const Field& change) const {
-    return (r_stiffness * change.matrix()).array().rowwise() * polar_weight.transpose() + (change.matrix() * polar_stiffness).array().colwise() * r_weight;
+    return (r_stiffness * change.matrix()).array().rowwise() * polar_weight.transpose() +
+           (change.matrix() * polar_stiffness).array().colwise() * r_weight;
   }
   Field residual(const Field& change) const {
     const Field theta = boundary + change;
     return stiffness(change) + well * theta.sin() * theta.cos() - source;
   }
-  Field curvature(const Field& change) const { return well * (2 * (boundary + change)).cos(); }  ///< of the well: what the Jacobian has beside the stiffness
+  /// of the well: what the Jacobian has beside the stiffness
+  Field curvature(const Field& change) const { return well * (2 * (boundary + change)).cos(); }
   Eigen::SparseMatrix<double> jacobian(const Field& change) const {
     const Field diagonal = curvature(change);
     // Nodes share an element: all between its first and its last, of those inside.
-    const auto first = [&](int k) { return std::max(0, (k + 1) % degree == 0 ? k - degree : (k + 1) / degree * degree - 1); };
+    const auto first = [&](int k) {
+      return std::max(0, (k + 1) % degree == 0 ? k - degree : (k + 1) / degree * degree - 1);
+    };
     const auto last = [&](int k) { return std::min(inner - 1, ((k + 1) / degree + 1) * degree - 1); };
     Eigen::SparseMatrix<double> j(inner * inner, inner * inner);
     j.reserve(inner * inner * 4 * degree);
@@ -194,8 +208,8 @@ struct Equations {
           continue;
         }
         for (int k = first(d); k <= last(d); ++k)
-          j.insertBack(row * inner + k, column) =
-              r_weight[c] * polar_stiffness(k, d) + (k == d ? r_stiffness(c, c) * polar_weight[d] + diagonal(c, d) : 0.0);
+          j.insertBack(row * inner + k, column) = r_weight[c] * polar_stiffness(k, d) +
+                                                  (k == d ? r_stiffness(c, c) * polar_weight[d] + diagonal(c, d) : 0.0);
       }
     }
     j.finalize();
@@ -215,15 +229,17 @@ void factorize(Factors& factors, const Equations& equations, const Field& change
   if (factors.info() != Eigen::Success) throw std::domain_error("equilibrium of the droplet: singular equations");
 }
 
-/// Slopes of the nodes' values by e and ring, by the implicit function theorem; the equations' own slope by differences, 1e-9 of it: the nodes
-/// move with e and ring. `solve`: by the Jacobian.
+/// Slopes of the nodes' values by e and ring, by the implicit function theorem; the equations' own slope by
+/// differences, 1e-9 of it: the nodes move with e and ring. `solve`: by the Jacobian.
 struct Slopes {
   Field by_e, by_ring;  ///< the latter empty of a hedgehog
 };
 template <class Solve>
 Slopes slopes_of(double e, double ring, const AxialGrid& grid, const Field& change, const Solve& solve) {
   const auto slope = [&](double de, double dring) -> Field {
-    return solve(Field((Equations(e - de, ring - dring, grid).residual(change) - Equations(e + de, ring + dring, grid).residual(change)) / (2 * (de + dring))));
+    return solve(Field((Equations(e - de, ring - dring, grid).residual(change) -
+                        Equations(e + de, ring + dring, grid).residual(change)) /
+                       (2 * (de + dring))));
   };
   Slopes s{slope(1e-5 * (1 + e), 0), {}};
   if (ring > 0) s.by_ring = slope(0, 1e-5 * std::min(ring, 1 - ring));
@@ -234,7 +250,8 @@ Slopes slopes_of(double e, double ring, const AxialGrid& grid, const Field& chan
 int solve_by_newton(const Equations& equations, double e, double ring, Factors& factors, Field& x) {
   constexpr int kMostSteps = 60;
   constexpr double kSmallStep = 1e-9;  // rad
-  constexpr double kNear = 0.03;       // rad; from here the last factors serve: each step is a few percent of the one before
+  // rad; from here the last factors serve: each step is a few percent of the one before
+  constexpr double kNear = 0.03;
   bool near = false;
   Field residual = equations.residual(x);
   for (int steps = 1; steps <= kMostSteps; ++steps) {
@@ -253,17 +270,21 @@ int solve_by_newton(const Equations& equations, double e, double ring, Factors& 
     x = next, residual = after;
     if (done) return steps;
   }
-  throw std::domain_error("equilibrium of the droplet: Newton's method did not converge at reduced field " + std::to_string(e) + ", ring radius " + std::to_string(ring));
+  throw std::domain_error("equilibrium of the droplet: Newton's method did not converge at reduced field " +
+                          std::to_string(e) + ", ring radius " + std::to_string(ring));
 }
 
-AxialEquilibrium equilibrium_of(double e, double ring, const AxialGrid& grid, const Equations& equations, const Field& change, const Slopes& slopes, int steps) {
+AxialEquilibrium equilibrium_of(double e, double ring, const AxialGrid& grid, const Equations& equations,
+                                const Field& change, const Slopes& slopes, int steps) {
   const auto on_grid = [&](const Field& inside) {
     Eigen::MatrixXd m = Eigen::MatrixXd::Zero(grid.nodes(), grid.nodes());
     m.block(1, 1, inside.rows(), inside.cols()) = inside.matrix();
     return m;
   };
   const auto if_any = [&](const Field& f) { return f.size() > 0 ? on_grid(f) : Eigen::MatrixXd(); };
-  return {e, ring, grid, equations.r.x, equations.polar.x, on_grid(change), if_any(slopes.by_e), if_any(slopes.by_ring), steps};
+  return {
+      e,    ring, grid, equations.r.x, equations.polar.x, on_grid(change), if_any(slopes.by_e), if_any(slopes.by_ring),
+      steps};
 }
 
 }  // namespace
@@ -275,20 +296,22 @@ AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid,
   const int steps = solve_by_newton(equations, e, ring, factors, x);
   if (!slopes) return equilibrium_of(e, ring, grid, equations, x, {}, steps);
   factorize(factors, equations, x);
-  return equilibrium_of(e, ring, grid, equations, x, slopes_of(e, ring, grid, x, [&](const Field& right) { return solve(factors, right); }), steps);
+  return equilibrium_of(e, ring, grid, equations, x,
+                        slopes_of(e, ring, grid, x, [&](const Field& right) { return solve(factors, right); }), steps);
 }
 
 namespace {
 
-/// An equilibrium on the production grid that serves its neighbours: what they start from, and the factors of their steps.
+/// An equilibrium on the production grid that serves its neighbours: what they start from, and the factors of their
+/// steps.
 struct Rung {
   double e, ring;
   Field change;
   Slopes slopes;
   Factors factors;
 };
-/// The rung nearest to (e, ring), of a ladder that is fixed, so that what is found from it does not depend on what was asked before. Rungs are so
-/// close that a step with the factors of one leaves a tenth of the error.
+/// The rung nearest to (e, ring), of a ladder that is fixed, so that what is found from it does not depend on what was
+/// asked before. Rungs are so close that a step with the factors of one leaves a tenth of the error.
 std::shared_ptr<const Rung> rung_near(double e, double ring) {
   constexpr double kStep = 0.08;
   const double rung_e = 3 * std::expm1(kStep * std::round(std::log1p(e / 3) / kStep));
@@ -307,10 +330,12 @@ std::shared_ptr<const Rung> rung_near(double e, double ring) {
   fresh->change = equations.start(rung_e, rung_ring);
   solve_by_newton(equations, rung_e, rung_ring, fresh->factors, fresh->change);
   factorize(fresh->factors, equations, fresh->change);
-  fresh->slopes = slopes_of(rung_e, rung_ring, grid, fresh->change, [&](const Field& right) { return solve(fresh->factors, right); });
+  fresh->slopes = slopes_of(rung_e, rung_ring, grid, fresh->change,
+                            [&](const Field& right) { return solve(fresh->factors, right); });
   const std::lock_guard lock(guard);
   known.push_front(fresh);
-  constexpr std::size_t kMost = 48;  // reduced fields up to 100 with a hedgehog: a scan that goes through more than are kept would find none. 20 MB
+  // reduced fields up to 100 with a hedgehog: a scan that goes through more than are kept would find none. 20 MB
+  constexpr std::size_t kMost = 48;
   if (known.size() > kMost) known.pop_back();
   return fresh;
 }
@@ -340,11 +365,14 @@ AxialEquilibrium from_rung(double e, double ring, bool slopes) {
     const Field curvature = equations.curvature(x);
     found = slopes_of(e, ring, grid, x, [&](const Field& right) {
       Field slope = solve(rung->factors, right);
-      converged = converged && refine(slope, [&](const Field& at) -> Field { return equations.stiffness(at) + curvature * at - right; }) > 0;
+      converged = converged && refine(slope, [&](const Field& at) -> Field {
+                                 return equations.stiffness(at) + curvature * at - right;
+                               }) > 0;
       return slope;
     });
   }
-  return converged ? equilibrium_of(e, ring, grid, equations, x, found, steps) : axial_equilibrium(e, ring, grid, slopes);
+  return converged ? equilibrium_of(e, ring, grid, equations, x, found, steps)
+                   : axial_equilibrium(e, ring, grid, slopes);
 }
 
 }  // namespace
@@ -390,19 +418,23 @@ double AxialEquilibrium::theta(double rho, double z) const {
 
 namespace {
 
-/// 4 pi times half the squared gradient of theta_s over the quarter disc; of a ring less pi^2/2 ring ln(1 / r_c), where all but
-/// that logarithm converges as the tube around the ring that is left out, r_c thick, shrinks. Along rays from the ring.
+/// 4 pi times half the squared gradient of theta_s over the quarter disc; of a ring less pi^2/2 ring ln(1 / r_c), where
+/// all but that logarithm converges as the tube around the ring that is left out, r_c thick, shrinks. Along rays from
+/// the ring.
 double energy_of_boundary_angle(double ring) {
   if (ring == 0) return 2 * std::numbers::pi;
   const auto panels = [](const auto& f, double from, double to, int n) {
     double sum = 0;
-    for (int i = 0; i < n; ++i) sum += boost::math::quadrature::gauss<double, 20>::integrate(f, from + (to - from) * i / n, from + (to - from) * (i + 1) / n);
+    for (int i = 0; i < n; ++i)
+      sum += boost::math::quadrature::gauss<double, 20>::integrate(f, from + (to - from) * i / n,
+                                                                   from + (to - from) * (i + 1) / n);
     return sum;
   };
   const auto along = [&](double angle) {
     double c, s;
     sin_cos(angle, s, c);
-    const double to_sphere = std::sqrt(1 - ring * ring * s * s) - ring * c, end = c < 0 ? std::min(to_sphere, -ring / c) : to_sphere;
+    const double to_sphere = std::sqrt(1 - ring * ring * s * s) - ring * c,
+                 end = c < 0 ? std::min(to_sphere, -ring / c) : to_sphere;
     const double core = 0.5 * std::numbers::pi * ring;
     const auto rest = [&](double d) {
       Dual<double, 2> rho(ring + d * c), z(d * s);
@@ -412,7 +444,8 @@ double energy_of_boundary_angle(double ring) {
     };
     // The ring's image in the sphere is about as far as the sphere.
     double sum = core * std::log(end);
-    for (double from = 0, to = std::min(end, 1 - ring); from < end; from = to, to = std::min(end, 2 * to)) sum += panels(rest, from, to, 1);
+    for (double from = 0, to = std::min(end, 1 - ring); from < end; from = to, to = std::min(end, 2 * to))
+      sum += panels(rest, from, to, 1);
     return sum;
   };
   const double pole = std::numbers::pi - std::atan(1 / ring);
@@ -422,7 +455,8 @@ double energy_of_boundary_angle(double ring) {
 }  // namespace
 
 double AxialEquilibrium::energy() const {
-  // theta = theta_s + change: the gradients' product is, by parts, -change laplacian theta_s, since change vanishes on every boundary.
+  // theta = theta_s + change: the gradients' product is, by parts, -change laplacian theta_s, since change vanishes on
+  // every boundary.
   const Equations equations(e, ring, grid);
   const int n = grid.nodes();
   const Field inside = change.block(1, 1, equations.inner, equations.inner).array();
@@ -430,7 +464,9 @@ double AxialEquilibrium::energy() const {
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) {
       const double x = r[i], v = polar_rad[j], s = std::sin(v);
-      const double boundary = x > 0 ? axial_boundary_angle(x * s, std::max(x * std::cos(v), 0.0), ring) : ring > 0 ? 0.0 : v;
+      const double boundary = x > 0      ? axial_boundary_angle(x * s, std::max(x * std::cos(v), 0.0), ring)
+                              : ring > 0 ? 0.0
+                                         : v;
       const double st = std::sin(boundary + change(i, j)), over = s > 1e-12 ? st * st / s : 0.0;
       sum += equations.r.w[i] * equations.polar.w[j] * 0.5 * (over + e * e * x * x * s * st * st);
     }
@@ -446,7 +482,8 @@ RingBalance ring_balance(double e, double ring) {
     const std::lock_guard lock(guard);
     if (known_e == e && known_ring == ring) return known;
   }
-  const double step = 0.05 * (1 - ring), below = std::max(0.2, ring - step), above = std::min(0.995, ring + step), half = 0.5 * (above - below);
+  const double step = 0.05 * (1 - ring), below = std::max(0.2, ring - step), above = std::min(0.995, ring + step),
+               half = 0.5 * (above - below);
   const auto energy = [&](double at) { return known_axial_equilibrium(e, at, false)->energy(); };
   const double low = energy(below), here = energy(below + half), high = energy(above);
   const RingBalance fresh{-(high - low) / (std::numbers::pi * std::numbers::pi * half), high - 2 * here + low > 0};

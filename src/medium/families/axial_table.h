@@ -1,5 +1,6 @@
 #pragma once
-// A droplet's equilibrium, read at any place in the upper half: theta less axial_boundary_angle(), with slopes by place, field and ring.
+// A droplet's equilibrium, read at any place in the upper half: theta less axial_boundary_angle(), with slopes by
+// place, field and ring.
 
 #include <algorithm>
 #include <array>
@@ -10,19 +11,22 @@
 
 namespace birefit {
 
-/// The angle less axial_boundary_angle(), rad, at (r, polar angle), with slopes up to kOrder (0 to 2) by place; of order 1 on also by e and ring,
-/// [0] and [1], at a fixed place, and those by place with one order less. What is beyond the order is left empty.
+/// The angle less axial_boundary_angle(), rad, at (r, polar angle), with slopes up to kOrder (0 to 2) by place; of
+/// order 1 on also by e and ring, [0] and [1], at a fixed place, and those by place with one order less. What is beyond
+/// the order is left empty.
 template <class P, int kOrder>
 struct AxialChange {
   P value, by_r, by_polar, by_r2, by_r_polar, by_polar2;
   std::array<P, 2> by, by_r_and, by_polar_and;
 };
 
-/// The elements' polynomials, values of one element next to each other: a row of six, padded to a register, for each of its six radii.
+/// The elements' polynomials, values of one element next to each other: a row of six, padded to a register, for each of
+/// its six radii.
 class AxialTable {
  public:
   /// `slopes`: whether read() is asked for those by e and ring; the equilibrium must have them.
-  AxialTable(const AxialEquilibrium& equilibrium, bool has_ring, bool slopes) : elements_(equilibrium.grid.elements), planes_(slopes ? has_ring ? 3 : 2 : 1) {
+  AxialTable(const AxialEquilibrium& equilibrium, bool has_ring, bool slopes)
+      : elements_(equilibrium.grid.elements), planes_(slopes ? has_ring ? 3 : 2 : 1) {
     Dual<double, 2> e(equilibrium.e), ring(equilibrium.ring);
     e.d[0] = ring.d[1] = 1;
     const AxialGrid& grid = equilibrium.grid;
@@ -44,9 +48,11 @@ class AxialTable {
   /// r in [0, 1], polar angle in [0, pi/2]; P = double or Pack.
   template <class P, int kOrder>
   AxialChange<P, kOrder> read(const P& r, const P& polar) const {
-    const Along<P, kOrder> of_r = along<P, kOrder>(r, r_edges_, false), of_polar = along<P, kOrder>(polar, polar_edges_, true);
+    const Along<P, kOrder> of_r = along<P, kOrder>(r, r_edges_, false),
+                           of_polar = along<P, kOrder>(polar, polar_edges_, true);
     constexpr int n = std::is_same_v<P, double> ? 1 : kLanes;
-    // A lane's sums over an element: rows along the polar angle are added up first, weighted by the polynomials of r or their slopes.
+    // A lane's sums over an element: rows along the polar angle are added up first, weighted by the polynomials of r or
+    // their slopes.
     alignas(64) double block[n], of_r_lanes[kOrder + 1][kPoints][n], of_polar_lanes[n][kOrder + 1][kRow] = {};
     put(P((of_r.element * P(elements_) + of_polar.element) * P(kPoints * kRow)), block);
     for (int order = 0; order <= kOrder; ++order)
@@ -59,10 +65,12 @@ class AxialTable {
     // sum[plane][a][b]: with slopes of order a by r's coordinate and b by the polar angle's.
     alignas(64) double sum[3][kOrder + 1][kOrder + 1][n] = {};
     const auto add = [&]<int kMost>(int plane, int k) {
-      const double* row = values_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(block[k]);
+      const double* row =
+          values_.data() + static_cast<std::size_t>(plane) * plane_ + static_cast<std::size_t>(block[k]);
       Pack along_polar[kMost + 1][kChunks];
       for (int a = 0; a <= kMost; ++a)
-        for (int c = 0; c < kChunks; ++c) along_polar[a][c] = Pack(of_r_lanes[a][0][k]) * Pack::load_aligned(row + c * kLanes);
+        for (int c = 0; c < kChunks; ++c)
+          along_polar[a][c] = Pack(of_r_lanes[a][0][k]) * Pack::load_aligned(row + c * kLanes);
       for (int i = 1; i < kPoints; ++i)
         for (int c = 0; c < kChunks; ++c) {
           const Pack values = Pack::load_aligned(row + i * kRow + c * kLanes);
@@ -71,7 +79,8 @@ class AxialTable {
       for (int a = 0; a <= kMost; ++a)
         for (int b = 0; a + b <= kMost; ++b) {
           Pack products = along_polar[a][0] * Pack::load_aligned(of_polar_lanes[k][b]);
-          for (int c = 1; c < kChunks; ++c) products = products + along_polar[a][c] * Pack::load_aligned(of_polar_lanes[k][b] + c * kLanes);
+          for (int c = 1; c < kChunks; ++c)
+            products = products + along_polar[a][c] * Pack::load_aligned(of_polar_lanes[k][b] + c * kLanes);
           sum[plane][a][b][k] = sum_of_lanes(products);
         }
     };
@@ -86,7 +95,8 @@ class AxialTable {
     if constexpr (kOrder > 0) {
       const P a = of_r.scale, b = of_polar.scale;
       out.by_r = a * of(0, 1, 0), out.by_polar = b * of(0, 0, 1);
-      if constexpr (kOrder > 1) out.by_r2 = a * a * of(0, 2, 0), out.by_r_polar = a * b * of(0, 1, 1), out.by_polar2 = b * b * of(0, 0, 2);
+      if constexpr (kOrder > 1)
+        out.by_r2 = a * a * of(0, 2, 0), out.by_r_polar = a * b * of(0, 1, 1), out.by_polar2 = b * b * of(0, 0, 2);
       for (std::size_t q = 0; q < 2; ++q) {
         const int plane = static_cast<int>(q) + 1;
         out.by[q] = out.by_r_and[q] = out.by_polar_and[q] = P(0.0);
@@ -95,8 +105,10 @@ class AxialTable {
         const P moves_r = of_r.moves[q], moves_polar = of_polar.moves[q];
         out.by[q] = of(plane, 0, 0) + out.by_r * moves_r + out.by_polar * moves_polar;
         if constexpr (kOrder > 1) {
-          out.by_r_and[q] = a * of(plane, 1, 0) + out.by_r2 * moves_r + out.by_r_polar * moves_polar - out.by_r * of_r.wider[q];
-          out.by_polar_and[q] = b * of(plane, 0, 1) + out.by_r_polar * moves_r + out.by_polar2 * moves_polar - out.by_polar * of_polar.wider[q];
+          out.by_r_and[q] =
+              a * of(plane, 1, 0) + out.by_r2 * moves_r + out.by_r_polar * moves_polar - out.by_r * of_r.wider[q];
+          out.by_polar_and[q] = b * of(plane, 0, 1) + out.by_r_polar * moves_r + out.by_polar2 * moves_polar -
+                                out.by_polar * of_polar.wider[q];
         }
       }
     }
@@ -110,16 +122,20 @@ class AxialTable {
   static void put(const Pack& x, double* out) { x.store_aligned(out); }
   template <class P>
   static P get(const double* from) {
-    if constexpr (std::is_same_v<P, double>) return from[0];
-    else return Pack::load_aligned(from);
+    if constexpr (std::is_same_v<P, double>)
+      return from[0];
+    else
+      return Pack::load_aligned(from);
   }
 
-  /// Where a place lies along one coordinate, and the six polynomials of its element with their slopes by the element's own coordinate.
+  /// Where a place lies along one coordinate, and the six polynomials of its element with their slopes by the element's
+  /// own coordinate.
   template <class P, int kOrder>
   struct Along {
     P element, scale;  ///< number from 0; slope of its coordinate by the place
     P polynomial[kOrder + 1][kPoints];
-    std::array<P, 2> moves, wider;  ///< by e and ring: of the coordinate at a fixed place, in units of the place, and of the element's width, relative
+    /// by e and ring: of the coordinate at a fixed place, in units of the place, and of the element's width, relative
+    std::array<P, 2> moves, wider;
   };
   template <class P, int kOrder>
   static Along<P, kOrder> along(const P& place, const std::vector<Dual<double, 2>>& edges, bool falling) {
@@ -138,7 +154,8 @@ class AxialTable {
       const Edge here = edge(k), next = edge(k + 1);
       from.value = select(beyond, here.value, from.value), to.value = select(beyond, next.value, to.value);
       if constexpr (kOrder > 0)
-        for (std::size_t q = 0; q < 2; ++q) from.d[q] = select(beyond, here.d[q], from.d[q]), to.d[q] = select(beyond, next.d[q], to.d[q]);
+        for (std::size_t q = 0; q < 2; ++q)
+          from.d[q] = select(beyond, here.d[q], from.d[q]), to.d[q] = select(beyond, next.d[q], to.d[q]);
       out.element = select(beyond, P(static_cast<double>(k)), out.element);
     }
     const P over_width = inverse(P(to.value - from.value)), away = place - from.value;
@@ -167,7 +184,8 @@ class AxialTable {
       for (int order = 1; order <= kOrder; ++order) p[order] = P(0.0);
       for (std::size_t m = 0; m < kPoints; ++m) {
         if (m == i) continue;
-        for (int order = kOrder; order > 0; --order) p[order] = p[order] * factor[m] + P(static_cast<double>(order)) * p[order - 1];
+        for (int order = kOrder; order > 0; --order)
+          p[order] = p[order] * factor[m] + P(static_cast<double>(order)) * p[order - 1];
         p[0] = p[0] * factor[m];
       }
       for (int order = 0; order <= kOrder; ++order) out.polynomial[order][i] = p[order];
@@ -178,7 +196,8 @@ class AxialTable {
   int elements_, planes_;
   std::vector<Dual<double, 2>> r_edges_, polar_edges_;  ///< with slopes by e and ring
   std::size_t plane_ = 0;
-  std::vector<double, xsimd::aligned_allocator<double, 64>> values_;  ///< [plane: value, by e, by ring][element of r][of polar angle][radius][kRow]
+  /// [plane: value, by e, by ring][element of r][of polar angle][radius][kRow]
+  std::vector<double, xsimd::aligned_allocator<double, 64>> values_;
 };
 
 }  // namespace birefit

@@ -1,6 +1,6 @@
 #pragma once
-// Director fields in a sphere that have no symmetry about the viewing axis, along a refracted straight ray: bipolar, a field
-// in the image plane, the gap between two spheres. Positions in radii of the sphere, axes of docs/conventions.md.
+// Director fields in a sphere that have no symmetry about the viewing axis, along a refracted straight ray: bipolar, a
+// field in the image plane, the gap between two spheres. Positions in radii of the sphere, axes of docs/conventions.md.
 
 #include <memory>
 #include <span>
@@ -27,18 +27,21 @@ struct RadialField {
   }
 };
 
-/// Tangential anchoring, poles at +-pole_distance on `axis`: along the circles through both poles (Williams, J. Phys. A 19, 3211
-/// (1986)). Pole distance 1: boojums on the surface; far away: uniform. Not a solution of the elastic equations.
+/// Tangential anchoring, poles at +-pole_distance on `axis`: along the circles through both poles (Williams, J. Phys. A
+/// 19, 3211 (1986)). Pole distance 1: boojums on the surface; far away: uniform. Not a solution of the elastic
+/// equations.
 template <class S>
 struct BipolarField {
   Vec3<S> axis;
   S pole_distance;
   template <class T>
   Vec3<T> at(const Vec3<T>& r) const {
-    // (a^2 + rho^2 - w^2) u - 2 w rho with rho = r - w u: (a^2 + r^2) u - 2 w r. The small number keeps the poles finite.
+    // (a^2 + rho^2 - w^2) u - 2 w rho with rho = r - w u: (a^2 + r^2) u - 2 w r. The small number keeps the poles
+    // finite.
     const T twice_w = 2.0 * (r.x * axis.x + r.y * axis.y + r.z * axis.z);
     const T along = dot(r, r) + S(pole_distance * pole_distance + 1e-12);
-    return normalized(Vec3<T>{along * axis.x - twice_w * r.x, along * axis.y - twice_w * r.y, along * axis.z - twice_w * r.z});
+    return normalized(
+        Vec3<T>{along * axis.x - twice_w * r.x, along * axis.y - twice_w * r.y, along * axis.z - twice_w * r.z});
   }
 };
 
@@ -61,13 +64,15 @@ struct TiltedAxialField {
   }
 };
 
-/// Normal anchoring on the unit sphere and on one of radius `core` about `offset`: normals of the spheres nested between the
-/// two, |r - s offset| = 1 - s (1 - core), s in [0, 1]. Normal to both surfaces and smooth; not an elastic equilibrium.
+/// Normal anchoring on the unit sphere and on one of radius `core` about `offset`: normals of the spheres nested
+/// between the two, |r - s offset| = 1 - s (1 - core), s in [0, 1]. Normal to both surfaces and smooth; not an elastic
+/// equilibrium.
 template <class S>
 struct NestedField {
   Vec3<S> offset;
   S core;
-  bool core_left_out = false;  ///< rays find the wall's director go on within the core: what is seen beside it, continued smoothly
+  /// rays find the wall's director go on within the core: what is seen beside it, continued smoothly
+  bool core_left_out = false;
   template <class T>
   Vec3<T> at(const Vec3<T>& r) const {
     const S wall = 1.0 - core, a = dot(offset, offset) - wall * wall;
@@ -80,24 +85,27 @@ struct NestedField {
   }
 };
 
-/// Where a ray, of BallRay's geometry, passes the core's middle: across the ray in its frame (t, phi), that turned back into the picture, in radii
-/// of the core. Of length 1 where it touches the core. `reach`, in radii of the sphere, along the azimuth of the image point, less the offset:
-/// (impact t - offset).t = reach - offset.rho, as t - rho = (cos d - 1) rho + sin d z.
+/// Where a ray, of BallRay's geometry, passes the core's middle: across the ray in its frame (t, phi), that turned back
+/// into the picture, in radii of the core. Of length 1 where it touches the core. `reach`, in radii of the sphere,
+/// along the azimuth of the image point, less the offset: (impact t - offset).t = reach - offset.rho, as t - rho = (cos
+/// d - 1) rho + sin d z.
 template <class S>
-S reach_at_core(const NestedField<S>& f, const S& impact, const S& sin_deflection, const S& cos_deflection, const S& cos_azimuth, const S& sin_azimuth) {
-  return impact + (1.0 - cos_deflection) * (f.offset.x * cos_azimuth + f.offset.y * sin_azimuth) - sin_deflection * f.offset.z;
+S reach_at_core(const NestedField<S>& f, const S& impact, const S& sin_deflection, const S& cos_deflection,
+                const S& cos_azimuth, const S& sin_azimuth) {
+  return impact + (1.0 - cos_deflection) * (f.offset.x * cos_azimuth + f.offset.y * sin_azimuth) -
+         sin_deflection * f.offset.z;
 }
 
 template <class S>
 using BallField = std::variant<BipolarField<S>, TiltedAxialField<S>, NestedField<S>>;
 
-/// A straight piece through the unit sphere: r(s) = impact t + s k, |s| < half, with t = cos d rho + sin d z, k = cos d z - sin d rho
-/// (d: deflection inside, rho: the direction of the image point), seen in the frame (t, phi, k).
+/// A straight piece through the unit sphere: r(s) = impact t + s k, |s| < half, with t = cos d rho + sin d z, k = cos d
+/// z - sin d rho (d: deflection inside, rho: the direction of the image point), seen in the frame (t, phi, k).
 template <class S>
 struct BallRay {
-  S impact, half;                        ///< in radii
+  S impact, half;  ///< in radii
   S sin_deflection, cos_deflection;
-  S cos_azimuth, sin_azimuth;            ///< of the image point
+  S cos_azimuth, sin_azimuth;  ///< of the image point
   S radius_um;
 };
 
@@ -109,13 +117,14 @@ std::vector<double> ball_breaks(const Field& field) {
   return {0.5};
 }
 
-/// u in [0, 1/2] runs from the entry to the core or, where there is none on the way, to the middle; the rest to the exit. What
-/// lies in the core does not retard. Nodes crowd at a defect in the middle; at a ring of defects, to which a ray comes close twice, at
-/// u = 1/4 and 3/4, as far as it passes.
+/// u in [0, 1/2] runs from the entry to the core or, where there is none on the way, to the middle; the rest to the
+/// exit. What lies in the core does not retard. Nodes crowd at a defect in the middle; at a ring of defects, to which a
+/// ray comes close twice, at u = 1/4 and 3/4, as far as it passes.
 template <class S, class Field>
 class BallColumn final : public Column<S> {
  public:
-  BallColumn(const Field& field, const BallRay<S>& ray, const S& ordinary, const S& extraordinary) : field_(field), ray_(ray), eo_(ordinary), ee_(extraordinary) {
+  BallColumn(const Field& field, const BallRay<S>& ray, const S& ordinary, const S& extraordinary)
+      : field_(field), ray_(ray), eo_(ordinary), ee_(extraordinary) {
     this->breaks = ball_breaks(field);
     before_ = after_ = S(0.0);
     q_ = S(30.0);  // all but linear
@@ -123,8 +132,10 @@ class BallColumn final : public Column<S> {
     z_ = ray.sin_deflection * ray.impact;
     if constexpr (std::is_same_v<Field, NestedField<S>>) {
       // |impact t + s k - offset| = core.
-      const Vec3<S> t = rho_z(ray_.cos_deflection, ray_.sin_deflection), k = rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection);
-      const Vec3<S> away{ray_.impact * t.x - field.offset.x, ray_.impact * t.y - field.offset.y, ray_.impact * t.z - field.offset.z};
+      const Vec3<S> t = rho_z(ray_.cos_deflection, ray_.sin_deflection),
+                    k = rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection);
+      const Vec3<S> away{ray_.impact * t.x - field.offset.x, ray_.impact * t.y - field.offset.y,
+                         ray_.impact * t.z - field.offset.z};
       const S h = away.x * k.x + away.y * k.y + away.z * k.z;
       const S c = away.x * away.x + away.y * away.y + away.z * away.z - field.core * field.core;
       const S half_way = field.core_left_out ? S(0.0) : root(max_of(h * h - c, S(1e-14)));
@@ -133,12 +144,17 @@ class BallColumn final : public Column<S> {
     } else if constexpr (std::is_same_v<Field, TiltedAxialField<S>>) {
       q_ = 4.0 * ray_.impact * inverse(ray_.half) + 0.05;  // the defect or the wall's middle
       if (field.field->has_ring()) {
-        const Vec3<S> t = rho_z(ray_.cos_deflection, ray_.sin_deflection), k = rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection);
-        const auto along_axis = [&](const Vec3<S>& v) { return v.x * field.axis.x + v.y * field.axis.y + v.z * field.axis.z; };
+        const Vec3<S> t = rho_z(ray_.cos_deflection, ray_.sin_deflection),
+                      k = rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection);
+        const auto along_axis = [&](const Vec3<S>& v) {
+          return v.x * field.axis.x + v.y * field.axis.y + v.z * field.axis.z;
+        };
         // In front of and behind the middle, where the ray is as far from the axis as the ring is, or nearest to that:
         // impact^2 + s^2 - (above + s lean)^2 = ring^2.
         const S above = ray_.impact * along_axis(t), lean = along_axis(k), over = inverse(S(1.0 - lean * lean + 1e-6));
-        const S square = (field.field->ring() * field.field->ring() - ray_.impact * ray_.impact + above * above) * over + (above * lean * over) * (above * lean * over);
+        const S square =
+            (field.field->ring() * field.field->ring() - ray_.impact * ray_.impact + above * above) * over +
+            (above * lean * over) * (above * lean * over);
         const S away = root(max_of(square, S(1e-6))), middle = above * lean * over;
         for (int side = 0; side < 2; ++side) {
           RingSide& r = sides_[side];
@@ -154,7 +170,8 @@ class BallColumn final : public Column<S> {
     }
   }
   void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
-    for (std::size_t i = 0; i < u.size(); ++i) ::new (static_cast<void*>(out + i)) OpticalPoint<S>(at<S>(S(u[i]), u[i]));
+    for (std::size_t i = 0; i < u.size(); ++i)
+      ::new (static_cast<void*>(out + i)) OpticalPoint<S>(at<S>(S(u[i]), u[i]));
   }
   void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
     for (std::size_t i = 0; i < u.size(); ++i) {
@@ -171,7 +188,10 @@ class BallColumn final : public Column<S> {
     const bool first = where < 0.5;
     if (ring_) {
       const bool outer = where < 0.25 || where >= 0.75;
-      const T x = where < 0.25 ? 1.0 - 4.0 * u : where < 0.5 ? 4.0 * u - 1.0 : where < 0.75 ? 3.0 - 4.0 * u : 4.0 * u - 3.0;
+      const T x = where < 0.25   ? 1.0 - 4.0 * u
+                  : where < 0.5  ? 4.0 * u - 1.0
+                  : where < 0.75 ? 3.0 - 4.0 * u
+                                 : 4.0 * u - 3.0;
       // The director turns on the length of the distance: steps as long as they are far, distance = passes sinh(a x).
       const RingSide& r = sides_[first ? 0 : 1];
       const S& a = outer ? r.outer : r.inner;
@@ -184,7 +204,8 @@ class BallColumn final : public Column<S> {
     const S reach = (first ? S(ray_.half + before_) : S(ray_.half - after_)) * q_, end = q_ + 1.0;
     const T f = inverse(T(end - x));
     const T distance = reach * (x * f);
-    return seen_at<T>(first ? T(from - distance) : T(from + distance), T((2.0 * reach * end * ray_.radius_um) * (f * f)));
+    return seen_at<T>(first ? T(from - distance) : T(from + distance),
+                      T((2.0 * reach * end * ray_.radius_um) * (f * f)));
   }
   template <class T>
   OpticalPoint<T> seen_at(const T& s, const T& slope) const {
@@ -200,8 +221,9 @@ class BallColumn final : public Column<S> {
   S eo_, ee_, before_, after_, q_;
   S rho_, z_;  ///< of the ray's point nearest to the middle
   struct RingSide {
-    S at = S(0.0), passes = S(0.0);     ///< distances (radii): of the closest place from the middle, of the ring from there
-    S outer = S(0.0), inner = S(0.0);   ///< asinh of how many of the latter there are to the surface and to the middle
+    /// distances (radii): of the closest place from the middle, of the ring from there
+    S at = S(0.0), passes = S(0.0);
+    S outer = S(0.0), inner = S(0.0);  ///< asinh of how many of the latter there are to the surface and to the middle
   };
   RingSide sides_[2];
   bool ring_ = false;

@@ -9,15 +9,15 @@
 
 namespace birefit {
 
-/// The part of a plane stress that retards light: sxx - syy and 2 sxy. Its length is the difference of the principal stresses,
-/// its direction twice their azimuth; unlike these two it is smooth where the principal stresses are equal.
+/// The part of a plane stress that retards light: sxx - syy and 2 sxy. Its length is the difference of the principal
+/// stresses, its direction twice their azimuth; unlike these two it is smooth where the principal stresses are equal.
 template <class S>
 struct StressPair {
   S normal, shear;
 };
 
-/// Forces P at (0, R) and (0, -R) pressing inwards, thickness t; x, y in units of R, stress in units of P/(t R), tension
-/// positive. Infinite at the forces themselves, where 1e-12 keeps the numbers finite.
+/// Forces P at (0, R) and (0, -R) pressing inwards, thickness t; x, y in units of R, stress in units of P/(t R),
+/// tension positive. Infinite at the forces themselves, where 1e-12 keeps the numbers finite.
 template <class S>
 BIREFIT_INLINE StressPair<S> diametral_stress(const S& x, const S& y) {
   const S up = 1.0 - y, down = 1.0 + y, xx = x * x, uu = up * up, dd = down * down;

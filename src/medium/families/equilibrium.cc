@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// ---- the start -----------------------------------------------------------------------------------------------------------
+// ---- the start -----------------------------------------------------------------------------------------------------
 
 /// Complete elliptic integral K by the arithmetic-geometric mean, from 1 - m.
 double complete_k(double one_minus_m) {
@@ -48,8 +48,9 @@ double amplitude(double x, double one_minus_m) {
   return phi;
 }
 
-/// Angle from the anchored direction at depth zeta, at V/Vth = v, of one constant, a uniform field and a pretilt: a start, no
-/// more. v > 1: sin t = sqrt(m) sn(2 K zeta), K(m) = pi v / 2; below, the cubic amplitude equation of the pretilted cell.
+/// Angle from the anchored direction at depth zeta, at V/Vth = v, of one constant, a uniform field and a pretilt: a
+/// start, no more. v > 1: sin t = sqrt(m) sn(2 K zeta), K(m) = pi v / 2; below, the cubic amplitude equation of the
+/// pretilted cell.
 class EllipticStart {
  public:
   EllipticStart(double v, double pretilt) : pretilt_(pretilt) {
@@ -71,8 +72,11 @@ class EllipticStart {
     }
   }
   double at(double zeta) const {
-    const double swing = quarter_ > 0 ? std::asin(std::clamp(std::sqrt(1 - one_minus_m_) * std::sin(amplitude(2 * quarter_ * zeta, one_minus_m_)), 0.0, 1.0))
-                                      : swing_ * std::sin(kPi * zeta);
+    const double swing =
+        quarter_ > 0
+            ? std::asin(std::clamp(std::sqrt(1 - one_minus_m_) * std::sin(amplitude(2 * quarter_ * zeta, one_minus_m_)),
+                                   0.0, 1.0))
+            : swing_ * std::sin(kPi * zeta);
     return pretilt_ + (1 - pretilt_ * 2 / kPi) * swing;
   }
 
@@ -80,9 +84,10 @@ class EllipticStart {
   double pretilt_, one_minus_m_ = 1, quarter_ = 0, swing_ = 0;
 };
 
-// ---- the discrete energy -------------------------------------------------------------------------------------------------
+// ---- the discrete energy -------------------------------------------------------------------------------------------
 
-/// Density at one point without the electric part: its derivatives by t, t', f' and those of q = sin^2 t / (1 + gamma sin^2 t).
+/// Density at one point without the electric part: its derivatives by t, t', f' and those of q = sin^2 t / (1 + gamma
+/// sin^2 t).
 template <class R>
 struct Density {
   R e, e_t, e_tp, e_fp;
@@ -128,8 +133,12 @@ Density<R> density(const CellForces<R>& p, const R& t, const R& tp, const R& fp)
 /// Symmetric positive definite band, one row after another: entry (i, j), i - width <= j <= i.
 class SymmetricBand {
  public:
-  SymmetricBand(int size, int width) : size_(size), width_(width), a_(static_cast<std::size_t>(size) * static_cast<std::size_t>(width + 1), 0.0) {}
-  double& operator()(int i, int j) { return a_[static_cast<std::size_t>(i) * static_cast<std::size_t>(width_ + 1) + static_cast<std::size_t>(j - i + width_)]; }
+  SymmetricBand(int size, int width)
+      : size_(size), width_(width), a_(static_cast<std::size_t>(size) * static_cast<std::size_t>(width + 1), 0.0) {}
+  double& operator()(int i, int j) {
+    return a_[static_cast<std::size_t>(i) * static_cast<std::size_t>(width_ + 1) +
+              static_cast<std::size_t>(j - i + width_)];
+  }
   double operator()(int i, int j) const { return const_cast<SymmetricBand&>(*this)(i, j); }
   /// Cholesky's factor in place; false when not positive definite.
   bool factor() {
@@ -186,7 +195,8 @@ struct Slopes {
 
 /// The part of one element in the Hessian by the inner nodes' unknowns.
 template <bool kTwisted>
-void add_element(const DirectorMesh& mesh, int e, const Density<double>* points, double electric, SymmetricBand& hessian) {
+void add_element(const DirectorMesh& mesh, int e, const Density<double>* points, double electric,
+                 SymmetricBand& hessian) {
   constexpr int kMost = 21, kEach = kTwisted ? 2 : 1;  // nodes of an element
   // By (t'_i, t'_j), (f'_i, f'_j), (t_k, t'_j), (t_k, f'_j).
   std::array<double, kMost * kMost> tptp{}, fpfp{}, ttp, tfp;
@@ -198,7 +208,8 @@ void add_element(const DirectorMesh& mesh, int e, const Density<double>* points,
     std::array<double, kMost> slope;
     for (int j = 0; j < n; ++j) slope[static_cast<std::size_t>(j)] = mesh.slope(k, j) * scale;
     for (int i = 0; i < n; ++i) {
-      const double of_t = w * points[k].tptp * slope[static_cast<std::size_t>(i)], of_f = kTwisted ? w * points[k].fpfp * slope[static_cast<std::size_t>(i)] : 0;
+      const double of_t = w * points[k].tptp * slope[static_cast<std::size_t>(i)],
+                   of_f = kTwisted ? w * points[k].fpfp * slope[static_cast<std::size_t>(i)] : 0;
       double *t = &tptp[at(i, 0)], *f = &fpfp[at(i, 0)];
       for (int j = 0; j < n; ++j) t[j] += of_t * slope[static_cast<std::size_t>(j)];
       if constexpr (kTwisted)
@@ -224,7 +235,8 @@ void add_element(const DirectorMesh& mesh, int e, const Density<double>* points,
 }
 
 template <bool kTwisted, class R>
-Slopes<R> slopes(const CellForces<R>& p, const DirectorMesh& mesh, const std::vector<R>& t, const std::vector<R>& f, SymmetricBand* hessian) {
+Slopes<R> slopes(const CellForces<R>& p, const DirectorMesh& mesh, const std::vector<R>& t, const std::vector<R>& f,
+                 SymmetricBand* hessian) {
   constexpr int kEach = kTwisted ? 2 : 1;
   const int n = mesh.degree() + 1, inner = mesh.nodes() - 2;
   Slopes<R> r;
@@ -290,7 +302,8 @@ struct Newton {
     band_pull = pull;
     band.solve(band_pull);
   }
-  double room() const { return 1 + curvature * dot(pull, band_pull); }  ///< > 0: positive definite with the rank-one part
+  /// > 0: positive definite with the rank-one part
+  double room() const { return 1 + curvature * dot(pull, band_pull); }
   /// H x = b by Sherman and Morrison.
   void solve(std::vector<double>& b, bool with_rank_one = true) const {
     band.solve(b);
@@ -308,7 +321,8 @@ double curvature_by_q(const CellForces<double>& p, double q) {
 int band_width(const DirectorMesh& mesh, bool twisted) { return twisted ? 2 * mesh.degree() + 1 : mesh.degree(); }
 
 template <bool kTwisted>
-DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, std::vector<double> t, std::vector<double> f) {
+DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, std::vector<double> t,
+                       std::vector<double> f) {
   constexpr int kEach = kTwisted ? 2 : 1;
   constexpr int kMostIterations = 200;
   const int unknowns = (mesh.nodes() - 2) * kEach;
@@ -316,14 +330,16 @@ DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, st
   double before = 1;
   const auto moved = [&](const std::vector<double>& from, const std::vector<double>& step, double share, int offset) {
     std::vector<double> to = from;
-    for (int i = 0; i < mesh.nodes() - 2; ++i) to[static_cast<std::size_t>(i + 1)] += share * step[static_cast<std::size_t>(i * kEach + offset)];
+    for (int i = 0; i < mesh.nodes() - 2; ++i)
+      to[static_cast<std::size_t>(i + 1)] += share * step[static_cast<std::size_t>(i * kEach + offset)];
     return to;
   };
   for (int iteration = 1; iteration <= kMostIterations; ++iteration) {
     SymmetricBand band(unknowns, band_width(mesh, kTwisted));
     const Slopes<double> here = slopes<kTwisted, double>(p, mesh, t, f, &band);
     Newton newton(band, here.pull, curvature_by_q(p, here.q));
-    for (double shift = 1e-3; !newton.band.factor(); shift *= 10) {  // away from the minimum: steepest descent, the more the worse
+    // away from the minimum: steepest descent, the more the worse
+    for (double shift = 1e-3; !newton.band.factor(); shift *= 10) {
       newton.band = band;
       newton.band.add_to_diagonal(shift);
     }
@@ -342,7 +358,9 @@ DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, st
     const bool last = largest < 1e-5;
     std::vector<double> next_t = moved(t, step, share, 0), next_f = kTwisted ? moved(f, step, share, 1) : f;
     for (int halvings = 0; !last && halvings < 60; ++halvings) {
-      if (slopes<kTwisted, double>(p, mesh, next_t, next_f, nullptr).energy <= here.energy + 1e-4 * share * descent + 1e-13 * std::abs(here.energy)) break;
+      if (slopes<kTwisted, double>(p, mesh, next_t, next_f, nullptr).energy <=
+          here.energy + 1e-4 * share * descent + 1e-13 * std::abs(here.energy))
+        break;
       share *= 0.5;
       next_t = moved(t, step, share, 0);
       if (kTwisted) next_f = moved(f, step, share, 1);
@@ -350,7 +368,8 @@ DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, st
     t = std::move(next_t);
     f = std::move(next_f);
     result.energy = here.energy;
-    // Near the normal the azimuth is known to rounding over cos^2 of the tilt: steps that no longer shrink are its last digits.
+    // Near the normal the azimuth is known to rounding over cos^2 of the tilt: steps that no longer shrink are its last
+    // digits.
     const bool done = largest < 1e-11 || (last && largest > 0.25 * before);
     before = largest;
     if (done) {
@@ -368,8 +387,9 @@ void tangents(const CellForces<Dual<double, N>>& p, const DirectorMesh& mesh, co
               std::vector<std::array<double, N>>& tilt, std::vector<std::array<double, N>>& azimuth) {
   constexpr int kEach = kTwisted ? 2 : 1;
   using D = Dual<double, N>;
-  CellForces<double> plain_forces{p.k33.value, p.k22.value, p.gamma.value, p.drive.value, p.chirality.value,
-                                  p.tilt_entry.value, p.tilt_exit.value, p.twist.value, p.twisted};
+  CellForces<double> plain_forces{p.k33.value,       p.k22.value,       p.gamma.value,
+                                  p.drive.value,     p.chirality.value, p.tilt_entry.value,
+                                  p.tilt_exit.value, p.twist.value,     p.twisted};
   const int unknowns = (mesh.nodes() - 2) * kEach;
   SymmetricBand band(unknowns, band_width(mesh, kTwisted));
   const Slopes<double> here = slopes<kTwisted, double>(plain_forces, mesh, solution.tilt, solution.azimuth, &band);
@@ -386,8 +406,10 @@ void tangents(const CellForces<Dual<double, N>>& p, const DirectorMesh& mesh, co
   for (std::size_t d = 0; d < static_cast<std::size_t>(N); ++d) {
     std::vector<double> change(static_cast<std::size_t>(unknowns));
     for (std::size_t i = 0; i < change.size(); ++i) change[i] = -moved.gradient[i].d[d];
-    if (stable) newton.solve(change);
-    else std::fill(change.begin(), change.end(), 0.0);  // at the very threshold of a cell without pretilt no slope exists
+    if (stable)
+      newton.solve(change);
+    else
+      std::fill(change.begin(), change.end(), 0.0);  // at the very threshold of a cell without pretilt no slope exists
     for (std::size_t i = 0; i + 2 < t.size(); ++i) {
       tilt[i + 1][d] = change[i * kEach];
       if constexpr (kTwisted) azimuth[i + 1][d] = change[i * kEach + 1];
@@ -426,13 +448,16 @@ DirectorMesh::DirectorMesh(int elements, int degree) : degree_(degree) {
     weight_.push_back(2 / (degree * n * p * p));
   }
   std::vector<double> legendre(static_cast<std::size_t>(n));  // P_degree at the points
-  for (int i = 0; i < n; ++i) legendre[static_cast<std::size_t>(i)] = std::sqrt(2 / (degree * n * weight_[static_cast<std::size_t>(i)])) * ((degree - i) % 2 ? -1 : 1);
+  for (int i = 0; i < n; ++i)
+    legendre[static_cast<std::size_t>(i)] =
+        std::sqrt(2 / (degree * n * weight_[static_cast<std::size_t>(i)])) * ((degree - i) % 2 ? -1 : 1);
   slope_.assign(static_cast<std::size_t>(n * n), 0.0);
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j) {
       double& d = slope_[static_cast<std::size_t>(k * n + j)];
       if (k != j)
-        d = legendre[static_cast<std::size_t>(k)] / legendre[static_cast<std::size_t>(j)] / (point_[static_cast<std::size_t>(k)] - point_[static_cast<std::size_t>(j)]);
+        d = legendre[static_cast<std::size_t>(k)] / legendre[static_cast<std::size_t>(j)] /
+            (point_[static_cast<std::size_t>(k)] - point_[static_cast<std::size_t>(j)]);
       else if (k == 0)
         d = -0.25 * degree * n;
       else if (k == degree)
@@ -467,13 +492,16 @@ namespace {
 DirectorSolution solve_from_start(const CellForces<double>& p, const DirectorMesh& mesh) {
   std::vector<double> t, f;
   const double entry = p.tilt_entry, exit = p.tilt_exit;
-  // What a planar cell does for deps > 0 a homeotropic one does for deps < 0, with bend for splay, measured from the normal.
+  // What a planar cell does for deps > 0 a homeotropic one does for deps < 0, with bend for splay, measured from the
+  // normal.
   const bool falls = p.drive < 0;
   double stiffness = falls ? p.k33 : 1;
-  if (p.twisted && !falls) stiffness += ((p.k33 - 2 * p.k22) * p.twist * p.twist + 2 * p.k22 * p.chirality * p.twist) / (kPi * kPi);
+  if (p.twisted && !falls)
+    stiffness += ((p.k33 - 2 * p.k22) * p.twist * p.twist + 2 * p.k22 * p.chirality * p.twist) / (kPi * kPi);
   const double v = std::sqrt(std::abs(p.drive) / std::max(stiffness, 1e-2)) / kPi;
   const bool even = std::abs(entry - exit) < 0.5;
-  const double mean = 0.5 * (entry + exit), side = falls ? (mean > kPi / 2 ? -1 : 1) : (mean < 0 ? -1 : 1), upright = kPi / 2;
+  const double mean = 0.5 * (entry + exit), side = falls ? (mean > kPi / 2 ? -1 : 1) : (mean < 0 ? -1 : 1),
+               upright = kPi / 2;
   const EllipticStart start(even ? v : 0, side * (falls ? upright - mean : mean));
   for (int i = 0; i < mesh.nodes(); ++i) {
     const double zeta = mesh.place(i), linear = entry + (exit - entry) * zeta;
@@ -503,8 +531,8 @@ DirectorSolution solve_from_start(const CellForces<double>& p, const DirectorMes
   return solve<true>(p, mesh, std::move(t), std::move(f));
 }
 
-/// Solutions of the latest few thousand forces. Plans, passes over groups of derivatives and changes of anything but the
-/// director ask for the same one again and again; what is kept is what would be computed.
+/// Solutions of the latest few thousand forces. Plans, passes over groups of derivatives and changes of anything but
+/// the director ask for the same one again and again; what is kept is what would be computed.
 class SolutionCache {
  public:
   using Key = std::array<double, 9>;
@@ -536,7 +564,8 @@ class SolutionCache {
 DirectorSolution solve_director(const CellForces<double>& p, const DirectorMesh& mesh) {
   if (&mesh != &cell_mesh()) return solve_from_start(p, mesh);
   static SolutionCache cache;
-  const SolutionCache::Key key{p.k33, p.k22, p.gamma, p.drive, p.chirality, p.tilt_entry, p.tilt_exit, p.twist, p.twisted ? 1.0 : 0.0};
+  const SolutionCache::Key key{
+      p.k33, p.k22, p.gamma, p.drive, p.chirality, p.tilt_entry, p.tilt_exit, p.twist, p.twisted ? 1.0 : 0.0};
   DirectorSolution solution;
   if (cache.find(key, solution)) return solution;
   solution = solve_from_start(p, mesh);
@@ -545,16 +574,21 @@ DirectorSolution solve_director(const CellForces<double>& p, const DirectorMesh&
 }
 
 template <int N>
-void director_tangents(const CellForces<Dual<double, N>>& forces, const DirectorMesh& mesh, const DirectorSolution& solution,
-                       std::vector<std::array<double, N>>& tilt, std::vector<std::array<double, N>>& azimuth) {
+void director_tangents(const CellForces<Dual<double, N>>& forces, const DirectorMesh& mesh,
+                       const DirectorSolution& solution, std::vector<std::array<double, N>>& tilt,
+                       std::vector<std::array<double, N>>& azimuth) {
   if (forces.twisted)
     tangents<true, N>(forces, mesh, solution, tilt, azimuth);
   else
     tangents<false, N>(forces, mesh, solution, tilt, azimuth);
 }
-template void director_tangents<1>(const CellForces<Dual<double, 1>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 1>>&, std::vector<std::array<double, 1>>&);
-template void director_tangents<2>(const CellForces<Dual<double, 2>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 2>>&, std::vector<std::array<double, 2>>&);
-template void director_tangents<8>(const CellForces<Dual<double, 8>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 8>>&, std::vector<std::array<double, 8>>&);
-template void director_tangents<4>(const CellForces<Dual<double, 4>>&, const DirectorMesh&, const DirectorSolution&, std::vector<std::array<double, 4>>&, std::vector<std::array<double, 4>>&);
+template void director_tangents<1>(const CellForces<Dual<double, 1>>&, const DirectorMesh&, const DirectorSolution&,
+                                   std::vector<std::array<double, 1>>&, std::vector<std::array<double, 1>>&);
+template void director_tangents<2>(const CellForces<Dual<double, 2>>&, const DirectorMesh&, const DirectorSolution&,
+                                   std::vector<std::array<double, 2>>&, std::vector<std::array<double, 2>>&);
+template void director_tangents<8>(const CellForces<Dual<double, 8>>&, const DirectorMesh&, const DirectorSolution&,
+                                   std::vector<std::array<double, 8>>&, std::vector<std::array<double, 8>>&);
+template void director_tangents<4>(const CellForces<Dual<double, 4>>&, const DirectorMesh&, const DirectorSolution&,
+                                   std::vector<std::array<double, 4>>&, std::vector<std::array<double, 4>>&);
 
 }  // namespace birefit

@@ -28,7 +28,8 @@ CompleteElliptic<S> complete_elliptic(const S& k) {
 }
 
 /// azimuth = entry + am(rate u | k), handed as the pitch; am by its Fourier series (Abramowitz & Stegun 16.23.3),
-/// am(x) = pi x / (2 K) + sum 2 q^n / (n (1 + q^2n)) sin(n pi x / K), whose terms fall as q^n: 80 leave 1e-16 up to k = 1 - 1e-6.
+/// am(x) = pi x / (2 K) + sum 2 q^n / (n (1 + q^2n)) sin(n pi x / K), whose terms fall as q^n: 80 leave 1e-16 up to k =
+/// 1 - 1e-6.
 template <class S>
 struct UnwoundHelixLaw {
   static constexpr int kTerms = 80;
@@ -39,14 +40,16 @@ struct UnwoundHelixLaw {
   UnwoundHelixLaw(const S& pitch_um, const S& azimuth, const S& modulus, const S& o, const S& e, const S& thickness)
       : azimuth_rad(azimuth), ordinary(o), extraordinary(e), thickness_um(thickness) {
     const CompleteElliptic<S> elliptic = complete_elliptic(modulus);
-    // The nome exp(-pi K'/K) is even in k; its slope pi^2 q / (2 k k'^2 K^2) by hand, since that of K' is infinite at k = 0.
+    // The nome exp(-pi K'/K) is even in k; its slope pi^2 q / (2 k k'^2 K^2) by hand, since that of K' is infinite at k
+    // = 0.
     using P = PlainOf<S>;
     const P k = max_of(plain(modulus), P(1e-150)), rest = 1.0 - k * k, first = plain(elliptic.first);
     const P nome = exp(-std::numbers::pi * complete_elliptic<P>(sqrt(rest)).first / first);
     S q(nome);
     if constexpr (ScalarTraits<S>::derivatives > 0)
       q = modulus.chain(nome, (0.5 * std::numbers::pi * std::numbers::pi) * nome / (k * rest * first * first));
-    turn_rad = (0.5 * std::numbers::pi * std::numbers::pi * std::numbers::pi) * thickness / (pitch_um * elliptic.second * elliptic.first);
+    turn_rad = (0.5 * std::numbers::pi * std::numbers::pi * std::numbers::pi) * thickness /
+               (pitch_um * elliptic.second * elliptic.first);
     S power(1.0);
     for (int n = 1; n <= kTerms; ++n) {
       power = power * q;
@@ -65,7 +68,12 @@ struct UnwoundHelixLaw {
       after = next;
       next = here;
     }
-    return {axis_from_angles<T>(T(0.0), T(azimuth_rad) + angle + next * s), T(ordinary), T(extraordinary), T(0.0), T(0.0), T(thickness_um)};
+    return {axis_from_angles<T>(T(0.0), T(azimuth_rad) + angle + next * s),
+            T(ordinary),
+            T(extraordinary),
+            T(0.0),
+            T(0.0),
+            T(thickness_um)};
   }
 };
 

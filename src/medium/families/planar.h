@@ -34,13 +34,17 @@ struct TwistedLaw {
   S ordinary, extraordinary, thickness_um;
   template <class T>
   BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
-    return {axis_from_angles<T>(T(tilt_rad), T(azimuth_rad) + T(twist_rad) * u), T(ordinary), T(extraordinary),
-            T(0.0), T(0.0), T(thickness_um)};
+    return {axis_from_angles<T>(T(tilt_rad), T(azimuth_rad) + T(twist_rad) * u),
+            T(ordinary),
+            T(extraordinary),
+            T(0.0),
+            T(0.0),
+            T(thickness_um)};
   }
 };
 
-/// Temperature across a plate of one temperature, initial_k, whose faces are at cold_k (u = 0) and hot_k (u = 1) since the step:
-/// each face's step superposed.
+/// Temperature across a plate of one temperature, initial_k, whose faces are at cold_k (u = 0) and hot_k (u = 1) since
+/// the step: each face's step superposed.
 template <class S>
 struct HeatProfile {
   S fourier_number, cold_k, hot_k, initial_k;
@@ -62,8 +66,12 @@ struct HeatedLaw {
   template <class T>
   BIREFIT_INLINE OpticalPoint<T> at(const T& u) const {
     const T ne = e44_steinberg2020_extraordinary(heat.template at<T>(u));
-    return {{T(axis.x), T(axis.y), T(axis.z)}, T(kE44Steinberg2020Ordinary * kE44Steinberg2020Ordinary), ne * ne,
-            T(0.0), T(0.0), T(thickness_um)};
+    return {{T(axis.x), T(axis.y), T(axis.z)},
+            T(kE44Steinberg2020Ordinary * kE44Steinberg2020Ordinary),
+            ne * ne,
+            T(0.0),
+            T(0.0),
+            T(thickness_um)};
   }
 };
 

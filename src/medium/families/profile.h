@@ -22,8 +22,8 @@ class ProfileTable {
   const std::vector<double>& edges() const { return edges_; }  ///< of the pieces in u: 0 = first, 1 = last
 
   struct Piece {
-    double from;          ///< u at the start of the piece
-    double c[7][4];       ///< ax, ay, az, n_o, n_e, k_o, k_e as cubics in (u - from)
+    double from;     ///< u at the start of the piece
+    double c[7][4];  ///< ax, ay, az, n_o, n_e, k_o, k_e as cubics in (u - from)
   };
   const Piece& piece_at(double u) const {
     const auto it = std::upper_bound(edges_.begin() + 1, edges_.end() - 1, u);
@@ -47,8 +47,12 @@ struct ProfileLaw {
     T v[7];
     for (int i = 0; i < 7; ++i) v[i] = ((x * piece.c[i][3] + piece.c[i][2]) * x + piece.c[i][1]) * x + piece.c[i][0];
     // (n + i k)^2 = n^2 - k^2 + 2 i n k
-    return {normalized(Vec3<T>{v[0], v[1], v[2]}), v[3] * v[3] - v[5] * v[5], v[4] * v[4] - v[6] * v[6],
-            2.0 * v[3] * v[5], 2.0 * v[4] * v[6], T(table->thickness_um())};
+    return {normalized(Vec3<T>{v[0], v[1], v[2]}),
+            v[3] * v[3] - v[5] * v[5],
+            v[4] * v[4] - v[6] * v[6],
+            2.0 * v[3] * v[5],
+            2.0 * v[4] * v[6],
+            T(table->thickness_um())};
   }
 };
 

@@ -7,16 +7,21 @@
 namespace birefit {
 
 /// The chord inside a droplet of radius R: r = impact t + s k, |s| = S q w/(1 + q - w) with w = |2u - 1|, S = half
-/// chord, q = 4 impact/S + 0.01. The director of a hedgehog changes over a depth ~ impact; this map crowds w there at the
-/// price of one division (0.01 keeps it finite for the ray through the centre). Factors 0.5 to 4, offsets 0.01 to 0.4
-/// and sinh and cubic maps were compared; this one needs the fewest Magnus steps. Its kink at u = 1/2 must be a mesh node.
+/// chord, q = 4 impact/S + 0.01. The director of a hedgehog changes over a depth ~ impact; this map crowds w there at
+/// the price of one division (0.01 keeps it finite for the ray through the centre). Factors 0.5 to 4, offsets 0.01 to
+/// 0.4 and sinh and cubic maps were compared; this one needs the fewest Magnus steps. Its kink at u = 1/2 must be a
+/// mesh node.
 template <class S>
 struct Chord {
   S impact_um, radius_um, inverse_radius;
   S q, half_q;  // q and S q
 
   Chord(const S& impact, const S& half, const S& radius)
-      : impact_um(impact), radius_um(radius), inverse_radius(inverse(radius)), q(4.0 * impact * inverse(half) + 0.01), half_q(half * q) {}
+      : impact_um(impact),
+        radius_um(radius),
+        inverse_radius(inverse(radius)),
+        q(4.0 * impact * inverse(half) + 0.01),
+        half_q(half * q) {}
   /// Depth along the ray from the chord's middle and its slope d s / d u, for w = 2u - 1.
   template <class T>
   BIREFIT_INLINE void place(const T& w, T& s_um, T& slope_um) const {
@@ -78,7 +83,8 @@ struct TwistedRadialLaw {
     sin_cos(T(twist_rad) * (1.0 - r2 * inverse_r * T(chord.inverse_radius)), sn, cs);
     const T n_rho = cd * n_t - sd * n_k, n_z = sd * n_t + cd * n_k;  // droplet frame: outward, along its axis
     const T m_rho = n_rho * cs, m_phi = n_rho * sn;
-    return {{cd * m_rho + sd * n_z, m_phi, cd * n_z - sd * m_rho}, T(ordinary), T(extraordinary), T(0.0), T(0.0), slope};
+    return {
+        {cd * m_rho + sd * n_z, m_phi, cd * n_z - sd * m_rho}, T(ordinary), T(extraordinary), T(0.0), T(0.0), slope};
   }
 };
 

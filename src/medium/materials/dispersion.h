@@ -1,6 +1,6 @@
 #pragma once
-// Index of refraction against vacuum wavelength: the formulas of refractiveindex.info by their numbers there ("Dispersion
-// formulas" among the documents of its database), and tables. docs/methods.md, "Materials".
+// Index of refraction against vacuum wavelength: the formulas of refractiveindex.info by their numbers there
+// ("Dispersion formulas" among the documents of its database), and tables. docs/methods.md, "Materials".
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,9 @@ template <class S>
 S table_index(const std::vector<double>& xs, const std::vector<double>& ys, const S& x) {
   const std::size_t last = xs.size() - 1;
   const double at = lane(plain(x), 0);  // all lanes share one wavelength
-  const std::size_t i = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(std::upper_bound(xs.begin(), xs.end(), at) - xs.begin() - 1, 0)), last - 1);
+  const std::size_t i = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(
+                                     std::upper_bound(xs.begin(), xs.end(), at) - xs.begin() - 1, 0)),
+                                 last - 1);
   const auto width = [&](std::size_t k) { return xs[k + 1] - xs[k]; };
   const auto secant = [&](std::size_t k) { return (ys[k + 1] - ys[k]) / width(k); };
   const auto slope = [&](std::size_t k) {
@@ -53,7 +55,8 @@ S index_at(const Dispersion& law, const S& wavelength_um, const V& value) {
   const S& l = wavelength_um;
   const S l2 = l * l;
   const std::size_t count = law.coefficients.size();
-  const auto constant = [&](std::size_t i) { return i <= count ? law.coefficients[i - 1] : 0.0; };  // from C1, 0 beyond the last
+  // from C1, 0 beyond the last
+  const auto constant = [&](std::size_t i) { return i <= count ? law.coefficients[i - 1] : 0.0; };
   const auto c = [&](std::size_t i) {
     return i <= law.refs.size() && law.refs[i - 1] ? S(value(law.refs[i - 1])) : S(constant(i));
   };
@@ -79,7 +82,8 @@ S index_at(const Dispersion& law, const S& wavelength_um, const V& value) {
     case Form::refractiveindex_info: {
       S n2 = c(1) + powers(10);
       for (std::size_t i : {std::size_t{2}, std::size_t{6}})
-        if (constant(i) != 0) n2 = n2 + c(i) * real_power(l, constant(i + 1)) / (l2 - std::pow(constant(i + 2), constant(i + 3)));
+        if (constant(i) != 0)
+          n2 = n2 + c(i) * real_power(l, constant(i + 1)) / (l2 - std::pow(constant(i + 2), constant(i + 3)));
       return sqrt(n2);
     }
     case Form::cauchy:

@@ -25,14 +25,14 @@ S heat_fraction(const S& x, const S& fourier_number) {
   if (fo < 0.1) {
     const S scale = 0.5 / sqrt(fourier_number);
     S u(0.0);
-    for (int k = 0; k < 3; ++k)
-      u = u + erfc(((2.0 * k + 1.0) - x) * scale) - erfc(((2.0 * k + 1.0) + x) * scale);
+    for (int k = 0; k < 3; ++k) u = u + erfc(((2.0 * k + 1.0) - x) * scale) - erfc(((2.0 * k + 1.0) + x) * scale);
     return u;
   }
   constexpr double pi = std::numbers::pi;
   S u = x;
   for (int n = 1; n <= 8; ++n)
-    u = u + (2.0 / (n * pi) * (n % 2 ? -1.0 : 1.0)) * exp(fourier_number * (-double(n) * n * pi * pi)) * sin(x * (n * pi));
+    u = u +
+        (2.0 / (n * pi) * (n % 2 ? -1.0 : 1.0)) * exp(fourier_number * (-double(n) * n * pi * pi)) * sin(x * (n * pi));
   return u;
 }
 

@@ -11,7 +11,7 @@ namespace birefit {
 /// temperatures below Tc.
 template <class S>
 struct NematicLaw {
-  S mean, birefringence;       ///< at the reference temperature
+  S mean, birefringence;  ///< at the reference temperature
   S reference_k, inverse_clearing, exponent, mean_slope_per_k;
 
   template <class T>

@@ -9,8 +9,8 @@
 namespace birefit {
 
 struct MaterialPreset {
-  std::string name;      ///< of configs: "5CB-li2005"
-  std::string source;    ///< for reports
+  std::string name;           ///< of configs: "5CB-li2005"
+  std::string source;         ///< for reports
   double lower_nm, upper_nm;  ///< wavelengths the source covers
   /// Cauchy coefficients A, B, C of n = A + B/l^2 + C/l^4, l in um, at temperature_k; unused with four_parameter.
   std::array<double, 3> ordinary{}, extraordinary{};
@@ -19,8 +19,8 @@ struct MaterialPreset {
     double wavelength_um, mean_index, mean_slope_per_k, birefringence_0k, exponent, clearing_k;
   };
   std::vector<FourParameter> four_parameter;
-  double lower_k = 0, upper_k = 0;    ///< of the four-parameter law
-  double birefringence_uncertainty;   ///< standard deviation of n_e - n_o over itself
+  double lower_k = 0, upper_k = 0;   ///< of the four-parameter law
+  double birefringence_uncertainty;  ///< standard deviation of n_e - n_o over itself
 };
 
 /// All presets but E44-steinberg2020, which is a law of its own (materials/heat.h).

@@ -7,7 +7,11 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"berreman", 4, false, true, "4 x 4 transfer with all reflections, as scattering matrices",
+constexpr MethodInfo kInfo{"berreman",
+                           4,
+                           false,
+                           true,
+                           "4 x 4 transfer with all reflections, as scattering matrices",
                            "Berreman, J. Opt. Soc. Am. 62, 502 (1972); Redheffer, J. Math. Phys. 41, 1 (1962)"};
 constexpr double kSqrt3 = 1.7320508075688772;
 
@@ -47,11 +51,13 @@ Su2<S> Berreman<S>::retarder(const Column<S>&, const Ray<S>&, const Mesh&) const
   throw std::logic_error("berreman has no one-way transfer");
 }
 template <class S>
-Mat2<S> Berreman<S>::transmission(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, const S& host_index) const {
+Mat2<S> Berreman<S>::transmission(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
+                                  const S& host_index) const {
   return whole_stack(column, ray, mesh, host_index).forward;
 }
 template <class S>
-Mat2<S> Berreman<S>::reflection(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh, const S& host_index) const {
+Mat2<S> Berreman<S>::reflection(const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
+                                const S& host_index) const {
   return whole_stack(column, ray, mesh, host_index).front;
 }
 

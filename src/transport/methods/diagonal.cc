@@ -5,7 +5,11 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"diagonal", 0, true, false, "one phase integral per local mode, Gauss nodes as many as steps, flux factors",
+constexpr MethodInfo kInfo{"diagonal",
+                           0,
+                           true,
+                           false,
+                           "one phase integral per local mode, Gauss nodes as many as steps, flux factors",
                            "Born & Wolf 15; flux factors: docs/methods.md"};
 
 template <class S>
@@ -41,10 +45,11 @@ const MethodInfo& Diagonal<S>::info() const {
   return kInfo;
 }
 
-// With E and H continuous, flux-normalised modes of a lossless medium couple antisymmetrically, with zero diagonal: nothing
-// but the two phases is left between the faces.
+// With E and H continuous, flux-normalised modes of a lossless medium couple antisymmetrically, with zero diagonal:
+// nothing but the two phases is left between the faces.
 template <class S, class R>
-ModalTransfer<R> diagonal_transfer(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise, const Mesh& mesh) {
+ModalTransfer<R> diagonal_transfer(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise,
+                                   const Mesh& mesh) {
   if (column.absorbing || ray.continuity != Continuity::e_and_h) return modal_transfer(column, ray, k0, raise, mesh, 0);
   const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   const std::vector<double>&u = nodes.u, &weight = nodes.weight;
@@ -66,7 +71,8 @@ ModalTransfer<R> diagonal_transfer(const Column<S>& column, const Ray<S>& ray, c
     const Mat2<S> m = flux_modes(p, ray.kx, ray.ky);
     return {raise(m.a.re), raise(m.b.re), raise(m.c.re), raise(m.d.re)};
   };
-  return {modes_at(face[0]), modes_at(face[1]), Complex<R>(R(0.0), k0 * raise(phase_o)), Complex<R>(R(0.0), k0 * raise(phase_e))};
+  return {modes_at(face[0]), modes_at(face[1]), Complex<R>(R(0.0), k0 * raise(phase_o)),
+          Complex<R>(R(0.0), k0 * raise(phase_e))};
 }
 
 template <class S>
@@ -89,8 +95,9 @@ Su2<S> Diagonal<S>::retarder(const Column<S>& column, const Ray<S>& ray, const M
 
 #define BIREFIT_INSTANTIATE(S) template class Diagonal<S>;
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
-#define BIREFIT_INSTANTIATE_RAISED(S, R) \
-  template ModalTransfer<R> diagonal_transfer<S, R>(const Column<S>&, const Ray<S>&, const R&, const Raise<S, R>&, const Mesh&);
+#define BIREFIT_INSTANTIATE_RAISED(S, R)                                                                           \
+  template ModalTransfer<R> diagonal_transfer<S, R>(const Column<S>&, const Ray<S>&, const R&, const Raise<S, R>&, \
+                                                    const Mesh&);
 BIREFIT_FOR_EACH_RAISE(BIREFIT_INSTANTIATE_RAISED)
 
 }  // namespace birefit

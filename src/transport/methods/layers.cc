@@ -3,9 +3,17 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kMidpoint{"layers_midpoint", 2, false, false, "homogeneous layers with the medium of their middle",
+constexpr MethodInfo kMidpoint{"layers_midpoint",
+                               2,
+                               false,
+                               false,
+                               "homogeneous layers with the medium of their middle",
                                "Jones, J. Opt. Soc. Am. 38, 671 (1948); interfaces: docs/methods.md"};
-constexpr MethodInfo kEdge{"layers_edge", 1, false, false, "homogeneous layers with the medium of their upper face",
+constexpr MethodInfo kEdge{"layers_edge",
+                           1,
+                           false,
+                           false,
+                           "homogeneous layers with the medium of their upper face",
                            "Steinberg, ACM TOG 39(3) (2020): its brute force"};
 
 void sampled_depths(const Mesh& mesh, double place, std::vector<double>& u) {
@@ -53,9 +61,7 @@ Su2<S> Layers<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mes
   thread_local std::vector<double> u;
   sampled_depths(mesh, place_, u);
   Su2<S> total = Su2<S>::identity();
-  const auto advance = [&](std::size_t i, const Vec3<S>& v) {
-    total = su2_exp(S(mesh[i + 1] - mesh[i]) * v) * total;
-  };
+  const auto advance = [&](std::size_t i, const Vec3<S>& v) { total = su2_exp(S(mesh[i + 1] - mesh[i]) * v) * total; };
   if (ray.continuity == Continuity::e_and_h && !column.planar) {
     thread_local std::vector<OpticalPoint<Slope<S>>> points;
     points.resize(u.size());
@@ -70,8 +76,8 @@ Su2<S> Layers<S>::retarder(const Column<S>& column, const Ray<S>& ray, const Mes
   return total;
 }
 
-#define BIREFIT_INSTANTIATE(S) \
-  template class Layers<S>;    \
+#define BIREFIT_INSTANTIATE(S)      \
+  template class Layers<S>;         \
   template class LayersMidpoint<S>; \
   template class LayersEdge<S>;
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)

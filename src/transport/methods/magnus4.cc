@@ -4,8 +4,14 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"magnus4", 4, false, false, "exponential integrator of order 4, two Gauss nodes a step",
-                           "Iserles & Norsett, Phil. Trans. R. Soc. A 357 (1999)", false, true};
+constexpr MethodInfo kInfo{"magnus4",
+                           4,
+                           false,
+                           false,
+                           "exponential integrator of order 4, two Gauss nodes a step",
+                           "Iserles & Norsett, Phil. Trans. R. Soc. A 357 (1999)",
+                           false,
+                           true};
 
 }  // namespace
 
@@ -39,7 +45,8 @@ Mat2<S> Magnus4<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
       const Mat2<S> a[2] = {generator[2 * i], generator[2 * i + 1]};
       total = exp(magnus_exponent(mesh[i + 1] - mesh[i], a)) * total;
-      if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
+      if (column.jumps && ray.continuity == Continuity::e_and_h)
+        total = step_of_medium(column, ray, mesh, i + 1) * total;
     }
     return checked_transfer(kInfo, total);
   }

@@ -4,8 +4,14 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"magnus6", 6, false, false, "exponential integrator of order 6, three Gauss nodes a step",
-                           "Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 151 (2009)", false, true};
+constexpr MethodInfo kInfo{"magnus6",
+                           6,
+                           false,
+                           false,
+                           "exponential integrator of order 6, three Gauss nodes a step",
+                           "Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 151 (2009)",
+                           false,
+                           true};
 
 }  // namespace
 
@@ -40,7 +46,8 @@ Mat2<S> Magnus6<S>::transfer(const Column<S>& column, const Ray<S>& ray, const M
     for (std::size_t i = 0; i + 1 < mesh.size(); ++i) {
       const Mat2<S> a[3] = {generator[3 * i], generator[3 * i + 1], generator[3 * i + 2]};
       total = exp(magnus_exponent(mesh[i + 1] - mesh[i], a)) * total;
-      if (column.jumps && ray.continuity == Continuity::e_and_h) total = step_of_medium(column, ray, mesh, i + 1) * total;
+      if (column.jumps && ray.continuity == Continuity::e_and_h)
+        total = step_of_medium(column, ray, mesh, i + 1) * total;
     }
     return checked_transfer(kInfo, total);
   }

@@ -15,8 +15,13 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kInfo{"modal", 0, false, false, "phases and slow coupling of the local modes, 8 Gauss nodes a step",
-                           "collocation for oscillatory equations: Levin, Math. Comp. 38 (1982)", true};
+constexpr MethodInfo kInfo{"modal",
+                           0,
+                           false,
+                           false,
+                           "phases and slow coupling of the local modes, 8 Gauss nodes a step",
+                           "collocation for oscillatory equations: Levin, Math. Comp. 38 (1982)",
+                           true};
 constexpr int kNodes = 8;
 
 }  // namespace
@@ -27,19 +32,26 @@ const MethodInfo& Modal<S>::info() const {
 }
 
 template <class S, class R>
-Complex<R> raised(const Raise<S, R>& raise, const Complex<S>& z) { return {raise(z.re), raise(z.im)}; }
+Complex<R> raised(const Raise<S, R>& raise, const Complex<S>& z) {
+  return {raise(z.re), raise(z.im)};
+}
 template <class S, class R>
-Mat2<R> raised(const Raise<S, R>& raise, const Mat2<S>& m) { return {raised(raise, m.a), raised(raise, m.b), raised(raise, m.c), raised(raise, m.d)}; }
+Mat2<R> raised(const Raise<S, R>& raise, const Mat2<S>& m) {
+  return {raised(raise, m.a), raised(raise, m.b), raised(raise, m.c), raised(raise, m.d)};
+}
 
 template <class S, class R>
-ModalGenerator<R> generator_at(const OpticalPoint<Slope<S>>& p, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise) {
+ModalGenerator<R> generator_at(const OpticalPoint<Slope<S>>& p, const Ray<S>& ray, const R& k0,
+                               const Raise<S, R>& raise) {
   const ModalRates<S> rates = modal_rates(p, ray);
-  return modal_generator<R>({raised(raise, rates.q_o), raised(raise, rates.q_e), raised(raise, rates.turning)}, k0 * raise(p.depth_slope_um.value));
+  return modal_generator<R>({raised(raise, rates.q_o), raised(raise, rates.q_e), raised(raise, rates.turning)},
+                            k0 * raise(p.depth_slope_um.value));
 }
 
 /// The phases alone.
 template <class S, class R>
-ModalTransfer<R> uncoupled(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise, const Mesh& mesh) {
+ModalTransfer<R> uncoupled(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise,
+                           const Mesh& mesh) {
   const GaussNodes& nodes = gauss_nodes(mesh, column.breaks);
   thread_local std::vector<OpticalPoint<Slope<S>>> points;
   points.resize(nodes.u.size());
@@ -60,7 +72,8 @@ ModalTransfer<R> uncoupled(const Column<S>& column, const Ray<S>& ray, const R& 
 }
 
 template <class S, class R>
-ModalTransfer<R> modal_transfer(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise, const Mesh& mesh, int passes) {
+ModalTransfer<R> modal_transfer(const Column<S>& column, const Ray<S>& ray, const R& k0, const Raise<S, R>& raise,
+                                const Mesh& mesh, int passes) {
   using C = Complex<R>;
   if (passes == 0) return uncoupled(column, ray, k0, raise, mesh);
   thread_local Mesh last_mesh;
@@ -136,12 +149,13 @@ Su2<S> Modal<S>::retarder(const Column<S>&, const Ray<S>&, const Mesh&) const {
   throw std::logic_error("modal has no retarder");
 }
 
-#define BIREFIT_INSTANTIATE(S)                                                                              \
-  template class Modal<S>;                                                                                  \
+#define BIREFIT_INSTANTIATE(S) \
+  template class Modal<S>;     \
   template Mat2<S> together<S>(const ModalTransfer<S>&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
-#define BIREFIT_INSTANTIATE_RAISED(S, R) \
-  template ModalTransfer<R> modal_transfer<S, R>(const Column<S>&, const Ray<S>&, const R&, const Raise<S, R>&, const Mesh&, int);
+#define BIREFIT_INSTANTIATE_RAISED(S, R)                                                                        \
+  template ModalTransfer<R> modal_transfer<S, R>(const Column<S>&, const Ray<S>&, const R&, const Raise<S, R>&, \
+                                                 const Mesh&, int);
 BIREFIT_FOR_EACH_RAISE(BIREFIT_INSTANTIATE_RAISED)
 
 }  // namespace birefit

@@ -13,8 +13,13 @@ namespace birefit {
 namespace {
 
 namespace odeint = boost::numeric::odeint;
-constexpr MethodInfo kInfo{"ode_operator", 0, false, false, "the operator equation by adaptive Dormand-Prince steps",
-                           "Steinberg, ACM Trans. Graph. 39 (2020), eq. 19; Dormand & Prince, J. Comput. Appl. Math. 6 (1980)"};
+constexpr MethodInfo kInfo{
+    "ode_operator",
+    0,
+    false,
+    false,
+    "the operator equation by adaptive Dormand-Prince steps",
+    "Steinberg, ACM Trans. Graph. 39 (2020), eq. 19; Dormand & Prince, J. Comput. Appl. Math. 6 (1980)"};
 using State = std::array<double, 8>;
 
 State packed(const Mat2<double>& m) { return {m.a.re, m.a.im, m.b.re, m.b.im, m.c.re, m.c.im, m.d.re, m.d.im}; }
@@ -56,7 +61,8 @@ Mat2<double> OdeOperator::transfer(const Column<double>& column, const Ray<doubl
       // A last step cut short says nothing about the next part's.
       step = accepted && last ? std::max(h, step) : h;
     }
-    if (ray.continuity == Continuity::e_and_h) state = packed(step_of_medium(column, ray, mesh, i + 1) * unpacked(state));
+    if (ray.continuity == Continuity::e_and_h)
+      state = packed(step_of_medium(column, ray, mesh, i + 1) * unpacked(state));
   }
   return unpacked(state);
 }

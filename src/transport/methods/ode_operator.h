@@ -1,6 +1,6 @@
 #pragma once
-// The operator equation dE_t/du = generator E_t (Steinberg TOG 2020 eq. 19, for E_t) by the adaptive Runge-Kutta pair of
-// Dormand and Prince: the source paper's ode45 on the whole operator. Its steps must resolve the common phase too.
+// The operator equation dE_t/du = generator E_t (Steinberg TOG 2020 eq. 19, for E_t) by the adaptive Runge-Kutta pair
+// of Dormand and Prince: the source paper's ode45 on the whole operator. Its steps must resolve the common phase too.
 
 #include "transport/method.h"
 

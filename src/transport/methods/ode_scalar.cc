@@ -18,7 +18,11 @@ namespace {
 
 namespace odeint = boost::numeric::odeint;
 constexpr MethodInfo kInfo{
-    "ode_scalar", 0, false, false, "the four Wei-Norman equations by adaptive Dormand-Prince steps",
+    "ode_scalar",
+    0,
+    false,
+    false,
+    "the four Wei-Norman equations by adaptive Dormand-Prince steps",
     "Steinberg, ACM Trans. Graph. 39 (2020), eqs. 25-28; Dormand & Prince, J. Comput. Appl. Math. 6 (1980)"};
 
 using C = Complex<double>;

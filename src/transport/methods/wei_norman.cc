@@ -12,9 +12,16 @@
 namespace birefit {
 namespace {
 
-constexpr MethodInfo kPaperInfo{"wei_norman", 1, false, false, "product of exponentials, coupling integrals in closed form",
+constexpr MethodInfo kPaperInfo{"wei_norman",
+                                1,
+                                false,
+                                false,
+                                "product of exponentials, coupling integrals in closed form",
                                 "Steinberg, ACM Trans. Graph. 39 (2020), eqs. 25-37; docs/methods.md"};
-constexpr MethodInfo kExpInfo{"wei_norman_exp", 2, false, false,
+constexpr MethodInfo kExpInfo{"wei_norman_exp",
+                              2,
+                              false,
+                              false,
                               "closed coupling integrals about layer centres, one exponential of both",
                               "Steinberg, ACM Trans. Graph. 39 (2020); docs/methods.md"};
 
@@ -214,10 +221,12 @@ Mat2<double> layer_transfer(const LayerMedium<double>& m, const Ray<double>& ray
 template <class S>
 Mat2<S> transfer_of(const MethodInfo& info, const Column<S>& column, const Ray<S>& ray, const Mesh& mesh,
                     const WeiNormanForm& form) {
-  return checked_transfer(
-      info, transfer_by_lanes(
-                info, column, ray, mesh, [&](auto from, auto to) { return sample_layer(column, from, to, form, false); },
-                [&](const auto& medium, int l, const Ray<double>& one) { return layer_transfer(lane_of(medium, l), one, form); }));
+  return checked_transfer(info, transfer_by_lanes(
+                                    info, column, ray, mesh,
+                                    [&](auto from, auto to) { return sample_layer(column, from, to, form, false); },
+                                    [&](const auto& medium, int l, const Ray<double>& one) {
+                                      return layer_transfer(lane_of(medium, l), one, form);
+                                    }));
 }
 
 }  // namespace
@@ -251,7 +260,8 @@ WeiNormanReport wei_norman_report(const Column<double>& column, const Ray<double
       column.sample({&u, 1}, &p);
       return p;
     };
-    if (modes_turn_over(at, ray, mesh[i], mesh[i + 1], 16)) refuse("the axis passes the wavevector, where the modes change places");
+    if (modes_turn_over(at, ray, mesh[i], mesh[i + 1], 16))
+      refuse("the axis passes the wavevector, where the modes change places");
     if (!finite(layer_transfer(medium, ray, form)) || !std::isfinite(layer.estimate)) {
       refuse("not finite: the axis is parallel to the wavevector, or a layer far too thick");
       continue;
