@@ -4,47 +4,14 @@
 
 #include <fmt/format.h>
 
-#include "medium/build.h"
 #include "render/ball_core.h"
-#include "render/pilots.h"
 #include "render/radial_table.h"
 #include "render/round_view.h"
 #include "render/sampling.h"
+#include "transport/intensity_distance.h"
 #include "transport/magnus.h"
 
 namespace birefit {
-
-bool looks_round(const Droplet& droplet) {
-  if (std::holds_alternative<BipolarDirector>(droplet.director)) return false;
-  if (const auto* axial = std::get_if<AxialDirector>(&droplet.director)) return !axial->field_azimuth_deg;
-  if (const auto* shell = std::get_if<ShellDirector>(&droplet.director)) return !shell->offset_um[0];
-  return true;
-}
-
-template <class S>
-BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value) {
-  const Droplet& droplet = std::get<Droplet>(scene.sample);
-  BallOptics<S> o;
-  o.sphere = droplet_optics(scene, value);
-  const S rotation = value.radians(scene.view.rotation_deg);
-  const S inverse_radius = inverse(o.sphere.radius_um);
-  if (const auto* bipolar = std::get_if<BipolarDirector>(&droplet.director)) {
-    o.field = BipolarField<S>{
-        axis_from_angles<S>(value.radians(bipolar->tilt_deg), value.radians(bipolar->azimuth_deg) + rotation),
-        value.get(bipolar->pole_distance, 1.0)};
-    o.normal_anchoring = false;
-  } else if (const auto* axial = std::get_if<AxialDirector>(&droplet.director)) {
-    o.field = TiltedAxialField<S>{axis_from_angles<S>(S(0.0), value.radians(axial->field_azimuth_deg) + rotation),
-                                  o.sphere.axial};
-  } else {
-    const ShellDirector& shell = std::get<ShellDirector>(droplet.director);
-    const Vec3<S> offset{value.get(shell.offset_um[0], 0.0) * inverse_radius,
-                         value.get(shell.offset_um[1], 0.0) * inverse_radius,
-                         value.get(shell.offset_um[2], 0.0) * inverse_radius};
-    o.field = NestedField<S>{rotated(offset, rotation), 1.0 - value(shell.wall_um) * inverse_radius};
-  }
-  return o;
-}
 
 namespace {
 
@@ -936,7 +903,6 @@ std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderP
   return std::make_unique<BallImage<S>>(scene, plan, value, core_apart);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                   \
-  template BallOptics<S> ball_optics<S>(const Scene&, const Values<S>&);                         \
   template Mat2<S> ball_jones<S>(const BallOptics<S>&, const DropletRay<S>&, const S&, const S&, \
                                  const TransportMethod<S>&, const Mesh&);                        \
   template std::unique_ptr<PixelModel<S>> make_ball_model<S>(const Scene&, const RenderPlan&, const Values<S>&);

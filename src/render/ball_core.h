@@ -1,7 +1,7 @@
 #pragma once
 // A shell's core as rays see it: a disc of its own, wherever it lies in the sphere.
 
-#include "render/ball.h"
+#include "render/ball_optics.h"
 
 namespace birefit {
 

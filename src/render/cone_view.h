@@ -16,9 +16,16 @@
 #include <utility>
 
 #include "render/pixel_model.h"
-#include "render/planar.h"
 
 namespace birefit {
+
+/// Half angle in the host of the cone a plate or slab is seen in, one direction a pixel; none: every pixel sees the
+/// same.
+inline std::optional<ParameterRef> cone_half_angle(const Scene& scene) {
+  if (const auto* plate = std::get_if<Plate>(&scene.sample)) return plate->half_angle_deg;
+  if (const auto* slab = std::get_if<Slab>(&scene.sample); slab && slab->half_angle_deg) return slab->half_angle_deg;
+  return std::nullopt;
+}
 
 template <class S>
 class ConeView {

@@ -15,7 +15,6 @@
 
 #include "birefit/render.h"
 #include "medium/families/axial_angle.h"
-#include "render/ball.h"
 #include "render/chebyshev.h"
 
 namespace birefit {

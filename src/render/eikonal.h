@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "medium/families/axial.h"
-#include "render/droplet.h"
+#include "render/sphere_ray.h"
 #include "transport/by_lane.h"
 
 namespace birefit {

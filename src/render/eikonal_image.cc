@@ -160,7 +160,13 @@ S EikonalImage<S>::intensity(const P& column, const P& row) const {
   return result;
 }
 
-#define BIREFIT_INSTANTIATE(S) template class EikonalImage<S>;
+template <class S>
+std::unique_ptr<PixelModel<S>> make_eikonal_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+  return std::make_unique<EikonalImage<S>>(scene, plan, value);
+}
+#define BIREFIT_INSTANTIATE(S)    \
+  template class EikonalImage<S>; \
+  template std::unique_ptr<PixelModel<S>> make_eikonal_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -65,4 +65,7 @@ class EikonalImage final : public PixelModel<S> {
   double allowed_tail_;      ///< of tables that are read
 };
 
+template <class S>
+std::unique_ptr<PixelModel<S>> make_eikonal_model(const Scene&, const RenderPlan&, const Values<S>&);
+
 }  // namespace birefit

@@ -7,6 +7,7 @@
 #include "medium/counting_column.h"
 #include "medium/families/radial.h"
 #include "render/ball.h"
+#include "render/droplet.h"
 #include "render/planar.h"
 #include "render/volume.h"
 
@@ -15,26 +16,10 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Largest error of any polarizer-analyser intensity that two retarders can differ by: 2 |difference|, and a retarder
-/// and its negative are the same.
-double intensity_distance(const Su2<double>& a, const Su2<double>& b) {
-  const auto size = [&](double sign) {
-    return square(a.w - sign * b.w) + square(a.x - sign * b.x) + square(a.y - sign * b.y) + square(a.z - sign * b.z);
-  };
-  return 2 * std::sqrt(std::min(size(1), size(-1)));
-}
 double size_of(const Mat2<double>& d) { return std::sqrt(norm(d.a) + norm(d.b) + norm(d.c) + norm(d.d)); }
 double checked(double error) { return std::isfinite(error) ? error : 1e300; }
 
 }  // namespace
-
-double intensity_distance(const Mat2<double>& a, const Mat2<double>& b) {
-  const Complex<double> inner = conj(b.a) * a.a + conj(b.b) * a.b + conj(b.c) * a.c + conj(b.d) * a.d;
-  const double modulus = std::sqrt(norm(inner));
-  const Complex<double> turn =
-      modulus > 0 ? Complex<double>(inner.re / modulus, inner.im / modulus) : Complex<double>(1.0);
-  return std::sqrt(2.0) * size_of(turn * b - a);
-}
 
 std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, const Values<double>& value,
                                                         std::size_t most) {

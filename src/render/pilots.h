@@ -6,12 +6,10 @@
 #include <utility>
 
 #include "render/pixel_model.h"
+#include "transport/intensity_distance.h"
 #include "transport/method.h"
 
 namespace birefit {
-
-/// Largest change of any polarizer-analyser intensity between two Jones matrices, whose common phase does not matter.
-double intensity_distance(const Mat2<double>& a, const Mat2<double>& b);
 
 class Pilots {
  public:

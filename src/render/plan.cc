@@ -14,6 +14,7 @@
 #include "render/ball.h"
 #include "render/cone_view.h"
 #include "render/disc.h"
+#include "render/droplet.h"
 #include "render/eikonal_image.h"
 #include "render/fringe_table.h"
 #include "render/pilots.h"
@@ -295,7 +296,10 @@ void note_ring(const Scene& scene, const Values<double>& value, RenderPlan& plan
 
 /// measure_points() of a droplet whose rays are planned.
 void measure_points_of(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
-  const std::unique_ptr<PixelModel<Pack>> model = make_droplet_model(scene, plan, value.as<Pack>());
+  const Values<Pack> lanes = value.as<Pack>();
+  const std::unique_ptr<PixelModel<Pack>> model = looks_round(std::get<Droplet>(scene.sample))
+                                                      ? make_droplet_model(scene, plan, lanes)
+                                                      : make_ball_model(scene, plan, lanes);
   model->tabulate(PixelModel<Pack>::Wanted::picture, 0);
   measure_points(scene, *model, plan);
 }

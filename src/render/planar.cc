@@ -13,12 +13,6 @@
 
 namespace birefit {
 
-std::optional<ParameterRef> cone_half_angle(const Scene& scene) {
-  if (const auto* plate = std::get_if<Plate>(&scene.sample)) return plate->half_angle_deg;
-  if (const auto* slab = std::get_if<Slab>(&scene.sample); slab && slab->half_angle_deg) return slab->half_angle_deg;
-  return std::nullopt;
-}
-
 template <class S>
 PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value) {
   PlanarOptics<S> o;

@@ -1,8 +1,6 @@
 #pragma once
 // One direction of light through a plane-parallel sample.
 
-#include <optional>
-
 #include "render/pixel_model.h"
 #include "transport/method.h"
 
@@ -14,10 +12,6 @@ struct PlanarOptics {
   S k0, n_host;
   Continuity continuity = Continuity::e_and_h;
 };
-
-/// Half angle in the host of the cone a plate or slab is seen in, one direction a pixel; none: every pixel sees the
-/// same.
-std::optional<ParameterRef> cone_half_angle(const Scene& scene);
 
 template <class S>
 PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value);

@@ -9,7 +9,9 @@
 #include "core/threads.h"
 #include "render/ball.h"
 #include "render/cone_view.h"
+#include "render/droplet.h"
 #include "render/edge_pixels.h"
+#include "render/eikonal_image.h"
 #include "render/fringe_table.h"
 #include "render/pixel_model.h"
 #include "render/planar.h"
@@ -24,11 +26,15 @@ namespace birefit {
 template <class S>
 std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
-  if (std::holds_alternative<Droplet>(scene.sample)) return make_droplet_model(scene, plan, value);
+  if (const auto* droplet = std::get_if<Droplet>(&scene.sample)) {
+    if (looks_round(*droplet) && scene.rays == Rays::eikonal) return make_eikonal_model(scene, plan, value);
+    if (looks_round(*droplet)) return make_droplet_model(scene, plan, value);
+  }
   if constexpr (kForTablesOnly<S>) {
     if (plan.fringe_means) return make_planar_model(scene, plan, value);
     throw std::logic_error("no table serves this scene");
   } else {
+    if (std::holds_alternative<Droplet>(scene.sample)) return make_ball_model(scene, plan, value);
     if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
     if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
     if (std::holds_alternative<SampledVolume>(scene.sample)) return make_volume_model(scene, plan, value);

@@ -7,10 +7,10 @@
 
 #include "medium/build.h"
 #include "render/droplet.h"
+#include "render/objective.h"
 #include "render/pixel_mean.h"
 #include "render/radial_table.h"
 #include "render/round_view.h"
-#include "render/wave.h"
 #include "wave/radial_series.h"
 
 namespace birefit {

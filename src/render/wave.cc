@@ -9,6 +9,7 @@
 #include "birefit/volume.h"
 #include "medium/build.h"
 #include "render/ball.h"
+#include "render/objective.h"
 #include "render/series.h"
 #include "render/volume.h"
 #include "wave/march.h"
@@ -110,23 +111,6 @@ WaveObject wave_object(const Scene& scene, const Values<double>& value) {
           sphere_grid(o, k0, na),
           fmt::format("sphere of {:.3g} um", 2 * o.radius_um)};
 }
-
-}  // namespace
-
-void check_objective(const Scene& scene, double n_host) {
-  const double na = scene.microscope.objective_na;
-  if (!(na > 0))
-    throw UserError(Where{}, "ceiling: wave needs microscope.objective_na",
-                    "the number engraved on the objective; without it use ceiling: one_way");
-  if (na > n_host)
-    throw UserError(
-        Where{},
-        fmt::format("microscope.objective_na {:g} is above the surround's index {:g}: no light leaves it so steeply",
-                    na, n_host),
-        "check objective_na and sample.surround");
-}
-
-namespace {
 
 WaveImaging imaging_of(const Scene& scene, const Values<double>& value, const WaveGrid& grid) {
   const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px), px = scene.view.pixel_size_um;

@@ -16,9 +16,6 @@ struct WavePlan {
   double ramp_um = 0;    ///< of its surfaces
 };
 
-/// Throws UserError where wave optics has no aperture to work with: none given, or one above the host's index.
-void check_objective(const Scene& scene, double n_host);
-
 /// A sphere as it is seen: exactly, by the series; by propagation; and, of sampled fields, by propagation through
 /// samples.
 struct RadialTwin {

@@ -7,6 +7,7 @@
 
 #include "birefit/render.h"
 #include "independent_droplet.h"
+#include "medium/families/radial.h"
 #include "reference_table.h"
 #include "render/ball.h"
 #include "scene_builder.h"

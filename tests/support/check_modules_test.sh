@@ -28,3 +28,25 @@ refuse src/io/bad.cc '#include "sibling.h"'
 refuse src/io/bad.cc '#include <ceres/ceres.h>'
 refuse include/birefit/error.h '#include "core/lanes.h"'
 refuse include/birefit/stray.h '// a header of no module'
+
+# what must be said of the tree
+says() { { "$check" "$tree" || true; } | grep -q "$1" || { echo "not said: $1"; exit 1; }; }
+
+# Circles of files, each named once; a file may include its own header.
+echo '#include "medium/b.h"' >"$tree/src/medium/a.h"
+echo '#include "medium/a.h"' >"$tree/src/medium/a.cc"
+: >"$tree/src/medium/b.h"
+"$check" "$tree" >/dev/null
+echo '#include "medium/a.h"' >"$tree/src/medium/b.cc"
+says 'circle of files: medium/a medium/b'
+rm "$tree"/src/medium/*
+
+# Long files and wide lines; what is known may stay, what is known and gone may not.
+seq 601 | sed 's|^|// |' >"$tree/src/core/good.cc"
+says 'over 600 lines: src/core/good.cc'
+mkdir "$tree/tools"
+echo 'long src/core/good.cc' >"$tree/tools/check_modules.known"
+"$check" "$tree" >/dev/null
+printf '// %0120d\n' 1 >"$tree/src/core/good.cc"
+says 'over 120 characters: src/core/good.cc'
+says 'no longer so.*long src/core/good.cc'
