@@ -13,7 +13,7 @@
 
 #include "app/commands.h"
 #include "birefit/io.h"
-#include "render/wave.h"
+#include "samples/waves/wave.h"
 
 namespace birefit {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "fit/errors/left_out.h"
 #include "fit/zone.h"
-#include "render/wave.h"
+#include "samples/waves/wave.h"
 
 namespace birefit {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "render/disc.h"
+#include "samples/disc/disc.h"
 
 namespace birefit::estimation {
 namespace {

@@ -1,6 +1,6 @@
 #include "io/config_disc.h"
 
-#include "render/disc.h"
+#include "samples/disc/disc.h"
 
 namespace birefit {
 namespace {

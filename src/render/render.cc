@@ -6,43 +6,20 @@
 #include <numeric>
 #include <optional>
 
+#include <fmt/format.h>
+
 #include "core/threads.h"
-#include "render/ball.h"
-#include "render/cone_view.h"
-#include "render/droplet.h"
-#include "render/edge_pixels.h"
-#include "render/eikonal_image.h"
-#include "render/fringe_table.h"
-#include "render/pixel_model.h"
-#include "render/planar.h"
-#include "render/retardance.h"
-#include "render/sampling.h"
-#include "render/series.h"
-#include "render/volume.h"
-#include "render/wave.h"
+#include "render/render_scalar.h"
+#include "samples/kind.h"
+#include "samples/layers/rings.h"
+#include "samples/pixels/edge_pixels.h"
+#include "samples/pixels/sampling.h"
+#include "samples/tables/fringe_table.h"
+#include "samples/tables/polar_table.h"
+#include "samples/waves/wave.h"
+#include "transport/method.h"
 
 namespace birefit {
-
-template <class S>
-std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
-  if (const auto* droplet = std::get_if<Droplet>(&scene.sample)) {
-    if (looks_round(*droplet) && scene.rays == Rays::eikonal) return make_eikonal_model(scene, plan, value);
-    if (looks_round(*droplet)) return make_droplet_model(scene, plan, value);
-  }
-  if constexpr (kForTablesOnly<S>) {
-    if (plan.fringe_means) return make_planar_model(scene, plan, value);
-    throw std::logic_error("no table serves this scene");
-  } else {
-    if (std::holds_alternative<Droplet>(scene.sample)) return make_ball_model(scene, plan, value);
-    if (std::holds_alternative<Crystal>(scene.sample)) return make_crystal_model(scene, plan, value);
-    if (std::holds_alternative<StressedDisc>(scene.sample)) return make_disc_model(scene, plan, value);
-    if (std::holds_alternative<SampledVolume>(scene.sample)) return make_volume_model(scene, plan, value);
-    if (is_ring_table(scene)) return make_ring_model(scene, plan, value);
-    if (plan.observable.quantity != Quantity::intensity) return make_retardance_model(scene, plan, value);
-    return make_planar_model(scene, plan, value);
-  }
-}
 
 int rays_side_by_side() { return kLanes; }
 
@@ -597,115 +574,16 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
   if (scene.ceiling == Ceiling::wave)
     throw UserError(Where{}, "under ceiling: wave a point of the image has no Jones matrix of its own ray",
                     "use `render`, or ceiling: one_way");
-  const double wavelength_nm = value(scene.microscope.wavelength_nm);
-  std::vector<JonesRow> rows;
-  // From the lab's x, y to the s, p pair of azimuth a: p = (cos a, sin a), s = (-sin a, cos a).
-  const auto add = [&](const Mat2<double>& j, double azimuth_rad, JonesRow row) {
-    const auto z = [](const Complex<double>& c) { return std::complex<double>(c.re, c.im); };
-    const std::complex<double> m[2][2] = {{z(j.a), z(j.b)}, {z(j.c), z(j.d)}};
-    const double p[2] = {std::cos(azimuth_rad), std::sin(azimuth_rad)}, s[2] = {-p[1], p[0]};
-    const auto element = [&](const double* out, const double* in) {
-      std::complex<double> sum = 0;
-      for (int a = 0; a < 2; ++a)
-        for (int b = 0; b < 2; ++b) sum += out[a] * m[a][b] * in[b];
-      return sum;
-    };
-    row.wavelength_nm = wavelength_nm;
-    row.ss = element(s, s);
-    row.ps = element(s, p);
-    row.sp = element(p, s);
-    row.pp = element(p, p);
-    rows.push_back(row);
-  };
   if (is_ring_table(scene))
     throw UserError(Where{}, "a table of rings has no Jones matrices", "give the plate view: {half_angle_deg} instead");
-  const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
-  if (std::holds_alternative<Slab>(scene.sample) && !half_angle) {
-    const PlanarOptics<double> optics = planar_optics(scene, value);
-    const TransportMethod<double>& method = transport_method<double>(plan.method);
-    for (const Direction& d : scene.microscope.directions) {
-      const double theta_rad = d.theta_deg * std::numbers::pi / 180, azimuth = d.azimuth_deg * std::numbers::pi / 180;
-      const double kappa = optics.n_host * std::sin(theta_rad);
-      const Ray<double> ray{optics.k0, kappa * std::cos(azimuth), kappa * std::sin(azimuth), optics.continuity};
-      // Each direction gets its own mesh, unless a number of steps was forced.
-      const Mesh mesh = plan.mesh.empty() ? uniform_mesh(plan.steps, optics.column->breaks)
-                                          : adapted_mesh(*optics.column, ray, scene.intensity_accuracy / 4);
-      const double t = std::tan(theta_rad);
-      add(planar_jones(optics, method, mesh, t * std::cos(azimuth), t * std::sin(azimuth)), azimuth,
-          {.theta_deg = d.theta_deg, .azimuth_deg = d.azimuth_deg});
-    }
-    return rows;
-  }
-  const int w = scene.view.width, h = scene.view.height;
-  const Mesh mesh = plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh;
-  if (std::holds_alternative<Droplet>(scene.sample)) {
-    if (scene.rays == Rays::eikonal)
-      throw UserError(Where{},
-                      "the two polarizations that curved rays bring to one place came by different ways: no Jones "
-                      "matrix of one ray",
-                      "use `render`, or physics.rays: straight");
-    const DropletOptics<double> optics = droplet_optics(scene, value);
-    const RimTable rim(optics.ratio, optics.n_host, scene.microscope.objective_na);
-    const TransportMethod<double>& method = transport_method<double>(plan.method);
-    std::optional<BallOptics<double>> ball;
-    const StepsByPlace steps(plan);
-    if (!looks_round(std::get<Droplet>(scene.sample))) ball = ball_optics(scene, value);
-    for (int r = 0; r < h; ++r)
-      for (int c = 0; c < w; ++c) {
-        const double x = (c - value(scene.view.center_x_px)) * scene.view.pixel_size_um;
-        const double y = (value(scene.view.center_y_px) - r) * scene.view.pixel_size_um;
-        const double rho = std::hypot(x, y), azimuth = std::atan2(y, x);
-        const JonesRow row{.theta_deg = 0, .azimuth_deg = 0, .row = r, .column = c};
-        if (rho >= optics.radius_um * rim.rho_max()) {
-          add(Mat2<double>::identity(), 0, row);
-          continue;
-        }
-        if (ball) {
-          const double edge = optics.radius_um * rim.rho_max();
-          add(ball_jones<double>(*ball, trace(optics, rim, rho), std::cos(azimuth), std::sin(azimuth), method,
-                                 ball_mesh(*ball, steps.at(rho / edge, x, y))),
-              0, row);
-          continue;
-        }
-        // droplet_jones is in (p, s) = (radial, azimuthal): turn it into x, y.
-        const DropletRay<double> ray = trace(optics, rim, rho);
-        const Mat2<double> local = droplet_jones(optics, ray, method, mesh);
-        const double ca = std::cos(azimuth), sa = std::sin(azimuth);
-        const Mat2<double> turn{{ca, 0}, {-sa, 0}, {sa, 0}, {ca, 0}}, back{{ca, 0}, {sa, 0}, {-sa, 0}, {ca, 0}};
-        add(turn * local * back, 0, row);
-      }
-    return rows;
-  }
-  if (std::holds_alternative<SampledVolume>(scene.sample)) {
-    const VolumeOptics<double> optics(scene, value);
-    const Mesh layers = plan.mesh.empty() ? uniform_mesh(plan.steps, optics.breaks) : plan.mesh;
-    for (int r = 0; r < h; ++r)
-      for (int c = 0; c < w; ++c)
-        add(volume_jones(optics, c, r, transport_method<double>(plan.method), layers), 0,
-            {.theta_deg = 0, .azimuth_deg = 0, .row = r, .column = c});
-    return rows;
-  }
-  if (std::holds_alternative<Crystal>(scene.sample))
-    throw UserError(Where{}, "a crystal scene has no jones table: its retarder is one closed formula per pixel",
+  const SampleKind& kind = kind_of(scene);
+  if (!kind.jones)
+    throw UserError(Where{},
+                    fmt::format("a {} has no jones table: its retarder is one closed formula per pixel", kind.name),
                     "use `render`");
-  const PlanarOptics<double> optics = planar_optics(scene, value);
-  const TransportMethod<double>& method = transport_method<double>(plan.method);
-  if (!half_angle) {
-    add(planar_jones(optics, method, mesh, 0.0, 0.0), 0, {});
-    return rows;
-  }
-  const ConeView<double> cone(scene, value);
-  for (int r = 0; r < h; ++r)
-    for (int c = 0; c < w; ++c) {
-      const auto [tx, ty] = cone.at(c, r);
-      const double azimuth = std::atan2(ty, tx);
-      add(planar_jones(optics, method, mesh, tx, ty), azimuth,
-          {.theta_deg = std::atan(std::hypot(tx, ty)) * 180 / std::numbers::pi,
-           .azimuth_deg = azimuth * 180 / std::numbers::pi,
-           .row = r,
-           .column = c});
-    }
-  return rows;
+  JonesTable table(value(scene.microscope.wavelength_nm));
+  kind.jones(scene, plan, value, table);
+  return std::move(table).rows();
 }
 
 }  // namespace birefit

@@ -8,7 +8,8 @@
 #include <fmt/format.h>
 
 #include "birefit/error.h"
-#include "render/wave.h"
+#include "birefit/render.h"
+#include "samples/waves/wave.h"
 #include "study/ball_scene.h"
 #include "transport/quadrature.h"
 #include "wave/radial_series.h"

@@ -10,7 +10,7 @@
 #include "birefit/parameters.h"
 #include "birefit/render.h"
 #include "birefit/study.h"
-#include "render/wave.h"
+#include "samples/waves/wave.h"
 #include "study/ball_scene.h"
 
 namespace birefit {

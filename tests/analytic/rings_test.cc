@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "render/rings.h"
+#include "samples/layers/rings.h"
 
 namespace birefit {
 namespace {

@@ -9,7 +9,7 @@
 #include "independent_droplet.h"
 #include "medium/families/radial.h"
 #include "reference_table.h"
-#include "render/ball.h"
+#include "samples/sphere/ball.h"
 #include "scene_builder.h"
 
 namespace birefit {

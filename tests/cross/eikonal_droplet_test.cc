@@ -16,8 +16,9 @@
 #include "independent_droplet.h"
 #include "independent_rays.h"
 #include "medium/families/axial_equilibrium.h"
+#include "rays/eikonal.h"
 #include "reference_table.h"
-#include "render/eikonal.h"
+#include "samples/kind.h"
 #include "scene_builder.h"
 #include "study/ball_scene.h"
 

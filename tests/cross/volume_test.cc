@@ -11,8 +11,8 @@
 #include "birefit/volume.h"
 #include "independent_volume.h"
 #include "medium/families/ball.h"
-#include "render/volume.h"
-#include "render/wave.h"
+#include "samples/volume/volume.h"
+#include "samples/waves/wave.h"
 #include "scene_builder.h"
 
 namespace birefit::testing {

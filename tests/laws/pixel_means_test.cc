@@ -14,9 +14,9 @@
 
 #include "birefit/render.h"
 #include "independent_droplet.h"
-#include "render/droplet.h"
-#include "render/fringe.h"
-#include "render/radial_table.h"
+#include "samples/fringe.h"
+#include "samples/sphere/droplet.h"
+#include "samples/tables/radial_table.h"
 #include "scene_builder.h"
 
 namespace birefit {

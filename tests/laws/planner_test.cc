@@ -11,7 +11,7 @@
 
 #include "birefit/io.h"
 #include "birefit/render.h"
-#include "render/pilots.h"
+#include "samples/kind.h"
 #include "scene_builder.h"
 
 namespace birefit {
@@ -234,7 +234,7 @@ TEST(LongPlanner, UnsymmetricDropletsAreWithinTheAccuracyAsked) { expect_rays_ke
 double planned_over_cheapest(const Scene& scene, const Theta& theta, const RenderPlan& planned) {
   if (planned.method == "closed_form" || scene.ceiling == Ceiling::reflections) return 0;
   const Values<double> value(theta, {});
-  const Pilots pilots(scene, value);
+  const Pilots pilots = kind_of(scene).pilots(scene, value);
   int cheapest = 1 << 30;
   for (const TransportMethod<double>* method : transport_methods<double>()) {
     if (method->info().reflections) continue;

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "birefit/render.h"
-#include "render/polar_table.h"
+#include "samples/tables/polar_table.h"
 #include "scene_builder.h"
 
 namespace birefit {

@@ -8,7 +8,7 @@
 #include <functional>
 
 #include "birefit/render.h"
-#include "render/pixel_model.h"
+#include "samples/kind.h"
 #include "scene_builder.h"
 #include "transport/method.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "medium/build.h"
-#include "render/planar.h"
+#include "samples/layers/planar.h"
 #include "transport/methods.h"
 
 namespace birefit::testing {

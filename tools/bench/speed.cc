@@ -23,7 +23,8 @@
 #include "independent_droplet.h"
 #include "medium/families/axial_equilibrium.h"
 #include "medium/families/radial.h"
-#include "render/droplet.h"
+#include "render/render_scalar.h"
+#include "samples/sphere/droplet.h"
 #include "study/frames.h"
 #include "transport/one_way.h"
 

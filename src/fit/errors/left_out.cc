@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "fit/problem/light.h"
-#include "render/wave.h"
+#include "samples/waves/wave.h"
 
 namespace birefit::estimation {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/wave.h"
+#include "samples/waves/wave.h"
 
 namespace birefit::estimation {
 

@@ -1,0 +1,85 @@
+#include "samples/bar/bar.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "transport/method.h"
+
+namespace birefit {
+namespace {
+
+template <class S>
+class CrystalModel final : public PixelModel<S> {
+ public:
+  CrystalModel(const Scene& scene, const Values<S>& value) : along_y_(std::get<Crystal>(scene.sample).field_along_y) {
+    const Crystal& crystal = std::get<Crystal>(scene.sample);
+    const S across = value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0);
+    phase_ = std::numbers::pi * across / value(crystal.half_wave_voltage_v);
+    for (ParameterRef ref : crystal.field_legendre) legendre_.push_back(value(ref));
+    const int size = along_y_ ? scene.view.height : scene.view.width;
+    low_ = value.get(crystal.electrode_low_px, -0.5);
+    high_ = value.get(crystal.electrode_high_px, size - 0.5);
+    // Born & Wolf 15.4.2: I = cos^2(A - P) - sin 2(A - f) sin 2(P - f) sin^2(delta/2), f the induced axis.
+    const S p = value.radians(scene.microscope.polarizer_deg), a = value.radians(scene.microscope.analyzer_deg);
+    const S f = value.radians(crystal.slow_axis_deg) + value.radians(scene.view.rotation_deg);
+    const S c = cos(a - p);
+    bright_ = c * c;
+    modulation_ = -(sin(2.0 * (a - f)) * sin(2.0 * (p - f)));
+  }
+  S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const override {
+    S field(1.0);
+    if (!legendre_.empty()) {
+      const S t = 2.0 * (S(along_y_ ? row : column) - low_) / (high_ - low_) - 1.0;
+      S before(1.0), now = t;  // P_0, P_1; (j + 1) P_{j+1} = (2j + 1) t P_j - j P_{j-1}
+      for (std::size_t j = 1; j <= legendre_.size(); ++j) {
+        field = field + legendre_[j - 1] * now;
+        const double order = static_cast<double>(j);
+        const S next = (t * now * (2 * order + 1) - before * order) * (1 / (order + 1));
+        before = now;
+        now = next;
+      }
+    }
+    const S s = sin(0.5 * phase_ * field);
+    return bright_ + modulation_ * s * s;
+  }
+
+ private:
+  bool along_y_;
+  S phase_, low_, high_, bright_, modulation_;
+  std::vector<S> legendre_;
+};
+
+}  // namespace
+
+RenderPlan plan_bar(const Planning& planning) {
+  check_closed_form(planning.scene, "a crystal bar");
+  RenderPlan plan;
+  plan.method = "closed_form";
+  plan.reasons.push_back("a crystal between electrodes is one retarder per pixel: sin^2 in closed form");
+  const Crystal& crystal = std::get<Crystal>(planning.scene.sample);
+  const Values<double>& value = planning.value;
+  const double across = value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0);
+  note_illumination(planning.scene, value, std::abs(std::numbers::pi * across / value(crystal.half_wave_voltage_v)),
+                    plan);
+  return plan;
+}
+
+std::vector<double> bar_phases(const Scene& scene, const Values<double>& value) {
+  std::vector<double> result;
+  const Crystal& crystal = std::get<Crystal>(scene.sample);
+  double field = 1;
+  for (ParameterRef c : crystal.field_legendre) field += value(c);
+  result.push_back(std::numbers::pi * (value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0)) /
+                   value(crystal.half_wave_voltage_v) * field);
+  return result;
+}
+
+template <class S>
+std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene& scene, const RenderPlan&, const Values<S>& value) {
+  return std::make_unique<CrystalModel<S>>(scene, value);
+}
+#define BIREFIT_INSTANTIATE(S) \
+  template std::unique_ptr<PixelModel<S>> make_crystal_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+}  // namespace birefit

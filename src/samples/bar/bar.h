@@ -1,0 +1,14 @@
+#pragma once
+// A cubic crystal bar between electrodes.
+
+#include "samples/planning.h"
+
+namespace birefit {
+
+RenderPlan plan_bar(const Planning&);
+/// The retardance where the field is largest (rad).
+std::vector<double> bar_phases(const Scene&, const Values<double>&);
+template <class S>
+std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene&, const RenderPlan&, const Values<S>&);
+
+}  // namespace birefit

@@ -1,0 +1,136 @@
+#include "samples/disc/disc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "transport/method.h"
+
+namespace birefit {
+
+template <class S>
+DiscOptics<S>::DiscOptics(const Scene& scene, const Values<S>& value) {
+  const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+  const S radius_um = 0.5 * value(disc.diameter_um);
+  const S k0 = wavenumber_per_um(scene, value), optic = value(disc.stress_optic_brewster);
+  center_x_px = value(scene.view.center_x_px);
+  center_y_px = value(scene.view.center_y_px);
+  px_per_radius_inverse = scene.view.pixel_size_um / radius_um;
+  sin_cos(value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg), load_sin, load_cos);
+  // 1 brewster = 1e-12/Pa, 1 N/um^2 = 1e12 Pa: the powers of ten cancel, and so does the thickness.
+  load_phase = k0 * optic * value(disc.load_n) / radius_um;
+  residual_phase = k0 * optic * value(disc.thickness_um) * 1e-6;
+  for (ParameterRef ref : disc.residual_normal_mpa) residual_normal.push_back(value(ref));
+  for (ParameterRef ref : disc.residual_shear_mpa) residual_shear.push_back(value(ref));
+  if (!disc.illumination.empty()) illumination.push_back(S(1.0));
+  for (ParameterRef ref : disc.illumination) illumination.push_back(value(ref));
+}
+
+DiscMargins disc_margins(const StressedDisc& disc, double radius_um) {
+  return {disc.contact_radius_um > 0 ? disc.contact_radius_um / radius_um : 0.1,
+          disc.rim_um > 0 ? disc.rim_um / radius_um : 0.02};
+}
+
+DiscZone::DiscZone(const Scene& scene, const Theta& theta) {
+  const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+  const auto value = [&](ParameterRef ref, double otherwise = 0) {
+    return ref ? theta[static_cast<std::size_t>(ref.index)] : otherwise;
+  };
+  const double radius_um = 0.5 * value(disc.diameter_um);
+  margins_ = disc_margins(disc, radius_um);
+  radius_px_ = radius_um / scene.view.pixel_size_um;
+  center_x_px_ = value(scene.view.center_x_px), center_y_px_ = value(scene.view.center_y_px);
+  const double load = (value(disc.load_azimuth_deg, 90) + value(scene.view.rotation_deg)) * std::numbers::pi / 180;
+  load_cos_ = std::cos(load), load_sin_ = std::sin(load);
+}
+
+bool DiscZone::fitted(double column, double row) const {
+  const double x = (column - center_x_px_) / radius_px_, y = (center_y_px_ - row) / radius_px_;
+  const double to_force = std::min(std::hypot(x - load_cos_, y - load_sin_), std::hypot(x + load_cos_, y + load_sin_));
+  return std::hypot(x, y) <= 1 - margins_.rim && to_force >= margins_.contact;
+}
+
+namespace {
+
+/// (1 - e^-u)/u for u >= 0, with contrast = e^-u; by its Taylor series where the quotient cancels (next term 3e-14).
+template <class S>
+S lost_share(const S& u, const S& contrast) {
+  const S series =
+      1.0 -
+      u * (1.0 / 2 -
+           u * (1.0 / 6 - u * (1.0 / 24 - u * (1.0 / 120 - u * (1.0 / 720 - u * (1.0 / 5040 - u * (1.0 / 40320)))))));
+  const auto small = plain(u) < PlainOf<S>(0.1);
+  const S safe = select(small, S(1.0), u);
+  return select(small, series, S((1.0 - contrast) * (1.0 / safe)));
+}
+
+template <class S>
+class DiscModel final : public PixelModel<S> {
+ public:
+  DiscModel(const Scene& scene, const Values<S>& value)
+      : optics_(scene, value),
+        circular_(scene.microscope.quarter_wave),
+        coloured_(scene.microscope.bandwidth_nm > 0),
+        spread_(scene.microscope.bandwidth_nm / 2.3548200450309493 / value(scene.microscope.wavelength_nm)) {
+    const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+    const S load =
+        value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg) - 0.5 * std::numbers::pi;
+    const S p = value.radians(scene.microscope.polarizer_deg) - load,
+            a = value.radians(scene.microscope.analyzer_deg) - load;
+    sin_cos(S(a - p), sin_between_, cos_between_);
+    // Linear: the pair seen along p + a. Circular: along 2 p.
+    sin_cos(S(circular_ ? 2.0 * p : p + a), sin_sum_, cos_sum_);
+  }
+  S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const override {
+    S x, y;
+    optics_.place(S(column), S(row), x, y);
+    StressPair<S> pair = optics_.phases(x, y);
+    const auto outside = plain(S(x * x + y * y)) > PlainOf<S>(1.0);
+    pair.normal = select(outside, S(0.0), pair.normal);
+    pair.shear = select(outside, S(0.0), pair.shear);
+    // The retarder is cos(d/2) + i sin(d/2)/d [[normal, shear], [shear, -normal]], d^2 = normal^2 + shear^2. Over a
+    // line of Gaussian shape, d goes as 1/wavelength, cos d and sin d lose contrast: means of cos^2, of sin^2/d^2, of
+    // cos sin/d.
+    const S d_sq = pair.normal * pair.normal + pair.shear * pair.shear;
+    const CosSinc<S> f = cos_sinc_sq(S(0.25 * d_sq));
+    const S half = 0.5 * f.sinc_sq;
+    S cos_cos = f.cos_sq * f.cos_sq, sinc_sinc = half * half, cos_sinc = f.cos_sq * half;
+    if (coloured_) {
+      const S u = (0.5 * spread_ * spread_) * d_sq, contrast = exp(S(-u));
+      sinc_sinc = contrast * sinc_sinc + (0.25 * spread_ * spread_) * lost_share(u, contrast);
+      cos_sinc = contrast * cos_sinc;
+      cos_cos = 1.0 - d_sq * sinc_sinc;
+    }
+    const S along = pair.normal * cos_sum_ + pair.shear * sin_sum_;
+    S light;
+    if (!circular_) {
+      light = cos_between_ * cos_between_ * cos_cos + along * along * sinc_sinc;
+    } else {
+      light = cos_between_ * cos_between_ * cos_cos + 2.0 * cos_between_ * sin_between_ * along * cos_sinc +
+              sin_between_ * sin_between_ * d_sq * sinc_sinc;
+    }
+    if (optics_.illumination.empty()) return light;
+    const S east = (column - optics_.center_x_px) * optics_.px_per_radius_inverse,
+            north = (optics_.center_y_px - row) * optics_.px_per_radius_inverse;
+    return light * plane_polynomial<S>(optics_.illumination, east, north);
+  }
+
+ private:
+  DiscOptics<S> optics_;
+  bool circular_, coloured_;
+  S spread_;  ///< standard deviation of the wavelength over the wavelength
+  S sin_between_, cos_between_, sin_sum_, cos_sum_;
+};
+
+}  // namespace
+
+template <class S>
+std::unique_ptr<PixelModel<S>> make_disc_model(const Scene& scene, const RenderPlan&, const Values<S>& value) {
+  return std::make_unique<DiscModel<S>>(scene, value);
+}
+#define BIREFIT_INSTANTIATE(S)   \
+  template struct DiscOptics<S>; \
+  template std::unique_ptr<PixelModel<S>> make_disc_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+}  // namespace birefit

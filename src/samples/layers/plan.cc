@@ -1,0 +1,427 @@
+#include "samples/layers/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "birefit/error.h"
+#include "core/threads.h"
+#include "medium/build.h"
+#include "samples/layers/cone_view.h"
+#include "samples/layers/planar.h"
+#include "samples/pixels/sampling.h"
+#include "samples/tables/fringe_table.h"
+#include "transport/intensity_distance.h"
+#include "transport/methods.h"
+
+namespace birefit {
+
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Smallest entry of `candidates` whose worst pilot error is within `target`; fills error. Falls back to the last.
+int choose(const std::vector<int>& candidates, double target, const std::function<double(int)>& error_of,
+           double& error) {
+  for (int n : candidates) {
+    error = error_of(n);
+    if (error <= target) return n;
+  }
+  return candidates.back();
+}
+const std::vector<int> kSteps{1,  2,  3,  4,  5,  6,  8,   10,  12,  14,  16,  18,   20,   22,   24,  28,
+                              32, 40, 48, 64, 80, 96, 128, 192, 256, 384, 512, 1024, 2048, 4096, 8192};
+
+Ray<double> ray_at(const PlanarOptics<double>& o, double tx, double ty) {
+  const double c = 1 / std::sqrt(1 + tx * tx + ty * ty);
+  return {o.k0, o.n_host * c * tx, o.n_host * c * ty, o.continuity};
+}
+
+/// Phase difference of the two modes (rad), a sum over midpoints.
+double planar_phase(const PlanarOptics<double>& o, double tx, double ty, int nodes = 64) {
+  const Ray<double> ray = ray_at(o, tx, ty);
+  std::vector<double> u(static_cast<std::size_t>(nodes));
+  for (int i = 0; i < nodes; ++i) u[static_cast<std::size_t>(i)] = (i + 0.5) / nodes;
+  std::vector<OpticalPoint<double>> p(u.size());
+  o.column->sample(u, p.data());
+  double sum = 0;
+  for (const auto& point : p) {
+    const double eo = point.ordinary, de = point.extraordinary - eo;
+    const double ak = point.axis.x * ray.kx + point.axis.y * ray.ky, kk = ray.kx * ray.kx + ray.ky * ray.ky;
+    const double a = eo + de * square(point.axis.z), b = de * point.axis.z * ak,
+                 c = eo * kk + de * ak * ak - eo * point.extraordinary;
+    const double root = b * b - a * c;
+    if (eo <= kk || root <= 0) return 0;
+    sum += ((std::sqrt(root) - b) / a - std::sqrt(eo - kk)) * point.depth_slope_um / nodes;
+  }
+  return o.k0 * sum;
+}
+
+/// Closed-form pixel means (samples/fringe.h) wherever they agree with 8 x 8 Gauss points; around the image of the
+/// optic axis, where the modes turn within a pixel, the points stay. False when the fringes curve too fast for the
+/// formula.
+bool plan_fringe_means(const Planning& planning, const PlanarOptics<double>& o, RenderPlan& plan) {
+  const Scene& scene = planning.scene;
+  const int w = scene.view.width, h = scene.view.height;
+  RenderPlan trial = plan;
+  trial.fringe_means = true;
+  // Along the axis inside, the wavevector is n_o a.
+  OpticalPoint<double> face;
+  const double start[1] = {0.0};
+  o.column->sample(start, &face);
+  const double n_o = std::sqrt(face.ordinary), sign = face.axis.z < 0 ? -1 : 1;
+  const double sx = sign * n_o * face.axis.x / o.n_host, sy = sign * n_o * face.axis.y / o.n_host,
+               s2 = sx * sx + sy * sy;
+  constexpr int kAround = 10;  // pixels
+  trial.samples = {1};
+  if (s2 < 1) {
+    const double cosine = std::sqrt(1 - s2);
+    const auto [column, row] = ConeView<double>(scene, planning.value).pixel_of({sx / cosine, sy / cosine});
+    if (column > -kAround && row > -kAround && column < w + kAround && row < h + kAround) {
+      trial.sampling_center_x_px = column;
+      trial.sampling_center_y_px = row;
+      trial.sampling_bin_px = 1;
+      trial.samples.assign(kAround + 1, 1);
+      std::fill(trial.samples.begin(), trial.samples.begin() + 4, 8);
+      std::fill(trial.samples.begin() + 4, trial.samples.begin() + kAround, 4);
+    }
+  }
+  RenderPlan points = trial;
+  points.fringe_means = false;
+  points.samples = {8};
+  std::vector<std::array<int, 2>> pilots;
+  for (int i = 0; i < 64; ++i) {
+    const auto at = [&](double turn, int size) {
+      return std::min(size - 1, static_cast<int>((turn - std::floor(turn)) * size));
+    };
+    // the plastic number: even in two dimensions
+    pilots.push_back({at(i * 0.7548776662466927, w), at(i * 0.5698402909980532, h)});
+  }
+  for (int i : {0, w - 1})
+    for (int j : {0, h - 1}) pilots.push_back({i, j});
+  const double error = (planning.means_at(trial, pilots) - planning.means_at(points, pilots)).cwiseAbs().maxCoeff();
+  if (!(error <= scene.intensity_accuracy)) return false;
+  plan = trial;
+  plan.numerical_error = std::max(plan.numerical_error, error);
+  return true;
+}
+
+/// Squares of the picture whose fringes are smooth enough to be interpolated from 144 rays each; of the sizes tried,
+/// from the whole picture on, the one with the fewest rays.
+void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
+  const int w = scene.view.width, h = scene.view.height;
+  // Less than 1e-9 the powers of a phase of some hundred radians do not hold.
+  constexpr double kLeast = 1e-9;
+  if (scene.intensity_accuracy < 10 * kLeast) return;
+  const double target = std::max(kSquaresShare * scene.intensity_accuracy, kLeast);
+  constexpr int kColumns = 8, kRims = 2 * FringeBlocks::kRim;
+  const Values<Pack> lanes = value.template as<Pack>();
+  const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
+  double fewest = 0.5 * w * h;
+  for (int parts = 1;; parts *= 2) {
+    constexpr int kWhole = 8;  // lanes do not cross from square to square
+    static_assert(kWhole % kLanes == 0);
+    const int size = ((std::max(w, h) + kRims + parts - 1) / parts + kWhole - 1) / kWhole * kWhole;
+    const FringeBlocks blocks(w, h, size);
+    const double least = static_cast<double>(blocks.count()) * FringeTable<Pack>::kRays;
+    if (least >= fewest) break;
+    const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1),
+                                  kGivenUp * scene.intensity_accuracy, 0, {},
+                                  [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
+    std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
+    parallel_for(blocks.count(), 0, [&](int b) {
+      const double left = (b % blocks.columns) * size - FringeBlocks::kRim,
+                   top = (b / blocks.columns) * size - FringeBlocks::kRim;
+      FringeScratch scratch;
+      for (const double down : {0.02, 0.31, 0.77, 0.98})  // none a Chebyshev point, the ends among them
+        for (int first = 0; first < kColumns; first += kLanes) {
+          alignas(64) double column[kLanes];
+          for (int k = 0; k < kLanes; ++k)
+            column[k] = left + size * (0.01 + 0.98 * std::min(first + k, kColumns - 1) / (kColumns - 1.0));
+          const double row = top + down * size;
+          const FringePoint<Pack> exact = model->fringe(Pack::load_aligned(column), Pack(row));
+          for (int k = 0; k < kLanes; ++k) {
+            FringePoint<double> read;
+            if (!table.read(column[k], row, scratch, read)) return;
+            const auto distance = [k](const Pack& a, double c) { return std::abs(lane(a, k) - c); };
+            // Every part counts as the intensity it changes.
+            const double size_of_fringe = std::abs(lane(exact.amplitude, k)) + std::abs(lane(exact.quadrature, k));
+            const double error = distance(exact.mean, read.mean) + distance(exact.amplitude, read.amplitude) +
+                                 distance(exact.quadrature, read.quadrature) +
+                                 size_of_fringe * distance(exact.phase, read.phase);
+            if (!(error <= target)) return;  // also where there is no number: total reflection outside the picture
+          }
+        }
+      smooth[static_cast<std::size_t>(b)] = 1;
+    });
+    double left_over = 0;  // pixels
+    for (int b = 0; b < blocks.count(); ++b)
+      if (!smooth[static_cast<std::size_t>(b)])
+        left_over += static_cast<double>(std::min(size, w + kRims - b % blocks.columns * size)) *
+                     std::min(size, h + kRims - b / blocks.columns * size);
+    if (least + left_over < fewest) {
+      fewest = least + left_over;
+      plan.fringe_block_px = size;
+      plan.fringe_blocks = smooth;
+    }
+  }
+  if (plan.fringe_block_px == 0) return;
+  plan.numerical_error += target;
+  plan.reasons.push_back(fmt::format("{} of {} squares of {} pixels have their fringes interpolated from {} rays each",
+                                     std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1),
+                                     plan.fringe_blocks.size(), plan.fringe_block_px, FringeTable<Pack>::kRays));
+}
+
+/// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
+RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o,
+                            const std::vector<std::pair<double, double>>& directions) {
+  RenderPlan plan;
+  plan.method = "berreman";
+  const Berreman<double> method;
+  // Halving a step of order 4 leaves a sixteenth of its error.
+  const auto change = [&](int n) {
+    const Mesh mesh = uniform_mesh(n, o.column->breaks);
+    Mesh halved{0.0};
+    for (std::size_t i = 1; i < mesh.size(); ++i) halved.insert(halved.end(), {0.5 * (mesh[i - 1] + mesh[i]), mesh[i]});
+    double largest = 0;
+    for (const auto& [tx, ty] : directions)
+      largest = std::max(largest, intensity_distance(planar_jones<double>(o, method, mesh, tx, ty),
+                                                     planar_jones<double>(o, method, halved, tx, ty)));
+    return largest;
+  };
+  plan.steps = choose(kSteps, scene.intensity_accuracy, change, plan.numerical_error);
+  plan.reasons.push_back(
+      fmt::format("{} steps of the 4 x 4 transport hold the intensity to {} on {} directions (asked: {})", plan.steps,
+                  sci(plan.numerical_error), directions.size(), sci(scene.intensity_accuracy)));
+  plan.reasons.push_back("asked for by physics.ceiling: all reflections, between the two faces too");
+  if (plan.numerical_error > scene.intensity_accuracy)
+    plan.warnings.push_back(fmt::format("Even {} steps err by {}.", plan.steps, sci(plan.numerical_error)));
+  double largest_phase = 0, round_trip = 0;
+  OpticalPoint<double> middle;
+  const double half[1] = {0.5};
+  o.column->sample(half, &middle);
+  for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
+  round_trip = 2 * o.k0 * std::sqrt(middle.ordinary) * middle.depth_slope_um;
+  const double bandwidth = scene.microscope.bandwidth_nm / value(scene.microscope.wavelength_nm);
+  if (round_trip * bandwidth > 1)
+    plan.warnings.push_back(
+        fmt::format("Light of this bandwidth does not interfere between the faces (the phase of a round trip spreads "
+                    "by {:.2g} rad), but is computed "
+                    "as if it did: ceiling one_way is nearer to what is seen.",
+                    round_trip * bandwidth));
+  note_illumination(scene, value, largest_phase, plan);
+  return plan;
+}
+
+bool has_fringes(const Effort& effort) {
+  const std::string name = effort.method->info().name;
+  return name == "diagonal" || name == "modal";
+}
+
+/// Whether the slow solutions of the modes hold in the whole picture, not only on the pilots: where the axis comes near
+/// the wavevector the modes turn too fast for them. What their last pass changes tells.
+bool slow_everywhere(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o,
+                     const Effort& effort) {
+  const ConeView<double> cone(scene, value);
+  const double w = scene.view.width, h = scene.view.height;
+  const Mesh mesh = uniform_mesh(effort.steps, o.column->breaks);
+  constexpr int kAcross = 24, kPasses = Modal<double>::kPasses;
+  const auto medium = [&](double u) {
+    OpticalPoint<double> p;
+    o.column->sample({&u, 1}, &p);
+    return p;
+  };
+  for (int i = 0; i <= kAcross; ++i)
+    for (int j = 0; j <= kAcross; ++j) {
+      const auto t = cone.at(w * i / kAcross - 0.5, h - 0.5 - h * j / kAcross);
+      const Ray<double> ray = ray_at(o, t.x, t.y);
+      if (modes_turn_over(medium, ray, 0, 1, 32)) return false;
+      const Mat2<double> all = together(modal_transfer(*o.column, ray, mesh, kPasses)),
+                         fewer = together(modal_transfer(*o.column, ray, mesh, kPasses - 1));
+      if (!(intensity_distance(all, fewer) <= scene.intensity_accuracy)) return false;
+    }
+  return true;
+}
+
+/// What a camera at the side does to the picture, in words.
+void note_camera(const Scene& scene, const Values<double>& value, const ConeView<double>& view, RenderPlan& plan) {
+  if (!scene.view.camera) return;
+  const double x = std::tan(value.radians(scene.view.camera->tilt_x_deg)),
+               y = std::tan(value.radians(scene.view.camera->tilt_y_deg));
+  const double t = std::hypot(x, y), w = scene.view.width - 0.5, h = scene.view.height - 0.5;
+  const auto [far, near] =
+      std::minmax({view.nearness(-0.5, -0.5), view.nearness(-0.5, h), view.nearness(w, -0.5), view.nearness(w, h)});
+  plan.reasons.push_back(
+      fmt::format("the camera sees the screen from {:.3g} degrees aside, azimuth {:.3g}: foreshortened there to "
+                  "{:.3g}; the scale in the picture's corners goes from {:.3g} to {:.3g} of the middle's",
+                  std::atan(t) * 180 / kPi, std::atan2(y, x) * 180 / kPi, 1 / std::hypot(1.0, t), far, near));
+}
+
+}  // namespace
+
+std::vector<double> planar_phases(const Scene& scene, const Values<double>& value) {
+  std::vector<double> result;
+  const PlanarOptics<double> o = planar_optics(scene, value);
+  for (const auto& [tx, ty] : pilot_directions(scene, value)) result.push_back(planar_phase(o, tx, ty));
+  if (const auto* cell = std::get_if<Cell>(&scene.sample)) {
+    if (const auto* twisted = std::get_if<TwistedDirector>(&cell->director))
+      result.push_back(2 * value.radians(twisted->twist_deg));
+    if (const auto* field = std::get_if<FreederickszDirector>(&cell->director))
+      result.push_back(2 * value.radians(field->twist_deg));
+    if (const auto* helix = std::get_if<HelixDirector>(&cell->director))
+      result.push_back(4 * kPi * value(cell->thickness_um) / value(helix->pitch_um));
+  }
+  result.push_back(value.radians(scene.microscope.compensator_phase_deg));
+  return result;
+}
+
+RenderPlan plan_planar(const Planning& planning) {
+  const Scene& scene = planning.scene;
+  const Values<double>& value = planning.value;
+  RenderPlan plan;
+  if (scene.view.camera) {
+    // A twentieth of the middle's scale: what is twenty times as far away as the middle is not a picture of a screen
+    // any more.
+    const ConeView<double> view(scene, value);
+    for (const int column : {0, scene.view.width - 1})
+      for (const int row : {0, scene.view.height - 1})
+        if (!(view.nearness(column, row) > 0.05))
+          throw UserError(
+              Where{},
+              fmt::format("the corner of the picture at column {}, row {} looks past the horizon of the screen", column,
+                          row),
+              "lower half_field_deg or the tilt of view.camera");
+  }
+  const PlanarOptics<double> o = planar_optics(scene, value);
+  o.column->freeze();  // no node set comes twice: remembering them would only cost the search
+  const auto directions = pilot_directions(scene, value);
+  const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
+  const bool cone = half_angle.has_value();
+  for (const auto& [tx, ty] : pilot_directions(scene, value, std::numeric_limits<std::size_t>::max())) {
+    const Ray<double> ray = ray_at(o, tx, ty);
+    std::vector<double> u{0.0, 0.5, 1.0};
+    OpticalPoint<double> p[3];
+    o.column->sample(u, p);
+    for (const auto& q : p)
+      if (std::min(q.ordinary, q.extraordinary) <= ray.kx * ray.kx + ray.ky * ray.ky)
+        throw UserError(
+            Where{},
+            "a direction of this scene is totally reflected: its tangential wavevector exceeds an index of the sample",
+            "lower the angle of incidence or the surround's index");
+  }
+  if (scene.ceiling == Ceiling::reflections) return plan_reflections(scene, value, o, directions);
+  const double target = scene.intensity_accuracy;
+  const bool slab = std::holds_alternative<Slab>(scene.sample);
+  const Pilots pilots = planar_pilots(scene, value);
+  const bool choose_freely = scene.method == "auto";
+  Effort effort =
+      cheapest_effort(pilots, target, choose_freely ? "" : scene.method, false, choose_freely && !cone ? "modal" : "");
+  if (cone && choose_freely && !has_fringes(effort)) {
+    // Pixel means come in closed form from transport in the modes: worth half as many samples again.
+    for (const char* name : {"diagonal", "modal"}) {
+      const Effort modes = cheapest_effort(pilots, target, name, false);
+      if (modes.error <= target && 2 * modes.samples <= 3 * effort.samples) {
+        effort = modes;
+        break;
+      }
+    }
+  }
+  if (cone && choose_freely && effort.method->info().slow_axes && !slow_everywhere(scene, value, o, effort))
+    effort = cheapest_effort(pilots, target, "", false, "modal");
+  plan.method = effort.method->info().name;
+  plan.steps = effort.steps;
+  plan.numerical_error = effort.error;
+  const std::string what =
+      fmt::format("{}: {}, {} samples of the medium a ray, hold the intensity to {} on {} pilot rays (asked: {})",
+                  plan.method, effort_text(plan.method, plan.steps), effort.samples, sci(effort.error), pilots.size(),
+                  sci(scene.intensity_accuracy));
+  if (effort.error > target && scene.method == "auto") {
+    // Steps where they are needed, by their own estimate.
+    double local_errors = 0;
+    for (const auto& [tx, ty] : directions) {
+      double estimate = 0;
+      const Mesh mesh = adapted_mesh(*o.column, ray_at(o, tx, ty), std::max(target / 20, 1e-13), &estimate);
+      local_errors = std::max(local_errors, estimate);
+      if (mesh.size() > plan.mesh.size()) plan.mesh = mesh;
+    }
+    plan.method = "magnus4";
+    plan.numerical_error = 2 * local_errors;  // of the matrix; an intensity changes by twice that at most
+    plan.reasons.push_back(fmt::format(
+        "no equal steps hold the accuracy: full 2 x 2 transport with {} adapted Magnus-4 steps", plan.mesh.size() - 1));
+  } else if (effort.error > target) {
+    plan.reasons.push_back(fmt::format("{} was asked for by name: {} err by {}", plan.method,
+                                       effort_text(plan.method, plan.steps), sci(plan.numerical_error)));
+    plan.warnings.push_back(
+        fmt::format("The {} method, asked for by name, errs by {} here.", plan.method, sci(plan.numerical_error)));
+  } else {
+    plan.reasons.push_back(plan.method == "diagonal" ? "mode coupling is below the accuracy: " + what
+                           : o.column->planar
+                               ? what + "; no method needs fewer"
+                               : (plan.method == "modal"
+                                      ? "the modes couple, slowly against their phase: "
+                                      : "the axis turns out of the ray's plane: full 2 x 2 transport, ") +
+                                     what + "; no method needs fewer");
+  }
+  double largest_phase = 0;
+  for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
+  if (cone) {
+    const ConeView<double> view(scene, value);
+    const double cx = view.center_x, cy = view.center_y;
+    note_camera(scene, value, view, plan);
+    const int bins = static_cast<int>(std::ceil(
+                         std::hypot(std::max(cx, scene.view.width - cx), std::max(cy, scene.view.height - cy)))) +
+                     1;
+    // The gradient changes slowly with radius: measure it on 24 radii and 12 azimuths, interpolate.
+    std::vector<double> gradient(25);
+    for (int i = 0; i <= 24; ++i)
+      for (int k = 0; k < 12; ++k) {
+        const double r = bins * i / 24.0, a = k * kPi / 6;
+        double x = cx + r * std::cos(a), y = cy - r * std::sin(a);
+        // Seen from the side there may be no screen outside the picture: there its edge, which ends in its corners,
+        // stands for what lies beyond.
+        if (scene.view.camera)
+          x = std::clamp(x, 0.0, scene.view.width - 1.0), y = std::clamp(y, 0.0, scene.view.height - 1.0);
+        const auto phase = [&](double column, double row) {
+          const auto t = view.at(column, row);
+          return planar_phase(o, t.x, t.y, 24);
+        };
+        const double gx = phase(x + 0.5, y) - phase(x - 0.5, y), gy = phase(x, y + 0.5) - phase(x, y - 0.5);
+        gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(gx, gy));
+      }
+    const double fastest = *std::max_element(gradient.begin(), gradient.end());
+    plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel", fastest));
+    if ((plan.method == "diagonal" || plan.method == "modal") && plan_fringe_means(planning, o, plan)) {
+      plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
+      plan_fringe_blocks(scene, value, plan);
+    } else {
+      sample_by_radius(plan, cx, cy, bins, [&](double r) {
+        const double f = std::min(23.999, r / bins * 24);
+        const std::size_t i = static_cast<std::size_t>(f);
+        return samples_for(std::max(gradient[i], gradient[i + 1]), scene.intensity_accuracy);
+      });
+      const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+      plan.reasons.push_back(fmt::format("pixel means from up to {} x {} rays a pixel", most, most));
+    }
+  } else if (!slab) {
+    plan.reasons.push_back("every pixel sees the same ray: one transfer for the whole image");
+  }
+  OpticalPoint<double> faces[2];
+  const double ends[2] = {0, 1};
+  o.column->sample(ends, faces);
+  double r = 0;
+  for (const auto& f : faces)
+    r = std::max({r, reflectance(std::sqrt(f.ordinary), o.n_host), reflectance(std::sqrt(f.extraordinary), o.n_host)});
+  plan.model_error = r + (scene.ceiling == Ceiling::e_only ? 0.03 : 0.0);
+  if (r > 0.01)
+    plan.left_out.push_back(
+        fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by "
+                    "up to about {:.2g}.",
+                    r, r));
+  note_illumination(scene, value, largest_phase, plan);
+  return plan;
+}
+
+}  // namespace birefit

@@ -1,0 +1,58 @@
+#include "samples/planning.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "birefit/error.h"
+
+namespace birefit {
+
+std::string sci(double x) { return fmt::format("{:.1e}", x); }
+
+std::string effort_text(const std::string& method, int steps) {
+  return fmt::format("{} {}", steps, method == "diagonal" ? "Gauss nodes" : "steps");
+}
+
+void check_closed_form(const Scene& scene, const std::string& what) {
+  if (scene.method != "auto" && scene.method != "diagonal")
+    throw UserError(Where{}, fmt::format("transport method '{}' does not apply to {}", scene.method, what),
+                    "leave transport.method at auto");
+}
+
+void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double bins,
+                      const std::function<int(double)>& points) {
+  plan.sampling_center_x_px = center_x;
+  plan.sampling_center_y_px = center_y;
+  plan.sampling_bin_px = 1;
+  plan.samples.clear();
+  for (int i = 0; i < bins; ++i) plan.samples.push_back(points(i + 0.5));
+}
+
+void note_illumination(const Scene& scene, const Values<double>& value, double largest_phase, RenderPlan& plan) {
+  const Microscope& m = scene.microscope;
+  if (m.bandwidth_nm > 0) {
+    const double s = largest_phase * m.bandwidth_nm / 2.355 / value(m.wavelength_nm);
+    const double loss = 0.5 * (1 - std::exp(-0.5 * s * s));
+    plan.model_error = std::hypot(plan.model_error, loss);
+    if (loss > 1e-3)
+      plan.warnings.push_back(
+          fmt::format("The light's bandwidth of {:g} nm is not modelled; at the largest retardance here ({:.3g} rad) "
+                      "it changes the "
+                      "intensity by up to {:.2g}.",
+                      m.bandwidth_nm, largest_phase, loss));
+  }
+  if (m.condenser_na > 0) {
+    const double s = largest_phase * m.condenser_na * m.condenser_na / 8;  // mean phase shift over the cone, n ~ 1.5
+    const double loss = std::min(0.5, 0.5 * std::abs(s));
+    plan.model_error = std::hypot(plan.model_error, loss);
+    if (loss > 1e-3)
+      plan.warnings.push_back(
+          fmt::format("The condenser's aperture (NA {:g}) is not modelled; it shifts the phase by about {:.2g} rad.",
+                      m.condenser_na, s));
+  }
+}
+
+double reflectance(double n1, double n2) { return square((n1 - n2) / (n1 + n2)); }
+
+}  // namespace birefit

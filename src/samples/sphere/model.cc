@@ -1,0 +1,28 @@
+// The picture of a sphere, in whatever way it is planned.
+
+#include <stdexcept>
+
+#include "samples/curved/eikonal_image.h"
+#include "samples/sphere/ball.h"
+#include "samples/sphere/droplet.h"
+#include "samples/sphere/plan.h"
+#include "samples/waves/series.h"
+
+namespace birefit {
+
+template <class S>
+std::unique_ptr<PixelModel<S>> make_sphere_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+  if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
+  if (looks_round(std::get<Droplet>(scene.sample)))
+    return scene.rays == Rays::eikonal ? make_eikonal_model(scene, plan, value)
+                                       : make_droplet_model(scene, plan, value);
+  if constexpr (kForTablesOnly<S>)
+    throw std::logic_error("a ray a point takes fewer derivatives at once");
+  else
+    return make_ball_model(scene, plan, value);
+}
+#define BIREFIT_INSTANTIATE(S) \
+  template std::unique_ptr<PixelModel<S>> make_sphere_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
+
+}  // namespace birefit

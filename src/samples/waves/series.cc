@@ -1,0 +1,239 @@
+#include "samples/waves/series.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "medium/build.h"
+#include "samples/pixels/pixel_mean.h"
+#include "samples/sphere/droplet.h"
+#include "samples/tables/radial_table.h"
+#include "samples/tables/round_view.h"
+#include "samples/waves/objective.h"
+#include "wave/radial_series.h"
+
+namespace birefit {
+namespace {
+
+/// The series knows single numbers, not lanes.
+template <class S>
+struct SingleOf {
+  using Type = double;
+  static double of(const S& x) { return lane(plain(x), 0); }
+};
+template <int N>
+struct SingleOf<Dual<Pack, N>> {
+  using Type = Dual<double, N>;
+  static Type of(const Dual<Pack, N>& x) {
+    Type r(lane(x.value, 0));
+    for (int j = 0; j < N; ++j) r.d[static_cast<std::size_t>(j)] = lane(x.d[static_cast<std::size_t>(j)], 0);
+    return r;
+  }
+};
+
+template <class S>
+class SeriesImage final : public PixelModel<S> {
+ public:
+  using P = PlainOf<S>;
+  using Single = typename SingleOf<S>::Type;
+  static constexpr int kTerms = 3;
+  SeriesImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+      : optics_(droplet_optics(scene, value)),
+        reach_um_(plan.series_reach_um),
+        panels_(plan.radial_panels),
+        na_(scene.microscope.objective_na),
+        pupil_(scene.microscope.aplanatic ? Pupil::aplanatic : Pupil::focal_plane),
+        focus_um_(value.get(scene.microscope.focus_um, 0.0)),
+        view_(scene, value) {
+    symmetry_ = round_symmetry(scene, value, false);
+    S unused;
+    sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), unused,
+            cos_between_);
+    RadialBall<Single> ball;
+    const auto one = [](const S& x) { return SingleOf<S>::of(x); };
+    if (optics_.director == DropletOptics<S>::Director::shell)
+      ball.layers.push_back({one(optics_.core_um), one(optics_.core_index), one(optics_.core_index)});
+    ball.layers.push_back({one(optics_.radius_um), one(optics_.n_o), one(optics_.n_e)});
+    ball.n_host = one(optics_.n_host);
+    ball.k0 = one(optics_.k0);
+    series_ = radial_series(ball);
+  }
+
+  void tabulate(typename PixelModel<S>::Wanted, int threads) override {
+    const RadialImage<Single> image(series_, na_, SingleOf<S>::of(focus_um_), reach_um_, pupil_);
+    const Single between = SingleOf<S>::of(cos_between_);
+    table_ = RadialTable<S>(panels_, kTerms, threads, [&](const P& v, S* out) {
+      if constexpr (kLanesOf<S> == 1) {
+        terms(image(v * reach_um_), between, out);
+      } else {
+        alignas(64) double place[kLanes], values[kLanes];
+        v.store_aligned(place);
+        std::array<std::array<Single, kTerms>, kLanes> f;
+        for (int k = 0; k < kLanes; ++k)
+          terms(image(Single(place[k] * reach_um_)), between, f[static_cast<std::size_t>(k)].data());
+        for (std::size_t t = 0; t < kTerms; ++t) {
+          const auto gather = [&](const auto& part) {
+            for (std::size_t k = 0; k < kLanes; ++k) values[k] = part(f[k][t]);
+            return Pack::load_aligned(values);
+          };
+          if constexpr (ScalarTraits<S>::derivatives > 0) {
+            out[t].value = gather([](const Single& x) { return x.value; });
+            for (std::size_t j = 0; j < out[t].d.size(); ++j)
+              out[t].d[j] = gather([j](const Single& x) { return x.d[j]; });
+          } else {
+            out[t] = gather([](const Single& x) { return x; });
+          }
+        }
+      }
+    });
+  }
+
+  Symmetry symmetry() const override { return symmetry_; }
+
+  // Behind the analyser the field is (1 + A0) cos(analyser - polarizer) + A2 q, q = cos(2 azimuth - analyser -
+  // polarizer).
+  S intensity(const P& column, const P& row) const override {
+    const auto place = view_.at(column, row);
+    const auto basis = RoundView<S>::basis(place);
+    const P v = place.rho_um * P(1 / reach_um_);
+    if constexpr (ScalarTraits<S>::derivatives == 0) {
+      return table_.template sum<kTerms>(v, basis.data());
+    } else {
+      typename RadialTable<S>::Slopes slopes;
+      const auto turned = RoundView<S>::turned(place);
+      S light = table_.template sum<kTerms>(v, basis.data(), turned.data(), &slopes);
+      view_.add_moves_and_turns(place, slopes.by_v * P(1 / reach_um_), slopes.turned, light);
+      return light;
+    }
+  }
+
+  /// Largest difference between the table and the series, over places that are no nodes of it.
+  double table_error() const {
+    const RadialImage<Single> image(series_, na_, SingleOf<S>::of(focus_um_), reach_um_, pupil_);
+    const Single between = SingleOf<S>::of(cos_between_);
+    double error = 0;
+    for (int i = 0; i < 60; ++i) {
+      const double turn = (i + 0.5) * 0.6180339887498949, v = turn - std::floor(turn);
+      Single f[kTerms];
+      terms(image(Single(v * reach_um_)), between, f);
+      for (int t = 0; t < kTerms; ++t) {
+        P basis[kTerms] = {P(0.0), P(0.0), P(0.0)};
+        basis[t] = P(1.0);
+        error = std::max(error, std::abs(lane(plain(table_.template sum<kTerms>(P(v), basis)), 0) - plain(f[t])));
+      }
+    }
+    return error;
+  }
+
+ private:
+  static void terms(const RadialAmplitudes<Single>& field, const Single& between, Single* f) {
+    const Single re = between * (1.0 + field.a0.re), im = between * field.a0.im;
+    f[0] = field.a2.re * field.a2.re + field.a2.im * field.a2.im;
+    f[1] = 2.0 * (re * field.a2.re + im * field.a2.im);
+    f[2] = re * re + im * im;
+  }
+
+  DropletOptics<S> optics_;
+  double reach_um_;
+  int panels_;
+  double na_;
+  Pupil pupil_;
+  S focus_um_, cos_between_;
+  RoundView<S> view_;
+  Symmetry symmetry_;
+  RadialSeries<Single> series_;
+  RadialTable<S> table_;
+};
+
+}  // namespace
+
+bool has_series(const Scene& scene) {
+  const auto* droplet = std::get_if<Droplet>(&scene.sample);
+  if (!droplet) return false;
+  if (const auto* radial = std::get_if<RadialDirector>(&droplet->director)) return !radial->twist_deg;
+  const auto* shell = std::get_if<ShellDirector>(&droplet->director);
+  return shell && !shell->offset_um[0];
+}
+
+RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
+  const DropletOptics<double> o = droplet_optics(scene, value);
+  const double na = scene.microscope.objective_na, px = scene.view.pixel_size_um;
+  check_objective(scene, o.n_host);
+  RenderPlan plan;
+  plan.method = "series";
+  plan.physics = "wave";
+  const double size = o.k0 * std::max({o.n_o, o.n_e, o.n_host}) * o.radius_um;
+  if (size > 1000)
+    throw UserError(
+        Where{},
+        fmt::format("a sphere of {:.3g} um is too large for the exact series ({:.0f} radians of phase; up to 1000)",
+                    2 * o.radius_um, size),
+        "check diameter_um, or use ceiling: one_way");
+  // To the farthest corner, and a tenth more: the centre may be fitted.
+  const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px);
+  plan.series_reach_um = 1.1 * px *
+                         (2 + std::hypot(std::max(std::abs(cx), std::abs(scene.view.width - 1 - cx)),
+                                         std::max(std::abs(cy), std::abs(scene.view.height - 1 - cy))));
+  plan.reasons.push_back(
+      "a sphere with a radial axis has an exact solution of Maxwell's equations, cheaper than any other wave optics: "
+      "its series");
+  // Intensity has no wavevector beyond twice the aperture's: panels of a few radians of that.
+  const double target = std::max(1e-3 * scene.intensity_accuracy, 1e-11), finest = 2 * o.k0 * na * plan.series_reach_um;
+  double error = 0;
+  for (plan.radial_panels = std::max(2, static_cast<int>(finest / 8));;
+       plan.radial_panels += std::max(1, plan.radial_panels / 4)) {
+    SeriesImage<double> image(scene, plan, value);
+    image.tabulate(PixelModel<double>::Wanted::picture, 1);
+    error = image.table_error();
+    if (error <= target || plan.radial_panels > finest) break;
+  }
+  plan.reasons.push_back(fmt::format("its field at {} radii serves all pixels (interpolated to {:.1e})",
+                                     plan.radial_panels * RadialTable<double>::kPoints, error));
+  // Pixels on a spiral over the sphere and what the focus spreads around it; few stand for many, hence thrice the
+  // worst.
+  const double over = std::min(plan.series_reach_um / 1.1,
+                               o.radius_um + 1 + std::abs(value.get(scene.microscope.focus_um, 0.0)) * na / o.n_host) /
+                      px;
+  const Values<Pack> lanes = value.as<Pack>();
+  SeriesImage<Pack> image(scene, plan, lanes);
+  image.tabulate(PixelModel<Pack>::Wanted::picture, 1);
+  constexpr int kPixels = 96;
+  double left = 0;
+  plan.samples = {1};
+  for (int& n = plan.samples[0];; n += n < 4 ? 1 : 2) {
+    left = 0;
+    for (int i = 0; i < kPixels; ++i) {
+      const double radius = over * (i + 0.5) / kPixels, azimuth = 2.399963 * i,
+                   column = std::round(cx + radius * std::cos(azimuth)),
+                   row = std::round(cy + radius * std::sin(azimuth));
+      if (column < 0 || row < 0 || column >= scene.view.width || row >= scene.view.height) continue;
+      left = std::max(
+          left, 3 * std::abs(lane(
+                        mean_over_one_pixel(image, column, row, n) - mean_over_one_pixel(image, column, row, 16), 0)));
+    }
+    if (left <= 0.5 * scene.intensity_accuracy || n >= 8) break;
+  }
+  plan.numerical_error = 2 * error + left;
+  plan.reasons.push_back(
+      fmt::format("pixel means from {0} x {0} points, measured: they are good to {1:.1e}", plan.samples[0], left));
+  if (plan.numerical_error > scene.intensity_accuracy)
+    plan.warnings.push_back(fmt::format(
+        "Pixels as large as these ({:.3g} um) average over so many fringes that their means are good to {:.1e} only.",
+        px, plan.numerical_error));
+  const double radii = plan.radial_panels * RadialTable<double>::kPoints,
+               points = static_cast<double>(scene.view.width) * scene.view.height * plan.samples[0] * plan.samples[0];
+  // more radii take more orders; measured with eight lanes
+  plan.cost_seconds = radii * (1e-6 + 2e-9 * radii) + 2.5e-9 * points;
+  return plan;
+}
+
+template <class S>
+std::unique_ptr<PixelModel<S>> make_series_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+  return std::make_unique<SeriesImage<S>>(scene, plan, value);
+}
+#define BIREFIT_INSTANTIATE(S) \
+  template std::unique_ptr<PixelModel<S>> make_series_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
+
+}  // namespace birefit

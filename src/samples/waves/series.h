@@ -1,0 +1,15 @@
+#pragma once
+// Pictures of radial droplets and concentric shells by their exact series, Ceiling::wave.
+
+#include "samples/image.h"
+
+namespace birefit {
+
+/// Radial without twist, or a concentric shell.
+bool has_series(const Scene& scene);
+/// Throws UserError like plan_wave, which serves the other spheres.
+RenderPlan plan_series(const Scene& scene, const Values<double>& value);
+template <class S>
+std::unique_ptr<PixelModel<S>> make_series_model(const Scene&, const RenderPlan&, const Values<S>&);
+
+}  // namespace birefit

@@ -1,0 +1,480 @@
+#include "samples/waves/wave.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "birefit/volume.h"
+#include "medium/build.h"
+#include "samples/sphere/ball.h"
+#include "samples/volume/volume.h"
+#include "samples/waves/objective.h"
+#include "samples/waves/series.h"
+#include "wave/march.h"
+#include "wave/sampled.h"
+#include "wave/sphere.h"
+
+namespace birefit {
+namespace {
+
+template <class S>
+SphereOptics<S> sphere_optics(const Scene& scene, const Values<S>& value) {
+  const Droplet& droplet = std::get<Droplet>(scene.sample);
+  SphereOptics<S> o;
+  const auto take = [&](const DropletOptics<S>& d) {
+    o.radius_um = d.radius_um, o.n_o = d.n_o, o.n_e = d.n_e, o.n_host = d.n_host;
+  };
+  if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) {
+    take(droplet_optics(scene, value));
+    o.field = RadialField<S>{static_cast<bool>(radial->twist_deg), value.radians(radial->twist_deg)};
+    return o;
+  }
+  if (const auto* axial = std::get_if<AxialDirector>(&droplet.director); axial && !axial->field_azimuth_deg) {
+    const DropletOptics<S> d = droplet_optics(scene, value);
+    take(d);
+    o.field = TiltedAxialField<S>{{S(0.0), S(0.0), S(1.0)}, d.axial};
+    return o;
+  }
+  if (const auto* shell = std::get_if<ShellDirector>(&droplet.director)) {
+    o.has_core = true;
+    const DropletOptics<S> d = droplet_optics(scene, value);
+    o.core_um = d.radius_um - value(shell->wall_um);
+    o.core_index = shell->core_index ? value(shell->core_index) : d.n_host;
+    if (!shell->offset_um[0]) {
+      take(d);
+      o.field = RadialField<S>{false, S(0.0)};
+      return o;
+    }
+  }
+  const BallOptics<S> ball = ball_optics(scene, value);
+  take(ball.sphere);
+  std::visit([&](const auto& field) { o.field = field; }, ball.field);
+  if (const auto* nested = std::get_if<NestedField<S>>(&ball.field))
+    o.core_offset_um = {o.radius_um * nested->offset.x, o.radius_um * nested->offset.y, o.radius_um * nested->offset.z};
+  return o;
+}
+
+template <class S>
+SampledOptics<S> sampled_optics(const Scene& scene, const Values<S>& value) {
+  const VolumeOptics<S> v(scene, value);
+  SampledOptics<S> o;
+  o.grid = v.grid.get();
+  o.scale = value.get(std::get<SampledVolume>(scene.sample).scale, 1.0);
+  o.cos_turn = v.cos_turn, o.sin_turn = v.sin_turn;
+  o.n_o = v.n_o, o.n_e = v.n_o + v.birefringence, o.n_host = host_index(scene, value);
+  return o;
+}
+
+template <class S>
+std::unique_ptr<WaveMedium<S>> wave_medium(const Scene& scene, const Values<S>& value, double ramp_um) {
+  if (std::holds_alternative<SampledVolume>(scene.sample))
+    return std::make_unique<SampledMedium<S>>(sampled_optics(scene, value), ramp_um);
+  return std::make_unique<SphereMedium<S>>(sphere_optics(scene, value), ramp_um);
+}
+
+/// What planning needs to know of a sphere or box.
+struct WaveObject {
+  double n_o, n_e, n_host, core_index;
+  double radius_um;  ///< of WavePlan
+  WaveGrid grid;
+  std::string what;
+};
+WaveObject wave_object(const Scene& scene, const Values<double>& value) {
+  const double k0 = wavenumber_per_um(scene, value), na = scene.microscope.objective_na;
+  if (!scene.surround_index && !scene.surround_dispersion)
+    throw UserError(Where{}, "ceiling: wave needs sample.surround",
+                    "the index of what is around the sample, and in a sampled box where there is no liquid crystal");
+  check_objective(scene, host_index(scene, value));
+  if (std::holds_alternative<SampledVolume>(scene.sample)) {
+    const SampledOptics<double> o = sampled_optics(scene, value);
+    const VolumeGrid& v = *o.grid;
+    const auto side = [&](int nodes, std::size_t i) { return o.scale * v.spacing_um[i] * (nodes - 1); };
+    return {o.n_o,
+            o.n_e,
+            o.n_host,
+            o.n_host,
+            0.5 * std::max({side(v.nx, 0), side(v.ny, 1), side(v.nz, 2)}),
+            sampled_grid(o, k0, na),
+            fmt::format("box of {:.3g} x {:.3g} x {:.3g} um", side(v.nx, 0), side(v.ny, 1), side(v.nz, 2))};
+  }
+  if (!std::holds_alternative<Droplet>(scene.sample))
+    throw UserError(Where{}, "ceiling: wave is for droplets, shells and sampled fields",
+                    "use one_way or, for cells and slabs, reflections");
+  const SphereOptics<double> o = sphere_optics(scene, value);
+  return {o.n_o,
+          o.n_e,
+          o.n_host,
+          o.has_core ? o.core_index : o.n_host,
+          o.radius_um,
+          sphere_grid(o, k0, na),
+          fmt::format("sphere of {:.3g} um", 2 * o.radius_um)};
+}
+
+WaveImaging imaging_of(const Scene& scene, const Values<double>& value, const WaveGrid& grid) {
+  const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px), px = scene.view.pixel_size_um;
+  const auto reach = [&](double centre, int pixels) {
+    return px * (std::max(std::abs(centre), std::abs(pixels - 1 - centre)) + 1);
+  };
+  return plan_imaging(grid, wavenumber_per_um(scene, value), scene.microscope.objective_na, reach(cx, scene.view.width),
+                      reach(cy, scene.view.height));
+}
+
+}  // namespace
+
+namespace {
+
+int add_constant(Theta& theta, double value) {
+  theta.push_back(value);
+  return static_cast<int>(theta.size()) - 1;
+}
+
+/// Radius of a ball of as much liquid crystal as there is in a box, in its units; none where that is all of the box, or
+/// the ball does not fit in.
+std::optional<double> radius_of_ball(const VolumeGrid& g) {
+  const auto crystal = std::count_if(g.nodes.begin(), g.nodes.end(), is_crystal);
+  const double radius = std::cbrt(static_cast<double>(crystal) * g.spacing_um[0] * g.spacing_um[1] * g.spacing_um[2] *
+                                  0.75 / std::numbers::pi);
+  const auto fits = [&](int nodes, std::size_t i) { return radius < 0.5 * (nodes - 1) * g.spacing_um[i]; };
+  if (crystal == 0 || crystal == std::ssize(g.nodes) || !fits(g.nx, 0) || !fits(g.ny, 1) || !fits(g.nz, 2))
+    return std::nullopt;
+  return radius;
+}
+
+/// Of that radius, in a box `share` times as wide as another, its nodes as far apart.
+std::shared_ptr<const VolumeGrid> sampled_ball(const VolumeGrid& like, double radius, double share = 1) {
+  auto ball = std::make_shared<VolumeGrid>();
+  const auto nodes = [&](int n) { return std::max(2, static_cast<int>(std::ceil(share * (n - 1))) + 1); };
+  ball->nx = nodes(like.nx), ball->ny = nodes(like.ny), ball->nz = nodes(like.nz);
+  ball->spacing_um = like.spacing_um;
+  ball->nodes.resize(static_cast<std::size_t>(ball->nx) * static_cast<std::size_t>(ball->ny) *
+                     static_cast<std::size_t>(ball->nz));
+  for (int k = 0; k < ball->nz; ++k)
+    for (int j = 0; j < ball->ny; ++j)
+      for (int i = 0; i < ball->nx; ++i) {
+        const double x = (i - 0.5 * (ball->nx - 1)) * ball->spacing_um[0],
+                     y = (j - 0.5 * (ball->ny - 1)) * ball->spacing_um[1],
+                     z = (k - 0.5 * (ball->nz - 1)) * ball->spacing_um[2];
+        const double r = std::sqrt(x * x + y * y + z * z);
+        ball->nodes[ball->at(i, j, k)] = r > radius ? std::array<double, 6>{}
+                                         : r > 0    ? director_tensor(x / r, y / r, z / r)
+                                                    : director_tensor(0, 0, 1);
+      }
+  return ball;
+}
+
+}  // namespace
+
+std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta) {
+  RadialTwin twin{{scene, scene}, theta};
+  Scene &exact = twin.scenes[0], &propagated = twin.scenes[1];
+  exact.method = "series";
+  propagated.method = "split_step";
+  if (std::holds_alternative<Droplet>(scene.sample)) {
+    Droplet& droplet = std::get<Droplet>(exact.sample);
+    if (auto* shell = std::get_if<ShellDirector>(&droplet.director))
+      shell->offset_um = {};
+    else
+      droplet.director = RadialDirector{};
+    propagated.sample = droplet;
+    return twin;
+  }
+  if (const auto* volume = std::get_if<SampledVolume>(&scene.sample))
+    if (const std::optional<double> radius = radius_of_ball(*volume->grid)) {
+      const double scale = Values<double>(theta, {}).get(volume->scale, 1.0);
+      exact.sample = propagated.sample = Droplet{{add_constant(twin.theta, 2 * scale * *radius)}, RadialDirector{}};
+      Scene sampled = propagated;
+      sampled.sample = SampledVolume{sampled_ball(*volume->grid, *radius), volume->scale};
+      twin.scenes.push_back(std::move(sampled));
+      return twin;
+    }
+  return std::nullopt;
+}
+
+double picture_error(const Image& image, const Image& exact) {
+  double difference = 0, size = 1e-24 * static_cast<double>(exact.values().size());
+  for (std::size_t i = 0; i < exact.values().size(); ++i) {
+    difference += square(image.values()[i] - exact.values()[i]);
+    size += square(exact.values()[i]);
+  }
+  return std::sqrt(difference / size);
+}
+
+namespace {
+
+/// picture_error of a model of the radial twin's last scene, all lengths of which are `scale` times the scene's; in a
+/// view of its own.
+template <class Model>
+double error_on_twin(RadialTwin twin, double scale, const RenderPicture& picture, const Model& model) {
+  const auto resize = [&](ParameterRef& length, double from) { length.index = add_constant(twin.theta, scale * from); };
+  for (Scene& scene : twin.scenes) {
+    const Theta before = twin.theta;
+    const Values<double> value(before, {});
+    if (auto* droplet = std::get_if<Droplet>(&scene.sample)) {
+      resize(droplet->diameter_um, value(droplet->diameter_um));
+      if (auto* shell = std::get_if<ShellDirector>(&droplet->director)) resize(shell->wall_um, value(shell->wall_um));
+    } else {
+      // Fewer nodes as far apart: what sampling errs by goes with their distance.
+      auto& volume = std::get<SampledVolume>(scene.sample);
+      // of the front one, which is resized already
+      const double diameter =
+          value(std::get<Droplet>(twin.scenes.front().sample).diameter_um) / value.get(volume.scale, 1.0);
+      if (scale < 1) volume.grid = sampled_ball(*volume.grid, 0.5 * diameter, scale);
+    }
+    if (scene.microscope.focus_um) resize(scene.microscope.focus_um, value(scene.microscope.focus_um));
+  }
+  const double diameter = Values<double>(twin.theta, {})(std::get<Droplet>(twin.scenes.front().sample).diameter_um);
+  for (Scene& scene : twin.scenes) {
+    // Pixels as large as the scene's, where 64 of them suffice: what is left out need not have the sign of what is
+    // seen, and large pixels average.
+    View& view = scene.view;
+    const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * view.pixel_size_um)), 2, 64);
+    view.width = view.height = pixels;
+    view.pixel_size_um = (diameter + 4) / pixels;
+    view.center_x_px.index = view.center_y_px.index = add_constant(twin.theta, 0.5 * (pixels - 1));
+    scene.intensity_accuracy = 1e-8;  // nearly dark pictures, too
+  }
+  const Values<double> values(twin.theta, {});
+  return picture_error(model(twin.scenes.back(), twin.theta),
+                       picture(twin.scenes.front(), plan_series(twin.scenes.front(), values), twin.theta));
+}
+
+std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {
+  auto wave = std::make_shared<WavePlan>();
+  wave->radius_um = object.radius_um;
+  const WaveGrid& g = wave->grid = object.grid;
+  wave->ramp_um = g.step_um;
+  if (static_cast<double>(g.nx) * g.ny > 4e6)
+    throw UserError(
+        Where{},
+        fmt::format(
+            "wave optics of a {} would need {} x {} points in {} slabs, about {:.1f} GB and {:.0f} min an image",
+            object.what, g.nx, g.ny, g.slabs, 4e-7 * g.nx * g.ny, 3e-6 / 60 * g.nx * g.ny * g.slabs),
+        "use ceiling: one_way, which becomes better with size only for weak birefringence, or check its size");
+  wave->imaging = imaging_of(scene, value, g);
+  return wave;
+}
+
+/// picture_error of propagation on the radial twin; where that takes longer than half a second, on a smaller one.
+double propagation_error_on_twin(const RadialTwin& of, double seconds, const RenderPicture& picture) {
+  return error_on_twin(of, std::min(1.0, std::cbrt(0.5 / seconds)), picture, [](const Scene& twin, const Theta& theta) {
+    const Values<double> values(theta, {});
+    Rendering rendering;
+    render_wave(twin, *plan_grids(twin, values, wave_object(twin, values)), theta, {}, 1, rendering);
+    return rendering.intensity;
+  });
+}
+
+}  // namespace
+
+RenderPlan plan_wave(const Planning& planning) {
+  const Scene& scene = planning.scene;
+  const Values<double>& value = planning.value;
+  const WaveObject o = wave_object(scene, value);
+  const double na = scene.microscope.objective_na;
+  RenderPlan plan;
+  plan.wave = plan_grids(scene, value, o);
+  const WaveGrid& g = plan.wave->grid;
+  plan.method = "split_step";
+  plan.physics = "wave";
+  plan.steps = g.slabs;
+  plan.reasons.push_back(fmt::format(
+      "a {}, {:.3g} wavelengths, {}", o.what, 2 * o.radius_um * o.n_host / wavelength_um(scene, value),
+      scene.method == "split_step" ? "propagation asked for by name" : "whose director has no exact series"));
+  plan.reasons.push_back(fmt::format(
+      "one-way wave optics on {} x {} points {:.3g} um apart, {} slabs of {:.3g} um, {} layers of the medium each",
+      g.nx, g.ny, g.step_um, g.slabs, (g.exit_um - g.entry_um) / g.slabs, g.layers));
+  plan.cost_seconds = static_cast<double>(g.nx) * g.ny * g.slabs * 1.4e-7;
+  // Above all that was measured on bright pictures of radial balls and shells (birefit chart,
+  // tests/cross/split_step_test.cc): it grows with the contrast, with the square of the aperture, and where light must
+  // leave a wall into a thinner medium. 0.01 is the grid's; half its step and slabs take no more away.
+  const double contrast = std::abs(o.n_e - o.n_o) + 2 * std::abs((2 * o.n_o + o.n_e) / 3 - o.n_host);
+  const bool shell = std::holds_alternative<Droplet>(scene.sample) &&
+                     std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
+  const double step_out = shell ? std::max(0.0, std::max(o.n_o, o.n_e) - std::min(o.n_host, o.core_index)) : 0;
+  plan.numerical_error = 0.01;
+  plan.model_error = (0.018 + 0.068 * na * na) * std::clamp(contrast / 0.4, 0.15, 1.6) + 0.15 * na * step_out;
+  plan.reasons.push_back("what is left out are reflections and the third order in the wave's slope");
+  const std::optional<RadialTwin> twin = radial_twin(scene, value.theta());
+  if (!twin) {
+    plan.warnings.push_back(
+        fmt::format("That wave propagation errs by {:.2g} of the picture's RMS was measured on spheres with bright "
+                    "pictures. Of a sampled field without host around it, or with a ball's worth of "
+                    "liquid crystal that its box would not hold as a ball, it is not, nor is the field's own sampling "
+                    "in it: a surface between nodes is known to half their spacing.",
+                    plan.numerical_error + plan.model_error));
+    return plan;
+  }
+  // A picture may be nearly dark, and what is left out is not: then the twin knows.
+  const double on_twin = propagation_error_on_twin(*twin, plan.cost_seconds, planning.picture);
+  const double more = std::max(1.0, 1.5 * on_twin / (plan.numerical_error + plan.model_error));
+  plan.numerical_error *= more;
+  plan.model_error *= more;
+  plan.reasons.back() +=
+      fmt::format("; the picture of a radial twin, which is exact by its series, is met to {:.2g} of its RMS", on_twin);
+  if (const double error = plan.numerical_error + plan.model_error; error > 0.15)
+    plan.warnings.push_back(
+        fmt::format("Wave propagation is expected to err by {:.2g} of this picture's RMS: light that it leaves out "
+                    "(reflected, or steep at large steps of the index) is as bright as much of "
+                    "what is left between these polarizers in this aperture.",
+                    error));
+  return plan;
+}
+
+namespace {
+
+template <class S>
+WaveLight<S> wave_light(const Scene& scene, const Values<S>& value) {
+  const Polarizers<S> p = polarizers(scene, value);
+  return {wavenumber_per_um(scene, value), host_index(scene, value), p.px, p.py};
+}
+
+template <class S>
+void picture(const Scene& scene, const WaveGrid& grid, const WaveImaging& imaging, const Values<S>& value,
+             const std::vector<WaveField>& fields, int threads, const std::vector<Image*>& images) {
+  const Polarizers<S> p = polarizers(scene, value);
+  WaveMicroscope<S> m;
+  m.objective_na = scene.microscope.objective_na;
+  m.aplanatic = scene.microscope.aplanatic;
+  m.focus_um = value.get(scene.microscope.focus_um, 0.0);
+  m.ax = p.ax, m.ay = p.ay;
+  m.center_x_px = value(scene.view.center_x_px), m.center_y_px = value(scene.view.center_y_px);
+  m.pixel_um = scene.view.pixel_size_um;
+  m.width = scene.view.width, m.height = scene.view.height;
+  form_image(grid, imaging, wave_light(scene, value), m, fields, threads, images);
+}
+
+}  // namespace
+
+void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, const std::vector<int>& active,
+                 int threads, Rendering& into) {
+  // What moves only the picture needs no light sent through the sample again.
+  struct Part {
+    std::vector<int> parameters;
+    std::vector<Image*> images;
+  } of_light, of_picture;
+  const Microscope& m = scene.microscope;
+  into.derivatives.resize(active.size());
+  for (std::size_t j = 0; j < active.size(); ++j) {
+    const auto is = [&](ParameterRef ref) { return ref && ref.index == active[j]; };
+    const bool only_picture = is(scene.view.center_x_px) || is(scene.view.center_y_px) || is(m.focus_um) ||
+                              (is(m.analyzer_deg) && !is(m.polarizer_deg));
+    Part& part = only_picture ? of_picture : of_light;
+    part.parameters.push_back(active[j]);
+    part.images.push_back(&into.derivatives[j]);
+  }
+  // Calls body<S>(parameters, images) for up to four of a part at a time.
+  const auto in_chunks = [&](const Part& part, const auto& body) {
+    for (std::size_t first = 0, take; first < part.parameters.size(); first += take) {
+      take = std::min<std::size_t>(part.parameters.size() - first, 4);
+      const auto from = static_cast<long>(first), to = static_cast<long>(first + take);
+      const std::vector<int> chunk(part.parameters.begin() + from, part.parameters.begin() + to);
+      std::vector<Image*> images{&into.intensity};
+      images.insert(images.end(), part.images.begin() + from, part.images.begin() + to);
+      if (take > 2)
+        body.template operator()<Dual4>(chunk, images);
+      else if (take == 2)
+        body.template operator()<Dual2>(chunk, images);
+      else
+        body.template operator()<Dual1>(chunk, images);
+    }
+  };
+  std::vector<WaveField> base;  // without derivatives
+  const auto send = [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
+    const Values<S> value(theta, chunk);
+    std::vector<WaveField> fields =
+        propagate(plan.grid, wave_light(scene, value), *wave_medium(scene, value, plan.ramp_um), threads);
+    picture(scene, plan.grid, plan.imaging, value, fields, threads, images);
+    fields.resize(1);
+    base = std::move(fields);
+  };
+  if (of_light.parameters.empty())
+    send.template operator()<Pack>({}, {&into.intensity});
+  else
+    in_chunks(of_light, send);
+  in_chunks(of_picture, [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
+    picture(scene, plan.grid, plan.imaging, Values<S>(theta, chunk), base, threads, images);
+  });
+}
+
+Image marched_picture(const Scene& scene, const Theta& theta, int threads) {
+  const Values<double> value(theta, {});
+  const Values<Pack> lanes(theta, {});
+  const WaveObject o = wave_object(scene, value);
+  const double k0 = wavenumber_per_um(scene, value);
+  // As wide as propagation asks, points and slabs where halving them changes less than what reflections leave
+  // (tests/cross/march_test.cc).
+  WaveGrid g = o.grid;
+  const double box_x = g.nx * g.step_um, box_y = g.ny * g.step_um, wavelength = 2 * std::numbers::pi / k0,
+               depth = g.exit_um - g.entry_um;
+  g.nx = fast_fft_size(static_cast<int>(std::ceil(box_x / (0.28 * wavelength))));
+  g.step_um = box_x / g.nx;
+  g.ny = fast_fft_size(static_cast<int>(std::ceil(box_y / g.step_um - 1e-9)));
+  MarchGrid grid{g.nx,
+                 g.ny,
+                 box_x,
+                 g.ny * g.step_um,
+                 g.entry_um,
+                 g.exit_um,
+                 static_cast<int>(std::ceil(depth / (0.35 * wavelength)))};
+  grid.limit = std::min(0.95, 0.98 * std::min({o.n_o, o.n_e, o.core_index}) / o.n_host);
+  if (static_cast<double>(g.nx) * g.ny * grid.slabs > 5e7)
+    throw UserError(
+        Where{},
+        fmt::format("marching Maxwell's equations through {} x {} points and {} slabs would take an hour or more", g.nx,
+                    g.ny, grid.slabs),
+        "leave --check out");
+  const std::unique_ptr<WaveMedium<double>> medium = wave_medium(scene, value, g.step_um);
+  const DielectricAt dielectric = [&](double x, double y, double z) -> std::array<double, 6> {
+    const double host = o.n_host * o.n_host;
+    if (!medium->reaches(x, y, z)) return {host, host, host, 0, 0, 0};
+    const OpticalPoint<double> p = medium->at(x, y, z);
+    const double eo = p.ordinary, de = p.extraordinary - eo;
+    const Vec3<double>& n = p.axis;
+    return {eo + de * n.x * n.x, eo + de * n.y * n.y, eo + de * n.z * n.z,
+            de * n.x * n.y,      de * n.x * n.z,      de * n.y * n.z};
+  };
+  const Polarizers<double> polarizer = polarizers(scene, value);
+  MarchWave wave;
+  wave.e = {polarizer.px, polarizer.py};
+  std::vector<MarchedField> marched = march(grid, k0, o.n_host, dielectric, {wave}, threads);
+  // Its transverse field in the terms of WaveField.
+  std::vector<WaveField> fields(1);
+  fields[0].a[0] = std::move(marched[0].ex), fields[0].a[1] = std::move(marched[0].ey);
+  const std::shared_ptr<const Fft2> fft = shared_fft(g.nx, g.ny);
+  for (Plane& plane : fields[0].a) fft->forward(plane);
+  const std::complex<double> back = std::polar(1.0 / static_cast<double>(fft->size()), -k0 * o.n_host * g.exit_um);
+  for (std::size_t i = 0; i < fft->size(); ++i) {
+    const auto wavevector = [&](int m, int n) {
+      return 2 * std::numbers::pi / (n * g.step_um * k0) * (m < n - m ? m : m - n);
+    };
+    const double x = wavevector(static_cast<int>(i) % g.nx, g.nx), y = wavevector(static_cast<int>(i) / g.nx, g.ny),
+                 k2 = x * x + y * y;
+    auto &ex = fields[0].a[0][i], &ey = fields[0].a[1][i];
+    const double q2 = o.n_host * o.n_host - k2;
+    if (q2 <= 1e-3) {
+      ex = ey = 0;
+      continue;
+    }
+    const double length = std::sqrt(k2), px = length > 0 ? x / length : 1, py = length > 0 ? y / length : 0,
+                 s_scale = std::sqrt(std::sqrt(q2) / o.n_host);
+    const std::complex<double> p = back * (px * ex + py * ey) / s_scale, s = back * (px * ey - py * ex) * s_scale;
+    ex = px * p - py * s;
+    ey = py * p + px * s;
+  }
+  for (Plane& plane : fields[0].a) fft->inverse(plane);
+  Image image;
+  picture<Pack>(scene, g, imaging_of(scene, value, g), lanes, fields, threads, {&image});
+  return image;
+}
+
+double march_error_on_twin(const Scene& scene, const Theta& theta, int threads, const RenderPicture& picture) {
+  const std::optional<RadialTwin> twin = radial_twin(scene, theta);
+  if (!twin) throw UserError(Where{}, "there is no radial twin of this sample to measure the march on", "");
+  return error_on_twin(*twin, 1, picture, [&](const Scene& scaled, const Theta& values) {
+    return marched_picture(scaled, values, threads);
+  });
+}
+
+}  // namespace birefit
