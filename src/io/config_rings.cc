@@ -29,7 +29,7 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
                                            const Scene& scene, Observable& observable) {
   PlacedTable table;
   try {
-    table = load_placed_table(path, where);
+    table = load_placed_table(path, where, MissingNumbers::left_out);
   } catch (const UserError& error) {
     reader.problems.add(error);
     return std::nullopt;
@@ -44,6 +44,11 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
   };
   const int m = column("m"), r = column("r_cm");
   if (m < 0 || r < 0) return std::nullopt;
+  reader.warnings.insert(reader.warnings.end(), table.notes.begin(), table.notes.end());
+  if (!table.units.empty() && contradicts_unit(table.units[static_cast<std::size_t>(r)], "cm"))
+    reader.problems.add({path.string(), table.header_line + 1},
+                        "r_cm is in " + table.units[static_cast<std::size_t>(r)] + " by its line of units",
+                        "give the radii in cm");
   const int rows = static_cast<int>(table.table.rows.size());
   if (rows < 2) {
     reader.problems.add({path.string(), table.header_line}, "has " + std::to_string(rows) + " rings",

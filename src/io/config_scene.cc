@@ -474,6 +474,7 @@ Slab read_slab(ConfigReader& reader, const Block& parent, View& shown) {
   }
 
   const std::string file = reader.resolve(*name).string();
+  reader.warnings.insert(reader.warnings.end(), table.notes.begin(), table.notes.end());
   const std::vector<std::string> required = {"depth_um", "ax", "ay", "az", "n_o", "n_e"};
   std::vector<std::string> known = required;
   known.insert(known.end(), {"k_o", "k_e"});
@@ -496,6 +497,10 @@ Slab read_slab(ConfigReader& reader, const Block& parent, View& shown) {
                         near.empty() ? "columns: " + list_words(known) : "did you mean " + near + "?");
   }
   if (!complete) return slab;
+  if (!table.units.empty() && contradicts_unit(table.units[static_cast<std::size_t>(column[0])], "um"))
+    reader.problems.add({file, table.header_line + 1},
+                        "depth_um is in " + table.units[static_cast<std::size_t>(column[0])] + " by its line of units",
+                        "give the depths in um");
 
   double above_um = 0;
   for (std::size_t r = 0; r < table.table.rows.size(); ++r) {

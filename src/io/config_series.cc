@@ -93,7 +93,7 @@ void join_table(ConfigReader& reader, const std::string& table_name, const Where
     std::vector<std::string> names;
     for (const TableCell& cell : table.header) names.push_back(cell.text);
     reader.problems.add({place, table.header_line, 1}, "has no column file",
-                        "it has " + some_of(names) + "; expected file, then parameter paths, separated by commas");
+                        "it has " + some_of(names) + "; expected file, then parameter paths");
     return;
   }
   const auto file_at = static_cast<std::size_t>(file_column - table.header.begin());

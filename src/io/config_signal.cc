@@ -106,6 +106,85 @@ SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::stri
   return item;
 }
 
+/// A row of a table that is wanted, as numbers.
+struct Row {
+  std::size_t number;  ///< in the file
+  double value;
+  std::vector<double> set;  ///< what the columns set
+};
+
+/// A range asks for a number; a text for itself, or for the same number written otherwise ("25", "25.0").
+bool lets_through(const SignalItem::Only& only, const std::string& text) {
+  const std::optional<double> x = parse_number(text);
+  if (only.range) return x && *x >= (*only.range)[0] && *x <= (*only.range)[1];
+  const std::optional<double> wanted = parse_number(only.text);
+  return text == only.text || (x && wanted && *x == *wanted);
+}
+
+/// The rows that `where` (in the columns `only`) lets through, with the numbers of `columns`: the value, then what sets
+/// parameters. Where a reading is missing the row is left out, which is said; what has digits and is no number is a
+/// slip.
+std::vector<Row> wanted_rows(ConfigReader& reader, const TextTable& text, const std::string& file,
+                             const SignalItem& item, const std::vector<int>& only, const std::vector<int>& columns) {
+  constexpr std::size_t kMostProblems = 100;
+  std::vector<Row> rows;
+  std::vector<int> left_out;
+  const std::size_t before = reader.problems.all().size();
+  for (std::size_t r = 0; r < text.rows.size() && reader.problems.all().size() <= before + kMostProblems; ++r) {
+    const auto cell = [&](int at) -> const TableCell& { return text.rows[r][static_cast<std::size_t>(at)]; };
+    bool wanted = true, missing = false;
+    for (std::size_t i = 0; i < only.size(); ++i) {
+      if (item.only[i].range && is_missing_number(cell(only[i]).text))
+        missing = true;
+      else
+        wanted = wanted && lets_through(item.only[i], cell(only[i]).text);
+    }
+    if (!wanted) continue;
+    std::vector<double> numbers;
+    for (const int at : columns) {
+      const std::string& shown = cell(at).text;
+      const std::optional<double> x = parse_number(shown);
+      missing = missing || is_missing_number(shown);
+      if (!is_missing_number(shown) && !(x && std::isfinite(*x)))
+        reader.problems.add(
+            {file, text.lines[r], cell(at).column},
+            text.header[static_cast<std::size_t>(at)].text + " = " + shown.substr(0, 40) + " is not a finite number",
+            number_hint(shown));
+      numbers.push_back(x.value_or(0));
+    }
+    if (missing) {
+      left_out.push_back(text.lines[r]);
+      continue;
+    }
+    Row row{r, numbers[0], {}};
+    for (std::size_t c = 0; c < item.columns.size(); ++c)
+      row.set.push_back(item.columns[c].scale * numbers[c + 1] + item.columns[c].plus);
+    rows.push_back(std::move(row));
+  }
+  if (reader.problems.all().size() > before) return rows;
+  const std::string name = std::filesystem::path(file).filename().string();
+  if (!left_out.empty()) reader.warnings.push_back(describe_left_out(name, left_out));
+  if (rows.size() < 3)
+    reader.problems.add(item.file_where, item.file +
+                                             (rows.size() + left_out.size() < text.rows.size()
+                                                  ? " has fewer than three rows that `where` lets through"
+                                                  : " has fewer than three rows") +
+                                             (left_out.empty() ? "" : " and have numbers"));
+  return rows;
+}
+
+/// A table that says "mV" under a column that sets volts, and a config that takes the numbers as they are.
+void check_unit(ConfigReader& reader, const TextTable& text, int column, const SignalItem& item, std::size_t i,
+                const std::string& unit) {
+  const SignalItem::Column& taken = item.columns[i];
+  if (column < 0 || text.units.empty() || taken.scale != 1 || taken.plus != 0) return;
+  const std::string& given = text.units[static_cast<std::size_t>(column)];
+  if (contradicts_unit(given, unit))
+    reader.problems.add(taken.where,
+                        taken.name + " is in " + given + " by the table's line of units, " + taken.path + " in " + unit,
+                        "{column: " + taken.name + ", scale: .., plus: ..} converts it");
+}
+
 }  // namespace
 
 std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
@@ -158,7 +237,14 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
                         near.empty() ? "it has " + list_words(names) : "did you mean " + near + "?");
     return -1;
   };
+  reader.warnings.insert(reader.warnings.end(), text.notes.begin(), text.notes.end());
   const int value_column = column_of(item.value_column, item.file_where);
+  if (value_column >= 0 && !text.units.empty() && item.quantity == Quantity::retardance_um &&
+      contradicts_unit(text.units[static_cast<std::size_t>(value_column)], "um"))
+    reader.problems.add(item.file_where,
+                        item.value_column + " is in " + text.units[static_cast<std::size_t>(value_column)] +
+                            " by the table's line of units, quantity retardance_um in um",
+                        "give the retardances in um");
   struct Column {
     int at;
     ParameterRef shared;
@@ -182,6 +268,7 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
       reader.problems.add(item.columns[i].where, "a column cannot set " + path,
                           "rows of a table share the lamp and the detector: give it in micrograph");
     columns.push_back({column_of(item.columns[i].name, item.columns[i].where), reader.refs.at(path), &spec->second});
+    check_unit(reader, text, columns.back().at, item, i, spec->second.unit);
   }
   std::vector<int> only;
   for (const SignalItem::Only& each : item.only) only.push_back(column_of(each.column, each.where));
@@ -190,49 +277,13 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
       std::any_of(only.begin(), only.end(), [](int at) { return at < 0; }))
     return;
 
-  // The rows that are wanted, as numbers: the value, then what the columns set.
-  struct Row {
-    std::size_t number;  // in the file
-    double value;
-    std::vector<double> set;
-  };
-  std::vector<Row> rows;
-  std::vector<std::pair<double, double>> curve;
+  std::vector<int> wanted_columns{value_column};
+  for (const Column& column : columns) wanted_columns.push_back(column.at);
   const std::size_t before = reader.problems.all().size();
-  for (std::size_t r = 0; r < text.rows.size() && reader.problems.all().size() <= before + 100; ++r) {
-    const auto cell = [&](int at) -> const TableCell& { return text.rows[r][static_cast<std::size_t>(at)]; };
-    const auto number = [&](int at) {
-      const std::optional<double> x = parse_number(cell(at).text);
-      if (x && std::isfinite(*x)) return *x;
-      reader.problems.add({file, text.lines[r], cell(at).column},
-                          names[static_cast<std::size_t>(at)] + " = " +
-                              (cell(at).text.empty() ? "nothing" : cell(at).text.substr(0, 40)) +
-                              " is not a finite number");
-      return 0.0;
-    };
-    bool wanted = true;
-    for (std::size_t i = 0; wanted && i < only.size(); ++i) {
-      if (item.only[i].range) {
-        const double x = number(only[i]);
-        wanted = x >= (*item.only[i].range)[0] && x <= (*item.only[i].range)[1];
-      } else {
-        wanted = cell(only[i]).text == item.only[i].text;
-      }
-    }
-    if (!wanted) continue;
-    Row row{r, number(value_column), {}};
-    for (std::size_t c = 0; c < columns.size(); ++c)
-      row.set.push_back(item.columns[c].scale * number(columns[c].at) + item.columns[c].plus);
-    curve.emplace_back(row.set[0], row.value);
-    rows.push_back(std::move(row));
-  }
+  const std::vector<Row> rows = wanted_rows(reader, text, file, item, only, wanted_columns);
   if (reader.problems.all().size() > before) return;
-  if (rows.size() < 3) {
-    reader.problems.add(item.file_where, item.file + (rows.size() < text.rows.size()
-                                                          ? " has fewer than three rows that `where` lets through"
-                                                          : " has fewer than three rows"));
-    return;
-  }
+  std::vector<std::pair<double, double>> curve;
+  for (const Row& row : rows) curve.emplace_back(row.set[0], row.value);
   double largest = 0;
   for (const auto& point : curve) largest = std::max(largest, std::abs(point.second));
   NoiseModel noise;  // of the whole table; one pixel cannot tell its own

@@ -6,6 +6,7 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
+#include <cctype>
 #include <sstream>
 
 namespace birefit {
@@ -47,6 +48,13 @@ void check_text(const std::string& text, const std::string& file) {
   throw UserError(where, "is nested deeper than " + std::to_string(kMaxYamlDepth) + " levels");
 }
 
+/// A tab where a line's indentation may still go on; blank lines and comments may have any.
+void refuse_tab(const std::string& text, std::size_t at, std::size_t line_end, const Where& where) {
+  const std::size_t first = text.find_first_not_of(" \t\r", at);
+  if (first == std::string::npos || first >= line_end || text[first] == '#') return;
+  throw UserError(where, "is indented with a tab", "YAML takes spaces only: two for each level");
+}
+
 /// Bounds the nesting before the recursive parser sees the text. An upper bound of the true depth: open brackets
 /// outside quotes and comments, and the stack of indentations including those made by "- - - x" in one line.
 void check_depth(const std::string& text, const std::string& file) {
@@ -61,6 +69,7 @@ void check_depth(const std::string& text, const std::string& file) {
     if (brackets == 0 && !quote) {
       for (;;) {
         while (i < line_end && text[i] == ' ') ++i;
+        if (i < line_end && text[i] == '\t') refuse_tab(text, i, line_end, {file, line, int(i - line_start) + 1});
         if (i >= line_end || text[i] == '#' || text[i] == '\r') break;
         const int column = static_cast<int>(i - line_start);
         while (!indents.empty() && indents.back() >= column) indents.pop_back();
@@ -99,6 +108,15 @@ void check_depth(const std::string& text, const std::string& file) {
   }
 }
 
+bool is_digits(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+}
+
+/// "1 2": two numbers between which a comma was forgotten.
+bool is_two_numbers(const std::string& text) {
+  return text.find(' ') != std::string::npos && text.find_first_not_of("0123456789+-.eE ") == std::string::npos;
+}
+
 class TreeBuilder : public YAML::EventHandler {
  public:
   TreeBuilder(const std::string& file, Problems& problems) : file_(file), problems_(problems) {}
@@ -122,6 +140,9 @@ class TreeBuilder : public YAML::EventHandler {
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t, const std::string& value) override {
     check_tag(mark, tag);
+    if (tag != "!" && !stack_.empty() && stack_.back().node.is_sequence() && is_two_numbers(value))
+      throw UserError(where(mark), "a comma is missing in the list: " + value,
+                      "[" + value.substr(0, value.find(' ')) + ", ..]");
     leaf(mark, YamlNode::Kind::scalar, value, tag == "!");
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
@@ -152,6 +173,17 @@ class TreeBuilder : public YAML::EventHandler {
   void check_tag(const YAML::Mark& mark, const std::string& tag) const {
     if (!tag.empty() && tag != "?" && tag != "!")
       throw UserError(where(mark), "YAML tags are not supported: " + tag, "write the plain value");
+  }
+
+  /// {b:1} is a key "b:1" and {value: 9,5} one "5", each without a value.
+  void check_lone_key(const Frame& parent) const {
+    const std::size_t colon = parent.key.find(':');
+    if (colon != std::string::npos && colon > 0 && colon + 1 < parent.key.size())
+      throw UserError(parent.key_where, "a space is missing behind the colon: " + parent.key,
+                      parent.key.substr(0, colon) + ": " + parent.key.substr(colon + 1));
+    if (is_digits(parent.key) && !parent.node.entries.empty())
+      throw UserError(parent.key_where, "found a number alone between commas: " + parent.key,
+                      "decimals have a point: 9.5, not 9,5");
   }
 
   void open(const YAML::Mark& mark, YamlNode::Kind kind) {
@@ -197,6 +229,7 @@ class TreeBuilder : public YAML::EventHandler {
       return;
     }
     parent.has_key = false;
+    if (node.kind == YamlNode::Kind::null) check_lone_key(parent);
     for (const YamlEntry& entry : parent.node.entries) {
       if (entry.key != parent.key) continue;
       problems_.add(parent.key_where, "duplicate key " + parent.key,
@@ -236,6 +269,74 @@ std::string YamlNode::describe() const {
   return quoted ? "the text \"" + shown + "\"" : shown;
 }
 
+namespace {
+
+/// A bracket that is open where the parser gave up.
+struct OpenBracket {
+  char bracket = 0;
+  int line = 0, column = 0;
+};
+std::vector<OpenBracket> open_brackets(const std::string& text, std::size_t end) {
+  std::vector<OpenBracket> open;
+  char quote = 0, previous = '\n';
+  int line = 1;
+  std::size_t line_start = 0;
+  for (std::size_t i = 0; i < std::min(end, text.size()); ++i) {
+    const char c = text[i];
+    if (c == '\n') {
+      ++line;
+      line_start = i + 1;
+    } else if (quote) {
+      if (c == quote) quote = 0;
+    } else if (c == '#' && (previous == ' ' || previous == '\t' || previous == '\n')) {
+      while (i + 1 < text.size() && text[i + 1] != '\n') ++i;
+    } else if ((c == '"' || c == '\'') && !std::isalnum(static_cast<unsigned char>(previous))) {
+      quote = c;
+    } else if (c == '{' || c == '[') {
+      open.push_back({c, line, static_cast<int>(i - line_start) + 1});
+    } else if ((c == '}' || c == ']') && !open.empty()) {
+      open.pop_back();
+    }
+    previous = c;
+  }
+  return open;
+}
+
+/// What yaml-cpp's words mean for someone who wrote a config.
+[[noreturn]] void explain_syntax(const std::string& text, const std::string& file, const YAML::Exception& error) {
+  if (error.mark.is_null()) throw UserError({file}, "YAML syntax error: " + error.msg);
+  const Where where{file, error.mark.line + 1, error.mark.column + 1};
+  std::size_t start = 0;
+  for (int line = 0; line < error.mark.line && start != std::string::npos; ++line) {
+    start = text.find('\n', start);
+    if (start != std::string::npos) ++start;
+  }
+  if (start == std::string::npos) throw UserError(where, "YAML syntax error: " + error.msg);
+  const std::size_t at = std::min(start + static_cast<std::size_t>(error.mark.column), text.size());
+  const std::string line = text.substr(start, text.find_first_of("\r\n", start) - start);
+  // The mark may stand on the bracket that does not fit, or just before what came instead of one.
+  const std::vector<OpenBracket> open = open_brackets(text, at);
+  if (!open.empty()) {
+    const OpenBracket& last = open.back();
+    const std::string close = last.bracket == '{' ? "}" : "]";
+    throw UserError(where,
+                    std::string("YAML syntax error in the ") + last.bracket + " that opens at " +
+                        std::to_string(last.line) + ":" + std::to_string(last.column),
+                    "a comma is missing before this, or the closing " + close);
+  }
+  if (line.find_first_of("}]") < static_cast<std::size_t>(error.mark.column) + 1)
+    throw UserError(where, "YAML syntax error: something stands behind a closing bracket",
+                    "one bracket too many, or a line end is missing");
+  const std::size_t first = line.find(": ");
+  if (first != std::string::npos && line.find(": ", first + 2) != std::string::npos)
+    throw UserError(where, "YAML syntax error: two keys in one line",
+                    "pairs in one line stand in braces, {a: 1, b: 2}; text with a colon in quotes");
+  throw UserError(where, "YAML syntax error: " + error.msg,
+                  "keys of one block start in the same column, and a space follows each colon");
+}
+
+}  // namespace
+
 YamlNode parse_yaml(const std::string& text, const std::string& file, Problems& problems) {
   check_text(text, file);
   check_depth(text, file);
@@ -246,16 +347,15 @@ YamlNode parse_yaml(const std::string& text, const std::string& file, Problems& 
     while (builder.documents < 2 && parser.HandleNextDocument(builder)) {
     }
   } catch (const YAML::Exception& error) {
-    Where where{file};
-    if (!error.mark.is_null()) where = {file, error.mark.line + 1, error.mark.column + 1};
-    throw UserError(where, "YAML syntax error: " + error.msg);
+    explain_syntax(text, file, error);
   }
   if (builder.documents > 1)
     throw UserError(builder.second_document, "a second YAML document starts here", "a config is one document");
   if (builder.documents == 0 || builder.root.kind == YamlNode::Kind::null)
     throw UserError({file}, "is empty", "`birefit new droplet` prints a config to start from");
   if (!builder.root.is_map())
-    throw UserError(builder.root.where, "expected `key: value` lines, found " + builder.root.describe());
+    throw UserError(builder.root.where, "expected `key: value` lines, found " + builder.root.describe(),
+                    builder.root.text.find(':') == std::string::npos ? "" : "a space follows each colon");
   return std::move(builder.root);
 }
 

@@ -460,6 +460,27 @@ TEST_F(Config, RefusesAnImageOptionBesideMicrographs) {
   EXPECT_THROW(load_config(write("config.yaml", kCrystal), ConfigUse::fit, folder_ / "a.tif"), UserError);
 }
 
+// Each names the place and what to do, not what the parser expected.
+TEST_F(Config, SaysWhatIsWrongWithTheYaml) {
+  EXPECT_EQ(mistakes("sample:\n\tdroplet: 1\n"),
+            "config.yaml:2:1: is indented with a tab; YAML takes spaces only: two for each level");
+  EXPECT_EQ(mistakes("sample:\n  \tdroplet: 1\n"),
+            "config.yaml:2:3: is indented with a tab; YAML takes spaces only: two for each level");
+  EXPECT_EQ(mistakes("sample: {a: 1 b: 2}\n"),
+            "config.yaml:1:16: YAML syntax error in the { that opens at 1:9; a comma is missing before this, or the "
+            "closing }");
+  EXPECT_NE(mistakes("sample: {a: [1, 2}\nb: 3\n").find("in the [ that opens at 1:13"), std::string::npos);
+  EXPECT_NE(mistakes("sample: {a: 1\nb: 3\n").find("in the { that opens at 1:9"), std::string::npos);
+  EXPECT_NE(mistakes("sample: {a: 1}}\n").find("behind a closing bracket"), std::string::npos);
+  EXPECT_NE(mistakes("sample: {a:1}\n").find("1:10: a space is missing behind the colon: a:1; a: 1"),
+            std::string::npos);
+  EXPECT_NE(mistakes("sample: {value: 9,5}\n").find("decimals have a point"), std::string::npos);
+  EXPECT_NE(mistakes("image_size_px: [64 48]\n").find("1:17: a comma is missing in the list: 64 48; [64, ..]"),
+            std::string::npos);
+  EXPECT_NE(mistakes("sample: droplet: 3\n").find("pairs in one line stand in braces"), std::string::npos);
+  EXPECT_NE(mistakes("sample:1\n").find("a space follows each colon"), std::string::npos);
+}
+
 const std::string kSignal = R"(signal:
   - {file: a.csv, value: out, columns: {sample.cell.director.freedericksz.voltage_v: volts}, set: {microscope.light.wavelength_nm: 500}}
   - {file: b.csv, value: out, columns: {sample.cell.director.freedericksz.voltage_v: volts}, set: {microscope.light.wavelength_nm: 600, micrograph.gain: {fit: auto}}, noise: 0.5, every: 2}
@@ -574,8 +595,18 @@ TEST_F(Config, TakesTheRowsAndUnitsThatASignalAsksFor) {
             std::string::npos);
   EXPECT_NE(mistakes(replaced(kBirefringence, "[0, 50]", "[50, 0]"), ConfigUse::fit).find("range [low, high]"),
             std::string::npos);
-  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic, ", ""), ConfigUse::fit)
-                .find("a.csv:7:7: celsius = none is not a finite number"),
+  // Without `kind`: the last row has no temperature, which `where` asks for.
+  const auto all = load(replaced(kBirefringence, "kind: nematic, ", ""), ConfigUse::fit);
+  EXPECT_EQ(all.signals[0].line, (std::vector<int>{2, 4, 5}));
+  EXPECT_NE(all.job.warnings[0].find("a.csv: 1 row without a number left out (line 7)"), std::string::npos);
+  write("a.csv", "kind,celsius,dn\nnematic,20,0.1\nnematic,30,1.2.3\nnematic,40,0.08\nnematic,45,0.07\n");
+  EXPECT_NE(mistakes(kBirefringence, ConfigUse::fit).find("a.csv:3:12: dn = 1.2.3 is not a finite number"),
+            std::string::npos);
+  write("a.csv", "kind;celsius;dn\n;K;\nnematic;20,5;0,1\nnematic;30;0,09\nnematic;40;0,08\n");
+  EXPECT_EQ(load(kBirefringence, ConfigUse::fit).signals[0].line, (std::vector<int>{3, 4, 5}));
+  write("a.csv", "kind;celsius;dn\n;C;\nnematic;20,5;0,1\nnematic;30;0,09\nnematic;40;0,08\n");
+  EXPECT_NE(mistakes(replaced(kBirefringence, ", scale: 1, plus: 273.15", ""), ConfigUse::fit)
+                .find("celsius is in C by the table's line of units, sample.material.temperature_k in K"),
             std::string::npos);
   EXPECT_NE(mistakes(replaced(kBirefringence, "quantity: birefringence", "quantity: retardance"), ConfigUse::fit)
                 .find("retardance_um"),
