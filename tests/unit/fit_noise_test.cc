@@ -2,6 +2,7 @@
 
 #include "fit/weights/noise.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -212,6 +213,39 @@ TEST(NoiseEstimate, KnowsRoundingWhereNoiseIsFarBelowACode) {
 
 /// Noise that grows faster than light (a pattern of the sensor, a scratched sample) puts a straight line's read noise
 /// below zero: no level may weigh more than four times what its own scatter justifies.
+// Read noise in the dark beside bright fringes whose photon noise is a hundred times as large: weights of the dark
+// field, most of many pictures, hang on it.
+TEST(NoiseEstimate, ADarkFieldKeepsItsNoiseBesideBrightFringes) {
+  std::mt19937_64 random(41);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  constexpr int kDraws = 12, kSize = 256;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const double read = 2 + 6 * uniform(random), gain = std::pow(10.0, 2.5 + 2 * uniform(random));
+    const double radius = kSize * (0.2 + 0.15 * uniform(random)), fringes = 1 + 3 * uniform(random);
+    Picture micrograph;
+    micrograph.values = Image(kSize, kSize);
+    micrograph.mask = Mask(kSize, kSize, 1);
+    double brightest = 0;
+    for (int y = 0; y < kSize; ++y)
+      for (int x = 0; x < kSize; ++x) {
+        // A cross of Maltese arms that fades smoothly into the dark.
+        const double dx = x - 0.5 * kSize, dy = y - 0.5 * kSize, r2 = (dx * dx + dy * dy) / (radius * radius);
+        const double arms = std::pow(std::sin(2 * std::atan2(dy, dx)), 2);
+        const double ring = std::pow(std::sin(std::numbers::pi * fringes * (1 - r2)), 2);
+        const double signal = r2 < 1 ? gain * arms * ring * std::pow(1 - r2, 2) : 0;
+        brightest = std::max(brightest, signal);
+        micrograph.values(x, y) = std::round(100 + signal + std::sqrt(read * read + signal) * normal(random));
+      }
+    const NoiseModel noise = estimate_noise(micrograph);
+    // Medians of 5,000 differences and more know a standard deviation to 4 %; the feet of the fringes that are taken
+    // into the darkest level and the straight line through all of them cost as much again: 0.2 is three of both.
+    EXPECT_NEAR(std::sqrt(variance_at(noise, 100)) / read, 1, 0.2) << read << ' ' << gain << ' ' << fringes;
+    const double at_bright = read * read + 0.7 * brightest;
+    EXPECT_NEAR(std::sqrt(variance_at(noise, 100 + 0.7 * brightest) / at_bright), 1, 0.2) << read << ' ' << gain;
+  }
+}
+
 TEST(NoiseEstimate, NeverEndsAtTheFloorWhereThePictureScatters) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;

@@ -184,6 +184,42 @@ double robust_variance(const std::vector<Sample>& samples, double step, double m
   return step * step * (seen + hidden_rounding(seen, 1 - std::min(1.0, apart / count)));
 }
 
+/// Standard deviation of the logarithm of a variance that `n` overlapping differences tell, times sqrt(n): of n, about
+/// n / 7 are independent, and medians know a variance to 2.3 / sqrt of that.
+constexpr double kVarianceSd = 6.2;
+
+/// The level of samples of like signal, or two where the variance of the darker and of the brighter half differ by more
+/// than chance: beside bright fringes the dark field and the feet of the fringes come into one bin, and the steepest
+/// change of the variance is there. Signal and variance are both medians: means of a bin's signal would lie far above
+/// the pixels that its median variance stands for. From `samples` on, to `cut` or near it: into `near_cut`.
+void add_levels(std::vector<Sample> samples, const Codes& codes, double mask_order, std::vector<Bin>& bins,
+                std::vector<Bin>& near_cut) {
+  const auto darker = [](const Sample& a, const Sample& b) { return a.signal < b.signal; };
+  const auto middle = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
+  std::nth_element(samples.begin(), middle, samples.end(), darker);
+  const double signal = middle->signal, count = static_cast<double>(samples.size());
+  const double begin = std::min_element(samples.begin(), std::next(middle), darker)->signal;
+  const double end = std::max_element(middle, samples.end(), darker)->signal;
+  const auto variance_of = [&](const std::vector<Sample>& of, double from, double to) {
+    return std::max(robust_variance(of, codes.step(from, to), mask_order), codes.floor());
+  };
+  constexpr std::size_t kTwoLevels = 200;  // samples; fewer tell no two variances apart
+  if (samples.size() >= kTwoLevels) {
+    std::vector<Sample> dark(samples.begin(), middle), bright(middle, samples.end());
+    const double log_ratio = std::log(variance_of(bright, signal, end) / variance_of(dark, begin, signal));
+    if (std::abs(log_ratio) > 2 * kVarianceSd * std::sqrt(4 / count)) {
+      add_levels(std::move(dark), codes, mask_order, bins, near_cut);
+      add_levels(std::move(bright), codes, mask_order, bins, near_cut);
+      return;
+    }
+  }
+  const double variance = variance_of(samples, begin, end);
+  // Of pixels that noise may take below the cut, those that are left scatter less: by 1 % of the variance at three
+  // standard deviations.
+  const bool truncated = codes.cut() && signal - *codes.cut() < 3 * std::sqrt(variance);
+  (truncated ? near_cut : bins).push_back({signal, variance, count, begin});
+}
+
 /// Samples of like signal together. Bins of equal width see the bright and the dark end alike; those with too few
 /// samples are skipped.
 std::vector<Bin> binned(std::vector<Sample> samples, const Codes& codes, double mask_order) {
@@ -202,18 +238,11 @@ std::vector<Bin> binned(std::vector<Sample> samples, const Codes& codes, double 
     parts[static_cast<std::size_t>(std::clamp(position, 0.0, static_cast<double>(number - 1)))].push_back(sample);
   }
   std::vector<Bin> bins, near_cut;
-  const double width = (high - low) / static_cast<double>(number);
-  for (std::size_t i = 0; i < number; ++i) {
-    if (parts[i].size() < std::min<std::size_t>(30, samples.size())) continue;
-    const double count = static_cast<double>(parts[i].size()), begin = low + width * static_cast<double>(i);
-    double signal = 0;
-    for (const Sample& sample : parts[i]) signal += sample.signal / count;
-    const double variance = robust_variance(parts[i], codes.step(begin, begin + width), mask_order);
-    // Of pixels that noise may take below the cut, those that are left scatter less: by 1 % of the variance at three
-    // standard deviations.
-    const bool truncated = codes.cut() && signal - *codes.cut() < 3 * std::sqrt(variance);
-    (truncated ? near_cut : bins).push_back({std::max(signal, begin), std::max(variance, codes.floor()), count, begin});
-  }
+  for (std::vector<Sample>& part : parts)
+    if (part.size() >= std::min<std::size_t>(30, samples.size()))
+      add_levels(std::move(part), codes, mask_order, bins, near_cut);
+  for (std::vector<Bin>* levels : {&bins, &near_cut})  // a few specks are not the darkest level
+    for (Bin& bin : *levels) bin.darkest = std::max(bin.darkest, low), bin.signal = std::max(bin.signal, bin.darkest);
   return bins.empty() ? near_cut : bins;
 }
 
@@ -238,8 +267,7 @@ VarianceLine variance_line(const std::vector<Bin>& bins, double floor, std::opti
     for (const Bin& bin : bins) {
       const double shape = share + per_signal * (bin.signal - dark);
       factor += bin.count / total * bin.variance / shape;
-      // Overlapping differences: of n, about n / 7 are independent, and medians know a variance to 2.3 / sqrt of that.
-      least = std::max(least, 0.5 * bin.variance * (1 - 3 * 6.2 / std::sqrt(bin.count)) / shape);
+      least = std::max(least, 0.5 * bin.variance * (1 - 3 * kVarianceSd / std::sqrt(bin.count)) / shape);
     }
     factor = std::max(factor, least);
     return VarianceLine{dark, factor * share, factor * per_signal};
