@@ -18,9 +18,10 @@
 
 namespace birefit {
 
-bool rays_stay_meridional(const Droplet& droplet) {
-  if (!looks_round(droplet)) return false;
-  const auto* radial = std::get_if<RadialDirector>(&droplet.director);
+bool rays_stay_meridional(const Sample& sample) {
+  const auto* droplet = std::get_if<Droplet>(&sample);
+  if (!droplet || !looks_round(*droplet)) return false;
+  const auto* radial = std::get_if<RadialDirector>(&droplet->director);
   return !radial || !radial->twist_deg;
 }
 

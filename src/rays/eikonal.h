@@ -13,7 +13,7 @@
 namespace birefit {
 
 /// Radial droplets without twist, shells whose core is in the middle, droplets in a field along the view.
-bool rays_stay_meridional(const Droplet& droplet);
+bool rays_stay_meridional(const Sample& sample);
 
 /// A droplet in units of its radius and of its ordinary index. Radial (a shell where core > 0) unless there is a field.
 template <class T>

@@ -18,7 +18,6 @@
 #include "transport/method.h"
 
 namespace birefit {
-
 namespace {
 
 void check_method(const Scene& scene) {
@@ -131,10 +130,7 @@ double march_error(const Scene& scene, const Theta& theta, int threads) {
   return march_error_on_twin(scene, theta, threads, picture_of);
 }
 
-bool has_curved_rays(const Scene& scene) {
-  const auto* droplet = std::get_if<Droplet>(&scene.sample);
-  return droplet && rays_stay_meridional(*droplet);
-}
+bool has_curved_rays(const Scene& scene) { return rays_stay_meridional(scene.sample); }
 
 WaveChoice wave_choice(const Scene& scene, const Theta& theta) {
   Scene waves = scene;
@@ -152,13 +148,7 @@ WaveChoice wave_choice(const Scene& scene, const Theta& theta) {
 
 double ripple_period(const Scene& scene, const Theta& theta, int index) {
   if (scene.ceiling != Ceiling::wave || !has_series(scene) || scene.method == "split_step") return 0;
-  if (index != std::get<Droplet>(scene.sample).diameter_um.index) return 0;
-  const Values<double> value(theta, {});
-  // Light caught under the surface: resonances follow each other by atan(s)/s of the size parameter, s^2 = m^2 - 1 (P.
-  // Chylek, J. Opt. Soc. Am. A 7, 1609 (1990)); by one where the sphere is hardly denser.
-  const DropletOptics<double> o = droplet_optics(scene, value);
-  const double s2 = o.n_o * o.n_e / (o.n_host * o.n_host) - 1, s = std::sqrt(std::max(s2, 1e-6));
-  return 2 * std::atan(s) / s / (o.k0 * o.n_host);
+  return series_ripple_period(scene, Values<double>(theta, {}), index);
 }
 
 double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index) {

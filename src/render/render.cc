@@ -11,7 +11,6 @@
 #include "core/threads.h"
 #include "render/render_scalar.h"
 #include "samples/kind.h"
-#include "samples/layers/rings.h"
 #include "samples/pixels/edge_pixels.h"
 #include "samples/pixels/sampling.h"
 #include "samples/tables/fringe_table.h"
@@ -574,8 +573,6 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
   if (scene.ceiling == Ceiling::wave)
     throw UserError(Where{}, "under ceiling: wave a point of the image has no Jones matrix of its own ray",
                     "use `render`, or ceiling: one_way");
-  if (is_ring_table(scene))
-    throw UserError(Where{}, "a table of rings has no Jones matrices", "give the plate view: {half_angle_deg} instead");
   const SampleKind& kind = kind_of(scene);
   if (!kind.jones)
     throw UserError(Where{},

@@ -12,7 +12,6 @@
 #include "samples/volume/volume.h"
 
 namespace birefit {
-
 namespace {
 
 template <class Sample>
@@ -21,7 +20,10 @@ bool is(const Scene& scene, const Observable&) {
 }
 bool is_rings(const Scene& scene, const Observable&) { return is_ring_table(scene); }
 bool is_retardance(const Scene&, const Observable& observable) { return observable.quantity != Quantity::intensity; }
-bool always_is(const Scene&, const Observable&) { return true; }
+bool is_layers(const Scene& scene, const Observable&) {
+  return std::holds_alternative<Cell>(scene.sample) || std::holds_alternative<Slab>(scene.sample) ||
+         std::holds_alternative<Plate>(scene.sample);
+}
 bool always(const Scene&) { return true; }
 bool has_cone(const Scene& scene) { return cone_half_angle(scene).has_value(); }
 

@@ -14,7 +14,7 @@
 namespace birefit {
 
 /// A ray's error, huge where it has none.
-inline double finite(double error) { return std::isfinite(error) ? error : 1e300; }
+inline double or_huge(double error) { return std::isfinite(error) ? error : 1e300; }
 
 /// A kind hands over its rays, each of which knows its own answer, converged to far below the scene's accuracy.
 struct Pilots {

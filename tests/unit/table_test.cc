@@ -100,7 +100,7 @@ TEST_F(TableFile, RowsWithoutANumberAreLeftOutWhereThatIsAsked) {
   const std::string text = "m,r_cm\n1,2\n2,NaN\n3,\n4,OL\n5,6\n";
   const PlacedTable table = read(text, MissingNumbers::left_out);
   EXPECT_THAT(table.lines, ElementsAre(2, 6));
-  EXPECT_THAT(table.notes, ElementsAre(HasSubstr("3 rows without a number left out (line 3, 4, 5)")));
+  EXPECT_THAT(table.notes, ElementsAre(HasSubstr("3 rows without a number left out (lines 3, 4, 5)")));
   EXPECT_THAT(error(text), HasSubstr("t.csv:3:3: r_cm = NaN is not a finite number"));
   // Digits that are no number are a slip, not a gap.
   EXPECT_THROW(read("m,r_cm\n1,2\n2,1O5\n", MissingNumbers::left_out), UserError);

@@ -78,7 +78,7 @@ Pilots planar_pilots(const Scene& scene, const Values<double>& value) {
     pilots.rays.push_back([=](const TransportMethod<double>& method, const Mesh& m) {
       try {
         const Mat2<double> jones = planar_jones<double>(*optics, method, m, tx, ty);
-        return finite(slab ? std::sqrt(2.0) * size_of(jones - exact) : intensity_distance(exact, jones));
+        return or_huge(slab ? std::sqrt(2.0) * size_of(jones - exact) : intensity_distance(exact, jones));
       } catch (const std::logic_error&) {  // steps too long for the method, or a medium it cannot do
         return 1e300;
       }

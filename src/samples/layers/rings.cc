@@ -64,6 +64,10 @@ RenderPlan plan_rings(const Planning& planning) {
 
 std::vector<double> ring_phases(const Scene&, const Values<double>&) { return {0.0}; }
 
+void refuse_ring_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&) {
+  throw UserError(Where{}, "a table of rings has no Jones matrices", "give the plate view: {half_angle_deg} instead");
+}
+
 template <class S>
 std::unique_ptr<PixelModel<S>> make_ring_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   return std::make_unique<RingModel<S>>(scene, plan, value);

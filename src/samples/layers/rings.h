@@ -1,6 +1,7 @@
 #pragma once
 // Dark rings of a uniaxial plate cut normal to its axis, in converging light on a screen.
 
+#include "samples/jones_table.h"
 #include "samples/planning.h"
 
 namespace birefit {
@@ -31,6 +32,8 @@ inline bool is_ring_table(const Scene& scene) {
 RenderPlan plan_rings(const Planning&);
 /// One that nothing changes: radii grow steadily with everything, there is no fringe order to lose.
 std::vector<double> ring_phases(const Scene&, const Values<double>&);
+/// Throws UserError: radii come of no matrix.
+void refuse_ring_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);
 template <class S>
 std::unique_ptr<PixelModel<S>> make_ring_model(const Scene&, const RenderPlan&, const Values<S>&);
 

@@ -21,7 +21,7 @@ Pilots droplet_pilots(const Scene& scene, const Values<double>& value) {
     const DropletRay<double> ray = trace(o, rim, f * rim.rho_max() * o.radius_um);
     const Su2<double> exact = droplet_retarder<double>(o, ray, transport_method<double>("magnus4"), fine);
     pilots.rays.push_back([=](const TransportMethod<double>& method, const Mesh& mesh) {
-      return finite(intensity_distance(exact, droplet_retarder(o, ray, method, mesh)));
+      return or_huge(intensity_distance(exact, droplet_retarder(o, ray, method, mesh)));
     });
   }
   pilots.samples_of = [=](const TransportMethod<double>& method, const Mesh& mesh) {
@@ -58,7 +58,7 @@ Pilots ball_pilots(const Scene& scene, const Values<double>& value) {
       const double azimuth = 2.399963 * static_cast<double>(candidates.size());  // the golden angle: no two alike
       const Mat2<double> exact = jones(f, azimuth, transport_method<double>("magnus4"), finer);
       candidates.push_back(
-          {f, azimuth, finite(intensity_distance(exact, jones(f, azimuth, transport_method<double>("magnus4"), fine))),
+          {f, azimuth, or_huge(intensity_distance(exact, jones(f, azimuth, transport_method<double>("magnus4"), fine))),
            exact});
     }
   std::stable_sort(candidates.begin(), candidates.end(),
@@ -68,7 +68,7 @@ Pilots ball_pilots(const Scene& scene, const Values<double>& value) {
     if (scene.method == "auto" && pilots.rays.size() >= kLeast && c.unsure > 0.1 * scene.intensity_accuracy) break;
     pilots.rays.push_back([=](const TransportMethod<double>& method, const Mesh& mesh) {
       try {
-        return finite(intensity_distance(c.exact, jones(c.fraction, c.azimuth, method, mesh)));
+        return or_huge(intensity_distance(c.exact, jones(c.fraction, c.azimuth, method, mesh)));
       } catch (const std::logic_error&) {  // a method that asks for more than this column knows
         return 1e300;
       }

@@ -121,7 +121,7 @@ Pilots volume_pilots(const Scene& scene, const Values<double>& value) {
     if (unsure > 0.1 * scene.intensity_accuracy && i < kMost - 4) continue;
     pilots.rays.push_back([=, x = x, y = y](const TransportMethod<double>& method, const Mesh& mesh) {
       try {
-        return finite(intensity_distance(exact, volume_retarder(*o, x, y, method, mesh)));
+        return or_huge(intensity_distance(exact, volume_retarder(*o, x, y, method, mesh)));
       } catch (const std::logic_error&) {  // a method that asks for more than this column knows
         return 1e300;
       }

@@ -228,6 +228,15 @@ RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
   return plan;
 }
 
+double series_ripple_period(const Scene& scene, const Values<double>& value, int index) {
+  if (index != std::get<Droplet>(scene.sample).diameter_um.index) return 0;
+  // Light caught under the surface: resonances follow each other by atan(s)/s of the size parameter, s^2 = m^2 - 1 (P.
+  // Chylek, J. Opt. Soc. Am. A 7, 1609 (1990)); by one where the sphere is hardly denser.
+  const DropletOptics<double> o = droplet_optics(scene, value);
+  const double s2 = o.n_o * o.n_e / (o.n_host * o.n_host) - 1, s_root = std::sqrt(std::max(s2, 1e-6));
+  return 2 * std::atan(s_root) / s_root / (o.k0 * o.n_host);
+}
+
 template <class S>
 std::unique_ptr<PixelModel<S>> make_series_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   return std::make_unique<SeriesImage<S>>(scene, plan, value);

@@ -9,6 +9,8 @@ namespace birefit {
 bool has_series(const Scene& scene);
 /// Throws UserError like plan_wave, which serves the other spheres.
 RenderPlan plan_series(const Scene& scene, const Values<double>& value);
+/// Distance of neighbouring resonances in the parameter of this index (its unit); 0 where it moves none.
+double series_ripple_period(const Scene& scene, const Values<double>& value, int index);
 template <class S>
 std::unique_ptr<PixelModel<S>> make_series_model(const Scene&, const RenderPlan&, const Values<S>&);
 
