@@ -283,12 +283,27 @@ struct Direction {
   double azimuth_deg = 0;  ///< of the plane of incidence, from +x
 };
 
+/// A lossless plate between a polarizer and the sample: the field along its slow axis is behind the other by the phase.
+struct Retarder {
+  ParameterRef phase_deg;      ///< at the light's wavelength; or, when not given,
+  ParameterRef retardance_nm;  ///< which is the same at all wavelengths
+  ParameterRef azimuth_deg;    ///< of the slow axis, from +x
+  double turned_deg = 0;       ///< added to it: of a plate that is mounted at an angle to a polarizer
+};
+/// Turns the polarization by angle_deg, counter-clockwise in the image.
+struct Rotator {
+  ParameterRef angle_deg;
+};
+using PolarizingPart = std::variant<Retarder, Rotator>;
+
 struct Microscope {
   ParameterRef wavelength_nm;  ///< vacuum
-  ParameterRef polarizer_deg;
-  ParameterRef analyzer_deg;
-  /// A lossless retarder between sample and analyser, its axis at compensator_azimuth_deg; not given: none. Cells only.
-  ParameterRef compensator_phase_deg, compensator_azimuth_deg;
+  ParameterRef polarizer_deg;  ///< not given: none, the light that comes in is unpolarized
+  ParameterRef analyzer_deg;   ///< not given: none, all that leaves the sample is seen
+  /// Flux that is let through along the polarizer over flux across it, both as they come in; >= 1; not given: ideal.
+  ParameterRef polarizer_extinction_ratio, analyzer_extinction_ratio;
+  /// Between polarizer and sample, between sample and analyser; in the order in which light meets them.
+  std::vector<PolarizingPart> before, behind;
   double bandwidth_nm = 0;  ///< FWHM, 0 = not stated; modelled by discs (a Gaussian), else it enters the model error
   double condenser_na = 0;  ///< 0 = not stated; not modelled: enters the model error
   /// 0 = not stated. Waves: the objective's band limit; droplet rays leaving steeper than this are lost.
@@ -297,8 +312,6 @@ struct Microscope {
   ParameterRef focus_um;
   bool aplanatic = false;             ///< imaging: focal_plane (default) or aplanatic, docs/conventions.md
   std::vector<Direction> directions;  ///< slab scenes
-  /// circular polariscope: quarter-wave plates at 45 degrees from the polarizer, crossed; discs
-  bool quarter_wave = false;
 };
 
 /// A camera that looks at a cone's screen from the side: a pinhole whose axis points at the cone's middle.

@@ -14,6 +14,7 @@
 #include "fit/problem/light.h"
 #include "fit/weights/noise.h"
 #include "fit/zone.h"
+#include "scene/polariscope.h"
 
 namespace birefit {
 namespace {
@@ -144,6 +145,15 @@ FitJob with_shot(const FitJob& job, const std::function<void(Scene&, ParameterTa
   return more;
 }
 
+/// With the plates that are mounted on it.
+void turn_polarizer(Microscope& microscope, ParameterRef to) {
+  for (auto* parts : {&microscope.before, &microscope.behind})
+    for (PolarizingPart& part : *parts)
+      if (auto* retarder = std::get_if<Retarder>(&part); retarder && retarder->azimuth_deg == microscope.polarizer_deg)
+        retarder->azimuth_deg = to;
+  microscope.polarizer_deg = to;
+}
+
 }  // namespace
 
 Outlook outlook(const FitJob& job) {
@@ -202,7 +212,7 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
     for (const double turn : {22.5, 45.0})
       candidates.emplace_back(fmt::format("polarizer and analyser turned together by {:g} deg", turn),
                               [=](Scene& s, ParameterTable& t) {
-                                s.microscope.polarizer_deg = constant(t, "next polarizer_deg", p + turn);
+                                turn_polarizer(s.microscope, constant(t, "next polarizer_deg", p + turn));
                                 s.microscope.analyzer_deg = constant(t, "next analyzer_deg", a + turn);
                               });
     for (const double turn : {-45.0, 45.0, 90.0})
@@ -219,9 +229,10 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
         });
   }
   const Scene& scene = first_picture(base).scene;
-  if (std::holds_alternative<StressedDisc>(scene.sample) && !now.quarter_wave)
-    candidates.emplace_back("with quarter-wave plates (circular polariscope)",
-                            [](Scene& s, ParameterTable&) { s.microscope.quarter_wave = true; });
+  if (std::holds_alternative<StressedDisc>(scene.sample) && now.before.empty() && now.behind.empty())
+    candidates.emplace_back("with quarter-wave plates (circular polariscope)", [=](Scene& s, ParameterTable& t) {
+      make_circular_polariscope(s.microscope, constant(t, "next phase_deg", 90));
+    });
   if (scene.ceiling == Ceiling::wave && (!now.focus_um || known(now.focus_um)))
     for (const double by : {-3.0, 3.0}) {
       const double at = (now.focus_um ? table[now.focus_um].value : 0) + by;

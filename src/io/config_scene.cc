@@ -9,8 +9,10 @@
 #include "io/config_director.h"
 #include "io/config_disc.h"
 #include "io/config_material.h"
+#include "io/config_microscope.h"
 #include "io/config_rings.h"
 #include "io/config_volume.h"
+#include "io/number_specs.h"
 #include "io/table.h"
 #include "transport/method.h"
 
@@ -19,63 +21,6 @@ namespace {
 
 const std::vector<std::string> kSampleKinds = {"droplet", "shell", "cell", "plate",
                                                "crystal", "slab",  "disc", "volume"};
-
-NumberSpec open_length(double upper_um) {
-  NumberSpec spec;
-  spec.unit = "um";
-  spec.lower = 0;
-  spec.lower_open = true;
-  spec.upper = upper_um;
-  spec.physical_lower = 0;
-  return spec;
-}
-
-NumberSpec angle() {
-  NumberSpec spec;
-  spec.unit = "deg";
-  spec.lower = -36000;  // a hundred turns: more is a typing error
-  spec.upper = 36000;
-  return spec;
-}
-
-NumberSpec angle_within(double lower, double upper) {
-  NumberSpec spec;
-  spec.unit = "deg";
-  spec.lower = lower;
-  spec.upper = upper;
-  return spec;
-}
-
-NumberSpec index_spec() {
-  NumberSpec spec;
-  spec.lower = 1;
-  spec.upper = 4;
-  return spec;
-}
-
-NumberSpec number_within(double lower, double upper) {
-  NumberSpec spec;
-  spec.lower = lower;
-  spec.upper = upper;
-  return spec;
-}
-
-NumberSpec aperture() {
-  NumberSpec spec;
-  spec.lower = 0;
-  spec.lower_open = true;
-  spec.upper = 1.6;
-  spec.percent = true;
-  return spec;
-}
-
-NumberSpec kelvin() {
-  NumberSpec spec;
-  spec.unit = "K";
-  spec.lower = 100;
-  spec.upper = 2000;
-  return spec;
-}
 
 /// The key of a map that names a kind: {radial: {..}}. A problem unless there is exactly one; of several the first is
 /// returned, so that its mistakes are found too.
@@ -648,101 +593,6 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
     scene.surround_index = reader.number(surround, "index", index_spec());
   } else {
     scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
-  }
-}
-
-/// The value under either of two spellings; both at once is a mistake.
-ParameterRef polarizing_element(ConfigReader& reader, const Block& block, const std::string& canonical,
-                                const std::string& variant, bool required) {
-  const YamlNode* node = block.find(canonical);
-  const YamlNode* other = block.find(variant);
-  if (node && other)
-    reader.problems.add(other->where, variant + " and " + canonical + " are the same key", "give one of the two");
-  if (!node) node = other;
-  const std::string path = block.path_of(canonical);
-  if (node) return reader.number_at(*node, path, angle());
-  return reader.number(block, canonical, angle(), required ? std::nullopt : std::optional<double>(0));
-}
-
-void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
-  Microscope& microscope = scene.microscope;
-  const Block block =
-      reader.block(root, "microscope",
-                   {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg", "objective_na",
-                    "condenser_na", "focus_um", "imaging", "directions", "quarter_wave", "compensator"},
-                   true);
-  const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
-  NumberSpec wavelength;
-  wavelength.unit = "nm";
-  wavelength.lower = 100;
-  wavelength.upper = 20000;
-  microscope.wavelength_nm = reader.number(light, "wavelength_nm", wavelength);
-  NumberSpec bandwidth;
-  bandwidth.unit = "nm";
-  bandwidth.lower = 0;
-  bandwidth.upper = 5000;
-  microscope.bandwidth_nm = reader.plain(light, "bandwidth_nm", bandwidth).value_or(0);
-
-  if (auto* constant = std::get_if<ConstantIndices>(&scene.material); constant && constant->resonance_nm) {
-    const Parameter &resonance = reader.table[constant->resonance_nm], &light = reader.table[microscope.wavelength_nm];
-    // A quarter of the light's wavelength away from the band its law stops to hold; 589.3 nm is where birefringence is
-    // given.
-    const double shortest = std::min(light.free ? light.lower : light.value, 589.3);
-    if ((resonance.free ? resonance.upper : resonance.value) > 0.8 * shortest)
-      reader.problems.add(
-          resonance.where,
-          resonance.name + " must stay below 0.8 of the wavelength (and of 589.3 nm, where birefringence is given)",
-          "liquid crystals have 200 to 300");
-  }
-  if (block.find("compensator")) {
-    const Block compensator = reader.block(block, "compensator", {"phase_deg", "azimuth_deg"}, true);
-    if (!std::holds_alternative<Cell>(scene.sample))
-      reader.problems.add(compensator.where, "microscope.compensator is for cells", "leave it out");
-    microscope.compensator_phase_deg = reader.number(compensator, "phase_deg", angle());
-    microscope.compensator_azimuth_deg = reader.number(compensator, "azimuth_deg", angle());
-  }
-
-  const Slab* slab_sample = std::get_if<Slab>(&scene.sample);
-  const bool slab = slab_sample && !slab_sample->half_angle_deg;
-  microscope.polarizer_deg =
-      polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab && reader.polarizers);
-  microscope.analyzer_deg =
-      polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab && reader.polarizers);
-  microscope.objective_na = reader.plain(block, "objective_na", aperture()).value_or(0);
-  microscope.condenser_na = reader.plain(block, "condenser_na", aperture()).value_or(0);
-  if (block.find("focus_um")) {
-    NumberSpec focus;
-    focus.unit = "um";
-    focus.lower = -1000;
-    focus.upper = 1000;
-    microscope.focus_um = reader.number(block, "focus_um", focus);
-  }
-  microscope.aplanatic = reader.choice(block, "imaging", {"focal_plane", "aplanatic"}).value_or("") == "aplanatic";
-
-  microscope.quarter_wave = reader.choice(block, "quarter_wave", {"true", "false"}).value_or("false") == "true";
-  if (microscope.quarter_wave && !std::holds_alternative<StressedDisc>(scene.sample))
-    reader.problems.add(block.find("quarter_wave")->where, "quarter_wave is for discs", "leave it out");
-  if (const YamlNode* directions = block.find("directions")) {
-    if (!slab)
-      reader.problems.add(directions->where,
-                          slab_sample ? "a slab with a view in a cone has a direction for every pixel"
-                                      : "directions belong to slab scenes",
-                          slab_sample ? "give one of the two" : "");
-    if (!directions->is_sequence() || directions->items.empty()) {
-      reader.problems.add(directions->where, "directions must be a list of {theta_deg, azimuth_deg}, found " +
-                                                 (directions->is_sequence() ? "an empty one" : directions->describe()));
-      return;
-    }
-    for (const YamlNode& item : directions->items) {
-      const Block direction = reader.block_of(item, "microscope.directions", {"theta_deg", "azimuth_deg"});
-      NumberSpec theta = angle_within(0, 90);
-      theta.upper_open = true;
-      if (direction.node && !direction.find("theta_deg")) reader.missing(direction, "theta_deg");
-      microscope.directions.push_back({reader.plain(direction, "theta_deg", theta).value_or(0),
-                                       reader.plain(direction, "azimuth_deg", angle()).value_or(0)});
-    }
-  } else if (slab) {
-    microscope.directions = {{0, 0}};
   }
 }
 

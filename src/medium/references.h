@@ -110,8 +110,14 @@ void for_each_ref(SceneOrConst& scene, F&& f) {
   f(scene.microscope.wavelength_nm);
   f(scene.microscope.polarizer_deg);
   f(scene.microscope.analyzer_deg);
-  f(scene.microscope.compensator_phase_deg);
-  f(scene.microscope.compensator_azimuth_deg);
+  f(scene.microscope.polarizer_extinction_ratio);
+  f(scene.microscope.analyzer_extinction_ratio);
+  for (auto* parts : {&scene.microscope.before, &scene.microscope.behind})
+    for (auto& part : *parts) {
+      if (auto* retarder = std::get_if<Retarder>(&part))
+        for (auto* ref : {&retarder->phase_deg, &retarder->retardance_nm, &retarder->azimuth_deg}) f(*ref);
+      if (auto* rotator = std::get_if<Rotator>(&part)) f(rotator->angle_deg);
+    }
   f(scene.microscope.focus_um);
   f(scene.view.center_x_px);
   f(scene.view.center_y_px);

@@ -9,6 +9,7 @@
 
 #include "birefit/error.h"
 #include "birefit/render.h"
+#include "instrument/beam.h"
 #include "medium/validity.h"
 #include "rays/eikonal.h"
 #include "samples/kind.h"
@@ -49,11 +50,16 @@ void check_method(const Scene& scene) {
 }
 
 std::vector<double> phases(const Scene& scene, const Theta& theta) {
-  return kind_of(scene).phases_rad(scene, Values<double>(theta, {}));
+  const Values<double> value(theta, {});
+  std::vector<double> phases = kind_of(scene).phases_rad(scene, value);
+  const std::vector<double> of_parts = part_phases(scene.microscope, value);
+  phases.insert(phases.end(), of_parts.begin(), of_parts.end());
+  return phases;
 }
 double largest_phase(const Scene& scene, const Theta& theta) {
   double largest = 0;
-  for (const double phase : phases(scene, theta)) largest = std::max(largest, std::abs(phase));
+  for (const double phase : kind_of(scene).phases_rad(scene, Values<double>(theta, {})))
+    largest = std::max(largest, std::abs(phase));
   return largest;
 }
 

@@ -11,6 +11,7 @@
 
 #include "birefit/plan.h"
 #include "core/scalar.h"
+#include "instrument/beam.h"
 #include "medium/surround.h"
 #include "samples/fringe.h"
 #include "scene/values.h"
@@ -92,23 +93,6 @@ bool centred(const Scene& scene, const S& center_x_px, const S& center_y_px) {
   return stays_at(center_x_px, 0.5 * (scene.view.width - 1)) && on_middle_row(scene, center_y_px);
 }
 
-template <class S>
-struct Polarizers {
-  S px, py, ax, ay;  ///< unit vectors of polarizer and analyser in the image's x, y
-};
-template <class S>
-Polarizers<S> polarizers(const Scene& scene, const Values<S>& value) {
-  Polarizers<S> r;
-  sin_cos(value.radians(scene.microscope.polarizer_deg), r.py, r.px);
-  sin_cos(value.radians(scene.microscope.analyzer_deg), r.ay, r.ax);
-  return r;
-}
-
-/// Both along x or y: a mirror in either turns no more than the sign of what passes.
-template <class S>
-bool along_axes(const Polarizers<S>& p) {
-  return stays_at(S(p.px * p.py), 0.0) && stays_at(S(p.ax * p.ay), 0.0);
-}
 /// A line's direction that a mirror y -> -y leaves as it is.
 template <class S>
 bool mirrored(const S& x, const S& y, const S& z) {
@@ -117,11 +101,10 @@ bool mirrored(const S& x, const S& y, const S& z) {
 
 /// Of a sample that looks the same from all sides of the viewing axis; twisted, it is not its mirror image.
 template <class S>
-Symmetry round_symmetry(const Scene& scene, const Values<S>& value, bool twisted) {
+Symmetry round_symmetry(const Scene& scene, const Values<S>& value, const Line<S>& light, bool twisted) {
   const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
   if (centred(scene, center_x, center_y)) return Symmetry::half_turn;
-  return !twisted && on_middle_row(scene, center_y) && along_axes(polarizers(scene, value)) ? Symmetry::mirror
-                                                                                            : Symmetry::none;
+  return !twisted && on_middle_row(scene, center_y) && light.mirrored() ? Symmetry::mirror : Symmetry::none;
 }
 
 }  // namespace birefit

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "birefit/plan.h"
-#include "transport/matrix.h"
+#include "core/jones.h"
 
 namespace birefit {
 

@@ -1,7 +1,7 @@
 #pragma once
 // How far two answers of transport may lie apart in a picture, whatever the polarizers.
 
-#include "transport/matrix.h"
+#include "core/jones.h"
 
 namespace birefit {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/jones.h"
 #include "medium/column.h"
-#include "transport/matrix.h"
 #include "transport/one_way.h"
 
 namespace birefit {
@@ -92,21 +92,5 @@ Mesh uniform_mesh(int steps, const std::vector<double>& breaks = {});
 /// Never fails: stops refining at max_steps and returns what it has; error_estimate receives the sum of local errors.
 Mesh adapted_mesh(const Column<double>& column, const Ray<double>& ray, double tolerance,
                   double* error_estimate = nullptr, int max_steps = 200000);
-
-// The scalars all kernels are compiled for, and one more for pictures that are read from a table over the radius: eight
-// derivatives at once cost less there than four and four, but not where every point has its ray (lanes leave the
-// registers).
-#define BIREFIT_FOR_EACH_SCALAR(X) X(double) X(Pack) X(Dual1) X(Dual2) X(Dual4)
-#define BIREFIT_FOR_EACH_SCALAR_OF_TABLES(X) BIREFIT_FOR_EACH_SCALAR(X) X(Dual8)
-/// Each of them and those with as many derivatives or more.
-#define BIREFIT_FOR_EACH_RAISE(X)                                                                             \
-  X(double, double)                                                                                           \
-  X(Pack, Pack)                                                                                               \
-  X(Pack, Dual1) X(Pack, Dual2) X(Pack, Dual4) X(Pack, Dual8) X(Dual1, Dual1) X(Dual1, Dual2) X(Dual1, Dual4) \
-      X(Dual1, Dual8) X(Dual2, Dual2) X(Dual2, Dual4) X(Dual2, Dual8) X(Dual4, Dual4) X(Dual4, Dual8) X(Dual8, Dual8)
-using Dual1 = Dual<Pack, 1>;
-using Dual2 = Dual<Pack, 2>;
-using Dual4 = Dual<Pack, 4>;
-using Dual8 = Dual<Pack, 8>;
 
 }  // namespace birefit

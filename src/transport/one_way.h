@@ -7,8 +7,8 @@
 // whose eigenvalues are the normal components q_o and q_e. Nothing divides by the angle between axis and wavevector.
 // D [I; Y] = [I; Y] N holds for the Berreman matrix D; a law test checks it for random media.
 
+#include "core/jones.h"
 #include "medium/column.h"
-#include "transport/matrix.h"
 
 namespace birefit {
 

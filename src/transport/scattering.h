@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/jones.h"
 #include "medium/column.h"
-#include "transport/matrix.h"
 
 namespace birefit {
 

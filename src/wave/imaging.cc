@@ -1,6 +1,7 @@
 #include "wave/imaging.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -163,10 +164,15 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
               p_over = m.aplanatic ? S(1.0) : inverse(s_over);
       S sn, cs;
       sin_cos(light.k0_per_um * (q - tilt_q) * depth, sn, cs);
-      const S on_p = S(px) * m.ax + S(py) * m.ay, on_s = S(px) * m.ay - S(py) * m.ax;
-      const S of_x = open * (p_over * on_p * S(px) - s_over * on_s * S(py)),
-              of_y = open * (p_over * on_p * S(py) + s_over * on_s * S(px));
-      const S factor[4] = {of_x * cs, of_x * sn, of_y * cs, of_y * sn};
+      const auto seen_of = [&](const S& ax, const S& ay) {
+        const S on_p = S(px) * ax + S(py) * ay, on_s = S(px) * ay - S(py) * ax;
+        return std::array<S, 2>{open * (p_over * on_p * S(px) - s_over * on_s * S(py)),
+                                open * (p_over * on_p * S(py) + s_over * on_s * S(px))};
+      };
+      const auto real = seen_of(m.ax.re, m.ay.re), imaginary = seen_of(-m.ax.im, -m.ay.im);
+      const Complex<S> delay(cs, sn), of_x = Complex<S>(real[0], imaginary[0]) * delay,
+                                      of_y = Complex<S>(real[1], imaginary[1]) * delay;
+      const S factor[4] = {of_x.re, of_x.im, of_y.re, of_y.im};
       for (int k = 0; k < count; ++k) {
         const auto number = [&](int which, int plane) {
           const auto at = [&](const S& s) {
@@ -202,7 +208,8 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   const bool tilted = light.kx_per_um != 0 || light.ky_per_um != 0;
   const double k0 = part(light.k0_per_um, 0);
   const bool collected = std::hypot(light.kx_per_um, light.ky_per_um) <= m.objective_na * k0;
-  const S direct = m.ax * light.ex + m.ay * light.ey;
+  const Complex<S> direct = conj(m.ax) * light.ex + conj(m.ay) * light.ey;
+  const auto direct_part = [&](int f) { return Z(part(direct.re, f), part(direct.im, f)); };
   // Intensity less that of the incident light, which is what remains outside.
   std::vector<Eigen::MatrixXd> intensity(kFields,
                                          Eigen::MatrixXd(static_cast<long>(y.size()), static_cast<long>(x.size())));
@@ -211,10 +218,10 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
       const Z wave = tilted ? std::polar(1.0, light.kx_per_um * x[static_cast<std::size_t>(i)] +
                                                   light.ky_per_um * y[static_cast<std::size_t>(j)])
                             : Z(1);
-      const Z incident = collected ? part(direct, 0) * wave : Z(0), field = incident + seen[0](j, i);
+      const Z incident = collected ? direct_part(0) * wave : Z(0), field = incident + seen[0](j, i);
       intensity[0](j, i) = std::norm(field) - std::norm(incident);
       for (int p = 1; p < kFields; ++p) {
-        const Z by = collected ? part(direct, p) * wave : Z(0);
+        const Z by = collected ? direct_part(p) * wave : Z(0);
         intensity[static_cast<std::size_t>(p)](j, i) =
             2 * std::real(std::conj(field) * (by + seen[static_cast<std::size_t>(p)](j, i)) - std::conj(incident) * by);
       }
@@ -241,7 +248,7 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
       for (std::size_t k = 0; k < w.size(); ++k) out += scale * w[k] * from.row(row.first + static_cast<long>(k));
     });
   };
-  const S background = collected ? direct * direct : S(0.0);
+  const S background = collected ? norm(direct) : S(0.0);
   for (std::size_t p = 0; p < images.size(); ++p) {
     Image& image = *images[p];
     if (image.width() != m.width || image.height() != m.height) image = Image(m.width, m.height);

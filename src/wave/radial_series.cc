@@ -361,14 +361,14 @@ Mat2<double> scattered_spectrum(const RadialSeries<double>& series, const std::a
   template RadialPair<S> carried(const RadialPair<S>&, const S&, const S&, const S&);       \
   template RiccatiBessel<S> riccati_bessel(const S&, int);
 BIREFIT_INSTANTIATE(double)
-using Dual1 = Dual<double, 1>;
-using Dual2 = Dual<double, 2>;
-using Dual4 = Dual<double, 4>;
-using Dual8 = Dual<double, 8>;
-BIREFIT_INSTANTIATE(Dual1)
-BIREFIT_INSTANTIATE(Dual2)
-BIREFIT_INSTANTIATE(Dual4)
-BIREFIT_INSTANTIATE(Dual8)
+using Single1 = Dual<double, 1>;
+using Single2 = Dual<double, 2>;
+using Single4 = Dual<double, 4>;
+using Single8 = Dual<double, 8>;
+BIREFIT_INSTANTIATE(Single1)
+BIREFIT_INSTANTIATE(Single2)
+BIREFIT_INSTANTIATE(Single4)
+BIREFIT_INSTANTIATE(Single8)
 #undef BIREFIT_INSTANTIATE
 
 }  // namespace birefit

@@ -16,8 +16,8 @@
 #include <array>
 #include <vector>
 
+#include "core/jones.h"
 #include "core/scalar.h"
-#include "transport/matrix.h"
 
 namespace birefit {
 

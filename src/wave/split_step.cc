@@ -235,7 +235,7 @@ class Propagation {
     }
     kx_ = padded(kx_), kept_ = padded(kept_), half_step_slope_ = padded(half_step_slope_);
     frame_x_ = padded(frame(g_.nx)), frame_y_ = frame(g_.ny);
-    incident_[0] = Complex<S>(light.ex), incident_[1] = Complex<S>(light.ey);
+    incident_[0] = light.ex, incident_[1] = light.ey;
     const S kh = light.k0_per_um * light.n_host;
     tilt2_ = square(light.kx_per_um) + square(light.ky_per_um);
     host_q_ = root(kh * kh - tilt2_) * inverse(light.k0_per_um);

@@ -41,7 +41,7 @@ template <class S>
 struct WaveLight {
   S k0_per_um;  ///< 2 pi / vacuum wavelength
   S n_host;
-  S ex, ey;                             ///< transverse field in the host
+  Complex<S> ex, ey;                    ///< transverse field in the host
   double kx_per_um = 0, ky_per_um = 0;  ///< transverse wavevector
 };
 

@@ -189,7 +189,7 @@ Image picture(const WaveGrid& g, const std::vector<WaveField>& field, const Wave
   const int n = pixels(half_um);
   WaveMicroscope<Pack> m;
   m.objective_na = na, m.aplanatic = aplanatic, m.focus_um = Pack(focus_um);
-  m.ax = Pack(0.0) - l.ey, m.ay = l.ex;
+  m.ax = -l.ey, m.ay = l.ex;
   m.center_x_px = m.center_y_px = Pack(0.5 * (n - 1));
   m.pixel_um = kPixel, m.width = m.height = n;
   Image image;
@@ -732,7 +732,7 @@ TEST(SplitStep, AnotherBeamPropagation) {
 /// Flux of the whole field at the exit over that of the incident wave.
 double transmitted(const WaveGrid& g, const WaveLight<Pack>& l, const WaveMedium<Pack>& medium) {
   const WaveField f = propagate(g, l, medium, 1)[0];
-  const double ex = lane(l.ex, 0), ey = lane(l.ey, 0);
+  const double ex = lane(l.ex.re, 0), ey = lane(l.ey.re, 0);
   double sum = 0;
   for (std::size_t i = 0; i < f.a[0].size(); ++i) sum += std::norm(f.a[0][i] + ex) + std::norm(f.a[1][i] + ey);
   return sum / (static_cast<double>(f.a[0].size()) * (ex * ex + ey * ey));
@@ -802,11 +802,11 @@ std::vector<Image> shell_images(const std::array<S, kCount>& p, int threads = 1)
   const S over = inverse(p[kRadius]);
   o.field = NestedField<S>{{over * p[kOffsetX], over * 0.05, over * p[kOffsetZ]}, over * p[kCore]};
   WaveLight<S> l{p[kWavenumber], p[kHost], S(0.0), S(0.0)};
-  sin_cos(p[kPolarizer], l.ey, l.ex);
+  sin_cos(p[kPolarizer], l.ey.re, l.ex.re);
   WaveMicroscope<S> m;
   m.objective_na = 0.6;
   m.focus_um = p[kFocus];
-  sin_cos(S(p[kPolarizer] + 1.2), m.ay, m.ax);
+  sin_cos(S(p[kPolarizer] + 1.2), m.ay.re, m.ax.re);
   m.center_x_px = p[kCentreX], m.center_y_px = p[kCentreY];
   m.pixel_um = 0.15, m.width = m.height = 41;
   std::vector<Image> images(1 + ScalarTraits<S>::derivatives);

@@ -11,6 +11,7 @@
 #include "birefit/volume.h"
 #include "medium/families/planar.h"
 #include "medium/families/radial.h"
+#include "scene/polariscope.h"
 #include "scene_builder.h"
 #include "transport/one_way.h"
 
@@ -243,8 +244,10 @@ std::vector<Case> cases() {
     d.k33_pn = c.t.fixed("k33_pn", 17.1);
     d.eps_parallel = c.t.fixed("eps_parallel", 19.3);
     d.eps_perpendicular = c.t.fixed("eps_perpendicular", 5.2);
-    c.scene.microscope.compensator_phase_deg = c.t.fixed("compensator_phase_deg", 70);
-    c.scene.microscope.compensator_azimuth_deg = c.t.fixed("compensator_azimuth_deg", 25);
+    Retarder compensator;
+    compensator.phase_deg = c.t.fixed("compensator_phase_deg", 70);
+    compensator.azimuth_deg = c.t.fixed("compensator_azimuth_deg", 25);
+    c.scene.microscope.behind.emplace_back(compensator);
     ConstantIndices& m = std::get<ConstantIndices>(c.scene.material);
     m.resonance_nm = c.t.fixed("resonance_nm", 250);
     all.push_back(c);
@@ -392,7 +395,7 @@ std::vector<Case> cases() {
     disc.residual_shear_mpa = {c.t.fixed("s1", -0.2), c.t.fixed("sx", 0.1), c.t.fixed("sy", 0.3),
                                c.t.fixed("sxx", 0.6)};
     c.scene.sample = disc;
-    c.scene.microscope.quarter_wave = circular;
+    if (circular) make_circular_polariscope(c.scene.microscope, c.t.fixed("quarter_deg", 90));
     all.push_back(c);
     c.name += ", broad and uneven light";
     disc.illumination = {c.t.fixed("light_x", 0.4), c.t.fixed("light_y", -0.2), c.t.fixed("light_xx", 0.3)};

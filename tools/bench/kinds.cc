@@ -10,190 +10,16 @@
 #include <functional>
 #include <iostream>
 #include <map>
-#include <memory>
-#include <numbers>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "birefit/render.h"
-#include "birefit/volume.h"
-#include "study/frames.h"
+#include "every_kind.h"
 
 using namespace birefit;
+using birefit::testing::Kind;
 
 namespace {
-
-struct Kind {
-  std::string name;
-  ParameterTable table;
-  Scene scene;
-  std::vector<int> four;  ///< to differentiate by; fewer where the kind has fewer
-
-  ParameterRef number(const std::string& what, double value) { return table.add_constant(what, value); }
-  ParameterRef moving(const std::string& what, double value) {
-    const ParameterRef ref = number(what, value);
-    if (four.size() < 4) four.push_back(ref.index);
-    return ref;
-  }
-};
-
-/// Between crossed polarizers, ordinary 1.52, birefringence 0.22, at 590 nm.
-Kind scene_of(std::string name, int size, double pixel_um, Sample (*sample)(Kind&)) {
-  Kind k;
-  k.name = std::move(name);
-  k.scene.view.width = k.scene.view.height = size;
-  k.scene.view.pixel_size_um = pixel_um;
-  k.scene.sample = sample(k);
-  ConstantIndices material;
-  material.birefringence = k.moving("birefringence", 0.22);
-  material.ordinary = k.number("ordinary", 1.52);
-  k.scene.material = material;
-  k.scene.surround_index = k.number("index", 1.43);
-  k.scene.view.center_x_px = k.moving("center_x", 0.5 * size + 0.3);
-  k.scene.view.center_y_px = k.moving("center_y", 0.5 * size - 0.2);
-  k.scene.microscope.wavelength_nm = k.moving("wavelength_nm", 590);
-  k.scene.microscope.polarizer_deg = k.number("polarizer_deg", 0);
-  k.scene.microscope.analyzer_deg = k.number("analyzer_deg", 90);
-  return k;
-}
-
-Droplet droplet_of(Kind& k) {
-  Droplet droplet;
-  droplet.diameter_um = k.moving("diameter_um", 9.3);
-  return droplet;
-}
-Sample radial(Kind& k) { return droplet_of(k); }
-Sample twisted(Kind& k) {
-  Droplet droplet = droplet_of(k);
-  droplet.director = RadialDirector{k.number("twist_deg", 60)};
-  return droplet;
-}
-Droplet shell_of(Kind& k) {
-  Droplet droplet = droplet_of(k);
-  ShellDirector shell;
-  shell.wall_um = k.number("wall_um", 1.3);
-  droplet.director = shell;
-  return droplet;
-}
-Sample shell(Kind& k) { return shell_of(k); }
-Sample eccentric_shell(Kind& k) {
-  Droplet droplet = shell_of(k);
-  std::get<ShellDirector>(droplet.director).offset_um = {k.number("offset_x", 0.4), k.number("offset_y", -0.2),
-                                                         k.number("offset_z", 0.3)};
-  return droplet;
-}
-Sample bipolar(Kind& k) {
-  Droplet droplet = droplet_of(k);
-  BipolarDirector director;
-  director.azimuth_deg = k.number("azimuth_deg", 35);
-  director.tilt_deg = k.number("tilt_deg", 20);
-  droplet.director = director;
-  return droplet;
-}
-Droplet in_field_of(Kind& k) {
-  Droplet droplet = droplet_of(k);
-  AxialDirector axial;
-  axial.reduced_field = k.number("reduced_field", 3);
-  droplet.director = axial;
-  return droplet;
-}
-Sample in_field(Kind& k) { return in_field_of(k); }
-Sample in_field_across(Kind& k) {
-  Droplet droplet = in_field_of(k);
-  std::get<AxialDirector>(droplet.director).field_azimuth_deg = k.number("field_azimuth_deg", 35);
-  return droplet;
-}
-Sample bar(Kind& k) {
-  Crystal crystal;
-  crystal.half_wave_voltage_v = k.number("half_wave_voltage_v", 1500);
-  crystal.bias_v = k.moving("bias_v", 2700);
-  crystal.slow_axis_deg = k.number("slow_axis_deg", 45);
-  crystal.field_legendre = {k.moving("c1", 0.1), k.moving("c2", 0.05), k.number("c3", 0.02)};
-  return crystal;
-}
-Sample disc(Kind& k) {
-  StressedDisc disc;
-  disc.diameter_um = k.moving("disc_um", 40000);
-  disc.thickness_um = k.number("thickness_um", 6000);
-  disc.load_n = k.moving("load_n", 800);
-  disc.stress_optic_brewster = k.number("stress_optic_brewster", 80);
-  return disc;
-}
-Sample cell(Kind& k) {
-  Cell cell;
-  cell.thickness_um = k.moving("thickness_um", 8);
-  TwistedDirector director;
-  director.twist_deg = k.moving("twist_deg", 80);
-  director.azimuth_deg = k.number("azimuth_deg", 10);
-  director.pretilt_deg = k.number("pretilt_deg", 2);
-  cell.director = director;
-  return cell;
-}
-Sample cell_in_field(Kind& k) {
-  Cell cell;
-  cell.thickness_um = k.moving("thickness_um", 8);
-  FreederickszDirector director;
-  director.reduced_voltage = k.moving("reduced_voltage", 1.7);
-  director.k33_over_k11 = k.number("k33_over_k11", 1.4);
-  director.eps_ratio = k.number("eps_ratio", 2.5);
-  director.pretilt_deg = k.number("pretilt_deg", 2);
-  director.azimuth_deg = k.number("azimuth_deg", 45);
-  cell.director = director;
-  return cell;
-}
-/// A cell of 64 x 64 x 24 nodes whose director winds once across and tilts in the middle.
-Sample volume(Kind& k) {
-  auto grid = std::make_shared<VolumeGrid>();
-  grid->nx = grid->ny = 64, grid->nz = 24;
-  grid->spacing_um = {0.2, 0.2, 0.2};
-  for (int z = 0; z < grid->nz; ++z)
-    for (int y = 0; y < grid->ny; ++y)
-      for (int x = 0; x < grid->nx; ++x) {
-        const double azimuth = 2 * std::numbers::pi * x / grid->nx + 0.03 * y + 0.04 * z,
-                     tilt = 0.6 * std::sin(std::numbers::pi * z / (grid->nz - 1.0));
-        grid->nodes.push_back(
-            director_tensor(std::cos(tilt) * std::cos(azimuth), std::cos(tilt) * std::sin(azimuth), std::sin(tilt)));
-      }
-  SampledVolume sample;
-  sample.grid = std::move(grid);
-  sample.scale = k.moving("scale", 1);
-  return sample;
-}
-
-std::vector<Kind> kinds() {
-  std::vector<Kind> all;
-  constexpr int kSize = 500;
-  constexpr double kPixelUm = 0.025;
-  const auto add = [&](const char* name, int size, double pixel_um, Sample (*sample)(Kind&)) -> Scene& {
-    all.push_back(scene_of(name, size, pixel_um, sample));
-    return all.back().scene;
-  };
-  add("radial", kSize, kPixelUm, radial);
-  add("twisted", kSize, kPixelUm, twisted);
-  add("shell", kSize, kPixelUm, shell);
-  add("in_field", kSize, kPixelUm, in_field);
-  add("bipolar", kSize, kPixelUm, bipolar);
-  add("in_field_across", kSize, kPixelUm, in_field_across);
-  add("eccentric_shell", kSize, kPixelUm, eccentric_shell);
-  add("bar", kSize, 1, bar);
-  add("disc", kSize, 90, disc);
-  add("cell", 8, 0, cell);
-  add("cell_in_field", 8, 0, cell_in_field);
-  add("volume", 200, 0.07, volume);
-  add("curved", 128, 0.1, radial).rays = Rays::eikonal;
-  add("curved_shell", 128, 0.1, shell).rays = Rays::eikonal;
-  for (const bool exactly : {true, false}) {
-    Scene& scene = add(exactly ? "waves_series" : "waves_propagated", 160, 0.08, exactly ? radial : bipolar);
-    scene.ceiling = Ceiling::wave;
-    scene.microscope.objective_na = 0.8;
-  }
-  for (study::FrameScene& f : study::frame_scenes()) {
-    if (std::holds_alternative<Droplet>(f.scene.sample)) continue;
-    all.push_back({f.name, std::move(f.table), std::move(f.scene), {f.parameters.begin(), f.parameters.begin() + 4}});
-  }
-  return all;
-}
 
 /// Of one call, the fastest of a few batches of some milliseconds each: what the machine's other work adds is never
 /// negative.
@@ -240,7 +66,7 @@ class Timed {
 
 int main(int argc, char** argv) {
   const bool serve = argc > 1 && std::string(argv[1]) == "--serve";
-  const std::vector<Kind> all = kinds();
+  const std::vector<Kind> all = birefit::testing::every_kind();
   std::map<std::string, Timed> timed;
   std::vector<std::string> names;
   for (const Kind& kind : all)

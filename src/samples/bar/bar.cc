@@ -19,12 +19,17 @@ class CrystalModel final : public PixelModel<S> {
     const int size = along_y_ ? scene.view.height : scene.view.width;
     low_ = value.get(crystal.electrode_low_px, -0.5);
     high_ = value.get(crystal.electrode_high_px, size - 0.5);
-    // Born & Wolf 15.4.2: I = cos^2(A - P) - sin 2(A - f) sin 2(P - f) sin^2(delta/2), f the induced axis.
-    const S p = value.radians(scene.microscope.polarizer_deg), a = value.radians(scene.microscope.analyzer_deg);
-    const S f = value.radians(crystal.slow_axis_deg) + value.radians(scene.view.rotation_deg);
-    const S c = cos(a - p);
-    bright_ = c * c;
-    modulation_ = -(sin(2.0 * (a - f)) * sin(2.0 * (p - f)));
+    // A retarder cos(delta/2) + i sin(delta/2) sz in the frame of the induced axis. Between linear states this is Born
+    // & Wolf 15.4.2, I = cos^2(A - P) - sin 2(A - f) sin 2(P - f) sin^2(delta/2), f the induced axis.
+    const Line<S> light(scene.microscope, value);
+    S sin_twice, cos_twice;
+    sin_cos(2.0 * (value.radians(crystal.slow_axis_deg) + value.radians(scene.view.rotation_deg)), sin_twice,
+            cos_twice);
+    const RetarderForm<S> form = light.form().in_frame(cos_twice, sin_twice);
+    bright_ = form.ww;
+    modulation_ = form.zz - form.ww;
+    turning_ = 2.0 * form.wz;
+    linear_ = light.linear();
   }
   S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const override {
     S field(1.0);
@@ -39,13 +44,19 @@ class CrystalModel final : public PixelModel<S> {
         now = next;
       }
     }
-    const S s = sin(0.5 * phase_ * field);
-    return bright_ + modulation_ * s * s;
+    if (linear_) {
+      const S s = sin(0.5 * phase_ * field);
+      return bright_ + modulation_ * s * s;
+    }
+    S s, c;
+    sin_cos(0.5 * phase_ * field, s, c);
+    return bright_ + (modulation_ * s + turning_ * c) * s;
   }
 
  private:
-  bool along_y_;
+  bool along_y_, linear_;
   S phase_, low_, high_, bright_, modulation_;
+  S turning_;  ///< of elliptic light
   std::vector<S> legendre_;
 };
 

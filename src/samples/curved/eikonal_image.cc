@@ -10,13 +10,13 @@ EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const 
     : optics_(droplet_optics(scene, value)),
       fan_p_(optics_, true, scene.microscope.objective_na),
       fan_s_(optics_, false, scene.microscope.objective_na),
-      view_(scene, value),
-      cos_between_(cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg))),
+      light_(Line<S>(scene.microscope, value)),
+      view_(scene, value, light_),
       aplanatic_(scene.microscope.aplanatic),
-      symmetry_(round_symmetry(scene, value, false)),
+      symmetry_(round_symmetry(scene, value, light_.line(), false)),
       panels_(plan.part_panels),
       allowed_tail_(std::max(0.05 * scene.intensity_accuracy, 3 * plan.numerical_error)) {
-  passing_ = PassingLight<S>(view_.pixel_um(), optics_.radius_um, cos_between_);
+  passing_ = PassingLight<S>(view_.pixel_um(), optics_.radius_um, light_.line().open());
   std::vector<S> ends = fan_p_.ends_um();
   ends.insert(ends.end(), fan_s_.ends_um().begin(), fan_s_.ends_um().end());
   const auto place = [](const S& end) { return lane(plain(end), 0); };
@@ -59,20 +59,22 @@ void EikonalImage<S>::terms_at(const S& rho_um, S* out) const {
   // |E|^2 is flux over the cosine; not aplanatic, only the transverse part of the p field counts.
   const S p_field = aplanatic_ ? p.amplitude : p.amplitude * root(p.cos_turn),
           s_field = aplanatic_ ? s.amplitude : s.amplitude * inverse_root(s.cos_turn);
-  // With a = p exp(i phase) and d = s in the (radial, azimuthal) frame the field behind the analyser is (a + d)/2
-  // cos(analyser - polarizer) + (a - d)/2 q.
+  // The matrix is (p exp(i phase), s) in the (radial, azimuthal) frame.
   S sine, cosine;
   sin_cos(p.phase_rad - s.phase_rad, sine, cosine);
+  if (!light_.line().linear())
+    return light_.terms({{p_field * cosine, p_field * sine}, {}, {}, {s_field}}, S(1.0), true, out);
   const S sum = 0.25 * (p_field * p_field + s_field * s_field), mixed = 0.5 * p_field * s_field * cosine;
   out[0] = sum - mixed;
-  out[1] = (0.5 * cos_between_) * (p_field * p_field - s_field * s_field);
-  out[2] = (cos_between_ * cos_between_) * (sum + mixed);
+  const S between = light_.line().cos_between();
+  out[1] = (0.5 * between) * (p_field * p_field - s_field * s_field);
+  out[2] = (between * between) * (sum + mixed);
 }
 
 template <class S>
 RadialTable<S> EikonalImage<S>::table(const Part& part, int panels, int threads) const {
   const S span = inverse(part.inverse_span);
-  return RadialTable<S>(panels, kTerms, threads,
+  return RadialTable<S>(panels, terms(), threads,
                         [&](const P& v, S* out) { terms_at(part.end_um + span * (v * v), out); });
 }
 
@@ -86,12 +88,13 @@ double EikonalImage<S>::table_error(std::size_t which, int panels) const {
   for (int i = 0; i < kPlaces; ++i) {
     const double turn = std::fmod((i + 0.5) * 0.6180339887498949, 1.0);
     const P v(i % 2 ? turn : turn * turn);  // more beside the end
-    std::array<S, kTerms> direct;
+    std::array<S, RoundView<S>::kMostTerms> direct;
     terms_at(part.end_um + span * (v * v), direct.data());
-    for (std::size_t f = 0; f < kTerms; ++f) {
-      std::array<P, kTerms> basis{P(0.0), P(0.0), P(0.0)};
+    for (std::size_t f = 0; f < static_cast<std::size_t>(terms()); ++f) {
+      std::array<P, RoundView<S>::kMostTerms> basis;
+      basis.fill(P(0.0));
       basis[f] = P(1.0);
-      error = std::max(error, std::abs(lane(plain(light.template sum<kTerms>(v, basis.data())) - plain(direct[f]), 0)));
+      error = std::max(error, std::abs(lane(plain(light.sum(terms(), v, basis.data())) - plain(direct[f]), 0)));
     }
   }
   return error;
@@ -144,7 +147,7 @@ S EikonalImage<S>::intensity(const P& column, const P& row) const {
     const P v = root(min_of(max_of(v2, P(1e-30)), P(1.0)));
     if constexpr (kSlopes) {
       typename RadialTable<S>::Slopes slopes;
-      const S light = part.light.template sum<kTerms>(v, basis.data(), turned.data(), &slopes);
+      const S light = part.light.sum(terms(), v, basis.data(), turned.data(), &slopes);
       const P by_v2 = select(v2 > P(1e-30), share * slopes.by_v * P(0.5) * inverse(v), P(0.0));
       const P outwards = by_v2 * plain(part.inverse_span) + plain(light) * slope;
       result = result + share * light;
@@ -153,7 +156,7 @@ S EikonalImage<S>::intensity(const P& column, const P& row) const {
       part.by_end.add(-outwards, result);
       part.by_inverse_span.add(by_v2 * from_end, result);
     } else {
-      result = result + share * part.light.template sum<kTerms>(v, basis.data());
+      result = result + share * part.light.sum(terms(), v, basis.data());
     }
   }
   if constexpr (kSlopes) view_.add_moves_and_turns(place, by_rho, by_angle, result);

@@ -38,7 +38,7 @@ class EikonalImage final : public PixelModel<S> {
   double table_error(std::size_t part, int panels) const;
 
  private:
-  static constexpr int kTerms = 3;  ///< functions of the radius, of RoundView's basis
+  int terms() const { return light_.functions(true); }  ///< functions of the radius, of RoundView's basis
   /// rho = end + v^2 / inverse_span.
   struct Part {
     S end_um, inverse_span;
@@ -55,9 +55,9 @@ class EikonalImage final : public PixelModel<S> {
 
   DropletOptics<S> optics_;
   EikonalFan<S> fan_p_, fan_s_;
+  RoundLight<S> light_;
   RoundView<S> view_;
   PassingLight<S> passing_;
-  S cos_between_;
   bool aplanatic_;
   Symmetry symmetry_;
   std::vector<Part> parts_;  ///< from the axis outwards, two for each stretch between ends

@@ -69,17 +69,16 @@ class DiscModel final : public PixelModel<S> {
  public:
   DiscModel(const Scene& scene, const Values<S>& value)
       : optics_(scene, value),
-        circular_(scene.microscope.quarter_wave),
         coloured_(scene.microscope.bandwidth_nm > 0),
         spread_(scene.microscope.bandwidth_nm / 2.3548200450309493 / value(scene.microscope.wavelength_nm)) {
     const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
     const S load =
         value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg) - 0.5 * std::numbers::pi;
-    const S p = value.radians(scene.microscope.polarizer_deg) - load,
-            a = value.radians(scene.microscope.analyzer_deg) - load;
-    sin_cos(S(a - p), sin_between_, cos_between_);
-    // Linear: the pair seen along p + a. Circular: along 2 p.
-    sin_cos(S(circular_ ? 2.0 * p : p + a), sin_sum_, cos_sum_);
+    const Line<S> light(scene.microscope, value);
+    S sin_twice, cos_twice;
+    sin_cos(2.0 * load, sin_twice, cos_twice);
+    form_ = light.form().in_frame(cos_twice, sin_twice);
+    linear_ = light.linear();
   }
   S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const override {
     S x, y;
@@ -101,14 +100,10 @@ class DiscModel final : public PixelModel<S> {
       cos_sinc = contrast * cos_sinc;
       cos_cos = 1.0 - d_sq * sinc_sinc;
     }
-    const S along = pair.normal * cos_sum_ + pair.shear * sin_sum_;
-    S light;
-    if (!circular_) {
-      light = cos_between_ * cos_between_ * cos_cos + along * along * sinc_sinc;
-    } else {
-      light = cos_between_ * cos_between_ * cos_cos + 2.0 * cos_between_ * sin_between_ * along * cos_sinc +
-              sin_between_ * sin_between_ * d_sq * sinc_sinc;
-    }
+    S light = form_.ww * cos_cos + (pair.normal * (form_.zz * pair.normal + 2.0 * (form_.xz * pair.shear)) +
+                                    form_.xx * (pair.shear * pair.shear)) *
+                                       sinc_sinc;
+    if (!linear_) light = light + 2.0 * (form_.wz * pair.normal + form_.wx * pair.shear) * cos_sinc;
     if (optics_.illumination.empty()) return light;
     const S east = (column - optics_.center_x_px) * optics_.px_per_radius_inverse,
             north = (optics_.center_y_px - row) * optics_.px_per_radius_inverse;
@@ -117,9 +112,9 @@ class DiscModel final : public PixelModel<S> {
 
  private:
   DiscOptics<S> optics_;
-  bool circular_, coloured_;
-  S spread_;  ///< standard deviation of the wavelength over the wavelength
-  S sin_between_, cos_between_, sin_sum_, cos_sum_;
+  bool coloured_, linear_;
+  S spread_;              ///< standard deviation of the wavelength over the wavelength
+  RetarderForm<S> form_;  ///< in the load's frame
 };
 
 }  // namespace

@@ -274,7 +274,6 @@ std::vector<double> planar_phases(const Scene& scene, const Values<double>& valu
     if (const auto* helix = std::get_if<HelixDirector>(&cell->director))
       result.push_back(4 * kPi * value(cell->thickness_um) / value(helix->pitch_um));
   }
-  result.push_back(value.radians(scene.microscope.compensator_phase_deg));
   return result;
 }
 

@@ -52,7 +52,7 @@ Mat2<S> planar_jones(const PlanarOptics<S>& o, const TransportMethod<S>& method,
 
 template <class S, class R>
 FringePoint<R> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh& mesh, const R& k0,
-                             const Raise<S, R>& raise, const Polarizers<R>& polarizers, const S& tx, const S& ty) {
+                             const Raise<S, R>& raise, const Line<R>& light, const S& tx, const S& ty) {
   using C = Complex<R>;
   const auto raised = [&raise](const Mat2<S>& m) {
     const auto z = [&raise](const Complex<S>& x) { return C(raise(x.re), raise(x.im)); };
@@ -64,33 +64,39 @@ FringePoint<R> planar_fringe(const PlanarOptics<S>& o, bool coupling, const Mesh
       coupling ? modal_transfer(*o.column, ray, k0, raise, mesh) : diagonal_transfer(*o.column, ray, k0, raise, mesh);
   const Mat2<R> in = inverse(m.first) * raised(entry_factor(*o.column, ray, o.n_host));
   const Mat2<R> out = raised(exit_factor(*o.column, ray, o.n_host)) * m.last;
-  // The polarizer's field rolled onto the plane of incidence (see planar_jones), the analyser seen from inside.
+  // Fields rolled onto the plane of incidence (see planar_jones), those behind seen from inside: over the two waves,
+  // what comes of each.
   const R x = raise(tx), y = raise(ty), roll = raise(c * c / (c + 1.0)), unroll = raise(c / (c + 1.0));
-  const R g = roll * (polarizers.px * x + polarizers.py * y);
-  const R px = polarizers.px - g * x, py = polarizers.py - g * y;
-  const R back = unroll * (polarizers.ax * x + polarizers.ay * y);
-  const R ax = polarizers.ax + back * x, ay = polarizers.ay + back * y;
-  C o_wave = (px * in.a + py * in.b) * (ax * out.a + ay * out.c);
-  C e_wave = (px * in.c + py * in.d) * (ax * out.b + ay * out.d);
-  if (o.column->absorbing) {
-    o_wave = exp(m.log_o.re) * o_wave;
-    e_wave = exp(m.log_e.re) * e_wave;
+  const auto waves = [&](const auto& px0, const auto& py0, const auto& ax0, const auto& ay0) {
+    const auto g = roll * (x * px0 + y * py0), back = unroll * (x * ax0 + y * ay0);
+    const auto px = px0 - x * g, py = py0 - y * g, ax = ax0 + x * back, ay = ay0 + y * back;
+    std::array<C, 2> w{(px * in.a + py * in.b) * (ax * out.a + ay * out.c),
+                       (px * in.c + py * in.d) * (ax * out.b + ay * out.d)};
+    if (o.column->absorbing) w = {exp(m.log_o.re) * w[0], exp(m.log_e.re) * w[1]};
+    return w;
+  };
+  const R phase = m.log_e.im - m.log_o.im;
+  if (light.linear()) {
+    const Field<R>&p = light.in().field[0], &a = light.out().field[0];
+    const auto [o_wave, e_wave] = waves(p.x.re, p.y.re, a.x.re, a.y.re);
+    const C both = R(2.0) * (conj(o_wave) * e_wave);
+    return {both.re, phase, norm(o_wave) + norm(e_wave), both.im};
   }
-  const C both = R(2.0) * (conj(o_wave) * e_wave);
-  return {both.re, m.log_e.im - m.log_o.im, norm(o_wave) + norm(e_wave), both.im};
+  FringePoint<R> point{R(0.0), phase, R(0.0), R(0.0)};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(light.in().count); ++i)
+    for (std::size_t j = 0; j < static_cast<std::size_t>(light.out().count); ++j) {
+      const Field<R>&p = light.in().field[i], &a = light.out().field[j];
+      const R weight = light.in().weight[i] * light.out().weight[j];
+      const auto [o_wave, e_wave] = waves(p.x, p.y, conj(a.x), conj(a.y));
+      const C both = (2.0 * weight) * (conj(o_wave) * e_wave);
+      point.amplitude = point.amplitude + both.re;
+      point.mean = point.mean + weight * (norm(o_wave) + norm(e_wave));
+      point.quadrature = point.quadrature + both.im;
+    }
+  return point;
 }
 
 namespace {
-
-/// exp(i phase/2) along its axis, exp(-i phase/2) across it.
-template <class S>
-std::optional<Mat2<S>> compensator(const Scene& scene, const Values<S>& value) {
-  if (!scene.microscope.compensator_phase_deg) return std::nullopt;
-  const S half = 0.5 * value.radians(scene.microscope.compensator_phase_deg),
-          twice = 2.0 * value.radians(scene.microscope.compensator_azimuth_deg);
-  const S c = cos(half), s = sin(half), along = cos(twice), across = sin(twice);
-  return Mat2<S>{{c, s * along}, {S(0.0), s * across}, {S(0.0), s * across}, {c, -(s * along)}};
-}
 
 /// Whether something holds at the nodes and in the middle of every step.
 template <class S, class Holds>
@@ -112,8 +118,7 @@ class PlanarModel final : public PixelModel<S> {
         optics_(planar_optics(scene, value)),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.column->breaks) : plan.mesh),
-        polarizers_(polarizers(scene, value)),
-        compensator_(compensator(scene, value)),
+        light_(scene.microscope, value),
         coupling_(plan.method == "modal"),
         has_fringes_(plan.fringe_means),
         blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
@@ -128,7 +133,7 @@ class PlanarModel final : public PixelModel<S> {
         tx = S(t * std::cos(a));
         ty = S(t * std::sin(a));
       }
-      constant_ = intensity_of(planar_jones(optics_, method_, mesh_, tx, ty));
+      constant_ = light_.of(planar_jones(optics_, method_, mesh_, tx, ty));
     }
     const bool straight = cone_ && cone_->from_front();
     if (straight && centred(scene, cone_->center_x, cone_->center_y) &&
@@ -136,7 +141,7 @@ class PlanarModel final : public PixelModel<S> {
           return stays_at(p.axis.z, 0.0) || (stays_at(p.axis.x, 0.0) && stays_at(p.axis.y, 0.0));
         }))
       symmetry_ = Symmetry::half_turn;
-    else if (straight && on_middle_row(scene, cone_->center_y) && along_axes(polarizers_) && !compensator_ &&
+    else if (straight && on_middle_row(scene, cone_->center_y) && light_.mirrored() &&
              axes_all(*optics_.column, mesh_,
                       [](const OpticalPoint<S>& p) { return mirrored(p.axis.x, p.axis.y, p.axis.z); }))
       symmetry_ = Symmetry::mirror;
@@ -148,11 +153,11 @@ class PlanarModel final : public PixelModel<S> {
   S intensity(const P& column, const P& row) const override {
     if (!cone_) return constant_;
     const auto t = cone_->at(column, row);
-    return intensity_of(planar_jones(optics(), method_, mesh_, t.x, t.y));
+    return light_.of(planar_jones(optics(), method_, mesh_, t.x, t.y));
   }
   FringePoint<S> fringe(const P& column, const P& row) const override {
     const auto t = cone_->at(column, row);
-    return planar_fringe(optics(), coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, t.x, t.y);
+    return planar_fringe(optics(), coupling_, mesh_, optics_.k0, Raise<S, S>(), light_, t.x, t.y);
   }
   int fringe_run(int column, double row, int count, FringeScratch& scratch, double* const* out) const override {
     return table_.run(column, row, count, !in_phase(), scratch, out);
@@ -164,7 +169,7 @@ class PlanarModel final : public PixelModel<S> {
   }
   FringeTraits fringe_traits() const override { return traits_; }
   bool in_phase() const override {
-    return !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h;
+    return light_.linear() && !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h;
   }
   Symmetry symmetry() const override { return symmetry_; }
   void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
@@ -202,7 +207,7 @@ class PlanarModel final : public PixelModel<S> {
   const PlanarOptics<S>& optics() const {
     std::call_once(first_ray_, [&] {
       if (has_fringes_)
-        planar_fringe(optics_, coupling_, mesh_, optics_.k0, Raise<S, S>(), polarizers_, S(0.0), S(0.0));
+        planar_fringe(optics_, coupling_, mesh_, optics_.k0, Raise<S, S>(), light_, S(0.0), S(0.0));
       else
         planar_jones(optics_, method_, mesh_, S(0.0), S(0.0));
       optics_.column->freeze();
@@ -261,7 +266,7 @@ class PlanarModel final : public PixelModel<S> {
       for (std::size_t j = 0; j < inside.size(); ++j)
         raise.to[j] =
             static_cast<std::size_t>(std::find(changing.begin(), changing.end(), inside[j]) - changing.begin());
-    const Polarizers<R> pair = polarizers(scene_, value);
+    const Line<R> light(scene_.microscope, value);
     const R k0 = wavenumber_per_um(scene_, value);
     std::optional<PlanarOptics<T>> own;
     const PlanarOptics<T>& optics = [&]() -> const PlanarOptics<T>& {
@@ -269,7 +274,7 @@ class PlanarModel final : public PixelModel<S> {
         return this->optics();
       } else {
         own = planar_optics(scene_, value_inside);
-        planar_fringe(*own, coupling_, mesh_, k0, raise, pair, T(0.0), T(0.0));
+        planar_fringe(*own, coupling_, mesh_, k0, raise, light, T(0.0), T(0.0));
         own->column->freeze();
         return *own;
       }
@@ -278,7 +283,7 @@ class PlanarModel final : public PixelModel<S> {
     table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places,
                             [&](const P& column, const P& row) {
                               const auto t = cone.at(column, row);
-                              return planar_fringe(optics, coupling_, mesh_, k0, raise, pair, t.x, t.y);
+                              return planar_fringe(optics, coupling_, mesh_, k0, raise, light, t.x, t.y);
                             });
     constexpr double kSlopeError = 1e-5;
     traits_.averaged = !left_to_rays_ && table_.complete();
@@ -288,18 +293,12 @@ class PlanarModel final : public PixelModel<S> {
     else
       table_.keep_all_fields();
   }
-  S intensity_of(const Mat2<S>& sample) const {
-    const Mat2<S> j = compensator_ ? *compensator_ * sample : sample;
-    return norm(polarizers_.ax * (polarizers_.px * j.a + polarizers_.py * j.b) +
-                polarizers_.ay * (polarizers_.px * j.c + polarizers_.py * j.d));
-  }
   const Scene& scene_;
   Values<S> value_;
   PlanarOptics<S> optics_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  Polarizers<S> polarizers_;
-  std::optional<Mat2<S>> compensator_;
+  Line<S> light_;
   bool coupling_, has_fringes_;
   std::optional<ConeView<S>> cone_;
   mutable std::once_flag first_ray_;
@@ -326,7 +325,7 @@ std::unique_ptr<PixelModel<S>> make_planar_model(const Scene& scene, const Rende
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 #define BIREFIT_INSTANTIATE_RAISED(S, R)                                                                               \
   template FringePoint<R> planar_fringe<S, R>(const PlanarOptics<S>&, bool, const Mesh&, const R&, const Raise<S, R>&, \
-                                              const Polarizers<R>&, const S&, const S&);
+                                              const Line<R>&, const S&, const S&);
 BIREFIT_FOR_EACH_RAISE(BIREFIT_INSTANTIATE_RAISED)
 
 }  // namespace birefit

@@ -27,7 +27,7 @@ Mat2<S> planar_jones(const PlanarOptics<S>& optics, const TransportMethod<S>& me
 /// S to their places (optics.k0 is not read).
 template <class S, class R>
 FringePoint<R> planar_fringe(const PlanarOptics<S>& optics, bool coupling, const Mesh& mesh, const R& k0,
-                             const Raise<S, R>& raise, const Polarizers<R>& polarizers, const S& tx, const S& ty);
+                             const Raise<S, R>& raise, const Line<R>& light, const S& tx, const S& ty);
 
 template <class S>
 std::unique_ptr<PixelModel<S>> make_planar_model(const Scene&, const RenderPlan&, const Values<S>&);

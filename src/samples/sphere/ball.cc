@@ -168,7 +168,7 @@ class BallRaysIn final : public BallRays<R> {
              const Directions<S, R>& up, bool places)
       : optics_(ball_optics(scene, value)),
         medium_(in_radii(droplet_optics(scene, all))),
-        light_(polarizers(scene, all)),
+        light_(scene.microscope, all),
         rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0),
              scene.microscope.objective_na),
         method_(transport_method<S>(plan.method)),
@@ -213,14 +213,12 @@ class BallRaysIn final : public BallRays<R> {
     S tube = ray.cos_out * ray.cos_twice * inverse(ray.slope_um);
     if (!aplanatic_) tube = tube * inverse(ray.cos_twice);
     const Mat2<R> j = jones_of(optics, medium_, up, ray, c, s, method_, mesh, aplanatic_ ? S(1.0) : ray.cos_twice);
-    const Complex<R> out =
-        light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d);
-    return up(tube) * norm(out);
+    return up(tube) * light_.of(j);
   }
   BallOptics<S> optics_, beside_;
   static BallMedium<R> in_radii(const DropletOptics<R>& o) { return {o, o.radius_um}; }
   BallMedium<R> medium_;
-  Polarizers<R> light_;
+  Line<R> light_;
   RimTable rim_;
   const TransportMethod<S>& method_;
   bool aplanatic_;
@@ -310,7 +308,7 @@ class BallImage final : public PixelModel<S> {
         optics_(ball_optics(scene, value)),
         rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0),
              scene.microscope.objective_na),
-        light_(polarizers(scene, value)),
+        light_(scene.microscope, value),
         view_(scene, value),
         edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
         inverse_edge_(inverse(edge_um_)),
@@ -345,8 +343,7 @@ class BallImage final : public PixelModel<S> {
           static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
     for (const int n : steps) meshes_.push_back(ball_mesh(optics_, n));
     if (meshes_.empty()) meshes_.push_back(ball_mesh(optics_, plan.steps));
-    passing_ = PassingLight<S>(scene.view.pixel_size_um, optics_.sphere.radius_um,
-                               light_.px * light_.ax + light_.py * light_.ay);
+    passing_ = PassingLight<S>(scene.view.pixel_size_um, optics_.sphere.radius_um, light_.open());
     const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
     bool moves = false;
     if constexpr (ScalarTraits<S>::derivatives > 0)
@@ -369,7 +366,7 @@ class BallImage final : public PixelModel<S> {
     };
     if (centred(scene, center_x, center_y) && std::visit(turned, optics_.field))
       symmetry_ = Symmetry::half_turn;
-    else if (on_middle_row(scene, center_y) && along_axes(light_) && std::visit(reflected, optics_.field))
+    else if (on_middle_row(scene, center_y) && light_.mirrored() && std::visit(reflected, optics_.field))
       symmetry_ = Symmetry::mirror;
   }
   Symmetry symmetry() const override { return symmetry_; }
@@ -573,7 +570,7 @@ class BallImage final : public PixelModel<S> {
   std::vector<Mesh> meshes_;          ///< from the fewest steps on
   std::vector<std::size_t> mesh_of_;  ///< which of them, by square of the disc; none: the first
   Symmetry symmetry_ = Symmetry::none;
-  Polarizers<S> light_;
+  Line<S> light_;
   CentredView<S> view_;
   PassingLight<S> passing_;
   S edge_um_, inverse_edge_;

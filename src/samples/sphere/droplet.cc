@@ -46,34 +46,6 @@ namespace {
 /// Where the two parts of the tables meet: w = 1 - sqrt(1 - rho/edge), about 1/30 of the radius.
 constexpr double kCentre = 1.0 / 64;
 
-/// With the Jones matrix [[j0 + j1, j2 + j3], [j2 - j3, j0 - j1]] in the (radial, azimuthal) frame, analyser at alpha,
-/// polarizer at beta and q, s = cos, sin (2 azimuth - alpha - beta), the field behind the analyser is D + j1 q - j2 s,
-/// D = j0 cos(alpha - beta) - j3 sin(alpha - beta), and
-///   I = sum of tube |field|^2 terms = f . (q^2, q, 1, s, q s),
-/// the last two only where the transport is not diagonal; between crossed polarizers a diagonal one leaves the first
-/// alone.
-template <class S>
-void intensity_terms(const Mat2<S>& j, const S& tube, const S& cos_between, const S& sin_between, bool diagonal, S* f) {
-  const auto cross = [](const Complex<S>& a, const Complex<S>& b) { return a.re * b.re + a.im * b.im; };
-  const S half(0.5), twice = 2.0 * tube;
-  const Complex<S> j1 = half * (j.a - j.d);
-  Complex<S> direct = (half * cos_between) * (j.a + j.d);
-  if (diagonal) {
-    f[0] = tube * norm(j1);
-    f[1] = twice * cross(direct, j1);
-    f[2] = tube * norm(direct);
-    return;
-  }
-  direct = direct - (half * sin_between) * (j.b - j.c);
-  const Complex<S> j2 = half * (j.b + j.c);
-  const S square2 = norm(j2);
-  f[0] = tube * (norm(j1) - square2);
-  f[1] = twice * cross(direct, j1);
-  f[2] = tube * (norm(direct) + square2);
-  f[3] = S(0.0) - twice * cross(direct, j2);
-  f[4] = S(0.0) - twice * cross(j1, j2);
-}
-
 }  // namespace
 
 template <class S>
@@ -83,15 +55,14 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       aplanatic_(scene.microscope.aplanatic),
-      view_(scene, value),
+      light_(Line<S>(scene.microscope, value)),
+      view_(scene, value, light_),
       edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)),
       inverse_edge_(inverse(edge_um_)),
       core_um_(0.0),
       centre_panels_(plan.centre_panels),
       rest_panels_(plan.radial_panels) {
-  sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), sin_between_,
-          cos_between_);
-  symmetry_ = round_symmetry(scene, value, optics_.coupled());
+  symmetry_ = round_symmetry(scene, value, light_.line(), optics_.coupled());
   shell_ = optics_.director == DropletOptics<S>::Director::shell;
   if (shell_) {
     core_um_ = core_edge(optics_, rim_);
@@ -105,7 +76,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
     if (!can_tabulate()) rest_panels_ = 0;
   }
   by_inverse_edge_ = Sensitivity<S>(inverse_edge_);
-  passing_ = PassingLight<S>(view_.pixel_um(), optics_.radius_um, cos_between_);
+  passing_ = PassingLight<S>(view_.pixel_um(), optics_.radius_um, light_.line().open());
 }
 
 template <class S>
@@ -147,7 +118,7 @@ void DropletImage<S>::terms_at(const S& rho_um, S* out) const {
     jones.b = ray.cos_twice * jones.b;
     tube = tube * inverse(ray.cos_twice);
   }
-  intensity_terms(jones, tube, cos_between_, sin_between_, !optics_.coupled(), out);
+  light_.terms(jones, tube, !optics_.coupled(), out);
 }
 
 // The light at rho_um < edge by a ray of its own.

@@ -71,7 +71,7 @@ class DropletImage final : public PixelModel<S> {
   /// seen through the core, up to the kink at its edge, and what is seen beside it.
   enum class Part { centre, rest };
   static constexpr int kMostTerms = RoundView<S>::kMostTerms;
-  int number_of_terms() const { return optics_.coupled() ? 5 : 3; }
+  int number_of_terms() const { return light_.functions(!optics_.coupled()); }
   /// False where one ray a point is needed whatever the plan says: a shell whose core's edge no ray of the image meets.
   bool can_tabulate() const { return !shell_ || lane(plain(core_um_), 0) > 0; }
   /// Other ones than the plan's, for the next tabulate().
@@ -82,8 +82,7 @@ class DropletImage final : public PixelModel<S> {
   S tabulated_sum(Part part, const P& v, const P* basis, const P* turned = nullptr,
                   typename RadialTable<S>::Slopes* slopes = nullptr) const {
     const RadialTable<S>& table = part == Part::centre ? centre_ : rest_;
-    return optics_.coupled() ? table.template sum<5>(v, basis, turned, slopes)
-                             : table.template sum<3>(v, basis, turned, slopes);
+    return table.sum(number_of_terms(), v, basis, turned, slopes);
   }
 
  private:
@@ -97,8 +96,8 @@ class DropletImage final : public PixelModel<S> {
   Mesh mesh_;
   bool aplanatic_, shell_;
   Symmetry symmetry_;
+  RoundLight<S> light_;
   RoundView<S> view_;
-  S cos_between_, sin_between_;  ///< of analyser - polarizer
   PassingLight<S> passing_;
   S edge_um_, inverse_edge_;
   S core_um_, inverse_core_, core_root_, inverse_core_root_;  ///< image radius of a shell's core, sqrt(1 - that / edge)

@@ -103,9 +103,13 @@ class RadialTable {
   struct Slopes {
     P by_v = P(0.0), turned = P(0.0);
   };
-  /// sum_k basis[k] f_k(v) over the F functions that were tabulated, with its derivatives at fixed v and basis; with
-  /// `slopes` also those, turned[k] in the place of basis[k]. v outside [0, 1] is extrapolated from the end panels.
-  /// Functions after the last one that is not negligible are left out.
+  /// sum_k basis[k] f_k(v) over the functions that were tabulated (F, or three or five), with its derivatives at fixed
+  /// v and basis; with `slopes` also those, turned[k] in the place of basis[k]. v outside [0, 1] is extrapolated from
+  /// the end panels. Functions after the last one that is not negligible are left out.
+  BIREFIT_INLINE S sum(int functions, const P& v, const P* basis, const P* turned = nullptr,
+                       Slopes* slopes = nullptr) const {
+    return functions <= 3 ? sum<3>(v, basis, turned, slopes) : sum<5>(v, basis, turned, slopes);
+  }
   template <int F>
   BIREFIT_INLINE S sum(const P& v, const P* basis, const P* turned = nullptr, Slopes* slopes = nullptr) const {
     if (F > 1 && live_ <= 1) return sum_of_live<1, F>(v, basis, turned, slopes);

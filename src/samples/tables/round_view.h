@@ -90,17 +90,75 @@ class CentredView {
   Sensitivity<S> by_center_x_, by_center_y_;
 };
 
-/// The same of light that is sum_k basis_k f_k(radius), basis = (q^2, q, 1, s, q s) with q, s = cos, sin of (2 azimuth
-/// - analyser - polarizer).
+/// What passes of rays that are alike all around the centre. With the Jones matrix [[j0 + j1, j2 + j3], [j2 - j3, j0 -
+/// j1]] in the (radial, azimuthal) frame a pair of fields has the amplitude d + u q + v s,
+///   d = j0 D + j3 Y, u = j1 Z + j2 X, v = j1 X - j2 Z, q, s = cos, sin of 2 azimuth,
+/// D, X, Y, Z those of 1, sigma_x, i sigma_y, sigma_z, and the light is sum_k basis_k f_k with the basis (q^2, q, 1, s,
+/// q s). Between linear states q and s count from (analyser + polarizer) / 2: Z = 1, X = 0, D and Y are the cosine and
+/// minus the sine of the angle between; the last two f_k are there only where the transport is not diagonal, and of a
+/// diagonal one between crossed polarizers the first alone.
+template <class S>
+class RoundLight {
+ public:
+  explicit RoundLight(const Line<S>& line) : line_(line) {}
+  /// Of the angle from which 2 azimuth counts.
+  S cos_sum() const { return line_.linear() ? line_.cos_sum() : S(1.0); }
+  S sin_sum() const { return line_.linear() ? line_.sin_sum() : S(0.0); }
+  const Line<S>& line() const { return line_; }
+  /// How many f_k there are; `diagonal`: j2 = j3 = 0.
+  int functions(bool diagonal) const { return diagonal && line_.linear() ? 3 : 5; }
+  /// The f_k of a ray, times `tube`.
+  void terms(const Mat2<S>& j, const S& tube, bool diagonal, S* f) const {
+    const auto cross = [](const Complex<S>& a, const Complex<S>& b) { return a.re * b.re + a.im * b.im; };
+    const S half(0.5), twice = 2.0 * tube;
+    const Complex<S> j1 = half * (j.a - j.d);
+    if (!line_.linear()) {
+      const Complex<S> j0 = half * (j.a + j.d), j2 = half * (j.b + j.c), j3 = half * (j.b - j.c);
+      for (int k = 0; k < 5; ++k) f[k] = S(0.0);
+      for (int k = 0; k < line_.pairs(); ++k) {
+        const auto& p = line_.pair(k);
+        Complex<S> d = p.one() * j0, u = p.z() * j1, v = p.x() * j1;
+        if (!diagonal) d = d + p.iy() * j3, u = u + p.x() * j2, v = v - p.z() * j2;
+        const S weight = tube * p.weight, twice_weight = 2.0 * weight, v2 = norm(v);
+        f[0] = f[0] + weight * (norm(u) - v2);
+        f[1] = f[1] + twice_weight * cross(d, u);
+        f[2] = f[2] + weight * (norm(d) + v2);
+        f[3] = f[3] + twice_weight * cross(d, v);
+        f[4] = f[4] + twice_weight * cross(u, v);
+      }
+      return;
+    }
+    Complex<S> direct = (half * line_.cos_between()) * (j.a + j.d);
+    if (diagonal) {
+      f[0] = tube * norm(j1);
+      f[1] = twice * cross(direct, j1);
+      f[2] = tube * norm(direct);
+      return;
+    }
+    direct = direct - (half * line_.sin_between()) * (j.b - j.c);
+    const Complex<S> j2 = half * (j.b + j.c);
+    const S square2 = norm(j2);
+    f[0] = tube * (norm(j1) - square2);
+    f[1] = twice * cross(direct, j1);
+    f[2] = tube * (norm(direct) + square2);
+    f[3] = S(0.0) - twice * cross(direct, j2);
+    f[4] = S(0.0) - twice * cross(j1, j2);
+  }
+
+ private:
+  Line<S> line_;
+};
+
+/// The same of light that is sum_k basis_k f_k(radius), as RoundLight has it.
 template <class S>
 class RoundView : public CentredView<S> {
  public:
   using P = PlainOf<S>;
   static constexpr int kMostTerms = 5;
-  RoundView(const Scene& scene, const Values<S>& value) : CentredView<S>(scene, value) {
-    const S sum = value.radians(scene.microscope.analyzer_deg) + value.radians(scene.microscope.polarizer_deg);
-    sin_cos(plain(sum), sin_sum_, cos_sum_);
-    by_sum_ = Sensitivity<S>(sum);
+  RoundView(const Scene& scene, const Values<S>& value, const RoundLight<S>& light)
+      : CentredView<S>(scene, value), sin_sum_(plain(light.sin_sum())), cos_sum_(plain(light.cos_sum())) {
+    // d sum = cos d sin - sin d cos
+    by_sum_ = Sensitivity<S>(S(S(cos_sum_) * light.sin_sum() - S(sin_sum_) * light.cos_sum()));
   }
   struct Place : CentredView<S>::Place {
     P q, s;
@@ -165,8 +223,9 @@ class PassingLight {
  public:
   using P = PlainOf<S>;
   PassingLight() = default;
-  PassingLight(double pixel_um, const S& radius_um, const S& cos_between)
-      : pixel_um_(pixel_um), radius_px_(radius_um * (1 / pixel_um)), open_(cos_between * cos_between) {
+  /// `open`: the light without a sample.
+  PassingLight(double pixel_um, const S& radius_um, const S& open)
+      : pixel_um_(pixel_um), radius_px_(radius_um * (1 / pixel_um)), open_(open) {
     dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
   }
   bool dark() const { return dark_; }

@@ -87,28 +87,21 @@ class VolumeModel final : public PixelModel<S> {
       : optics_(scene, value),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.breaks) : plan.mesh),
-        light_(polarizers(scene, value)) {
-    const S between = light_.px * light_.ax + light_.py * light_.ay;
-    open_ = between * between;
-  }
+        light_(scene.microscope, value) {}
   S intensity(const P& column, const P& row) const override {
     S x, y;
     optics_.place(S(column), S(row), x, y);
     const P right(optics_.grid->nx - 1.0), top(optics_.grid->ny - 1.0);
     const auto beside = plain(x) < P(0.0) || plain(y) < P(0.0) || plain(x) > right || plain(y) > top;
     const S inside_x = select(beside, S(0.0), x), inside_y = select(beside, S(0.0), y);
-    const Mat2<S> j = matrix(volume_retarder(optics_, inside_x, inside_y, method_, mesh_));
-    const S light =
-        norm(light_.ax * (light_.px * j.a + light_.py * j.b) + light_.ay * (light_.px * j.c + light_.py * j.d));
-    return select(beside, open_, light);
+    return select(beside, light_.open(), light_.of(volume_retarder(optics_, inside_x, inside_y, method_, mesh_)));
   }
 
  private:
   VolumeOptics<S> optics_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
-  Polarizers<S> light_;
-  S open_;
+  Line<S> light_;
 };
 
 }  // namespace

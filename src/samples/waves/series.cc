@@ -37,7 +37,6 @@ class SeriesImage final : public PixelModel<S> {
  public:
   using P = PlainOf<S>;
   using Single = typename SingleOf<S>::Type;
-  static constexpr int kTerms = 3;
   SeriesImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
       : optics_(droplet_optics(scene, value)),
         reach_um_(plan.series_reach_um),
@@ -45,11 +44,9 @@ class SeriesImage final : public PixelModel<S> {
         na_(scene.microscope.objective_na),
         pupil_(scene.microscope.aplanatic ? Pupil::aplanatic : Pupil::focal_plane),
         focus_um_(value.get(scene.microscope.focus_um, 0.0)),
-        view_(scene, value) {
-    symmetry_ = round_symmetry(scene, value, false);
-    S unused;
-    sin_cos(value.radians(scene.microscope.analyzer_deg) - value.radians(scene.microscope.polarizer_deg), unused,
-            cos_between_);
+        light_(Line<S>(scene.microscope, value)),
+        view_(scene, value, light_) {
+    symmetry_ = round_symmetry(scene, value, light_.line(), false);
     RadialBall<Single> ball;
     const auto one = [](const S& x) { return SingleOf<S>::of(x); };
     if (optics_.director == DropletOptics<S>::Director::shell)
@@ -61,48 +58,23 @@ class SeriesImage final : public PixelModel<S> {
   }
 
   void tabulate(typename PixelModel<S>::Wanted, int threads) override {
-    const RadialImage<Single> image(series_, na_, SingleOf<S>::of(focus_um_), reach_um_, pupil_);
-    const Single between = SingleOf<S>::of(cos_between_);
-    table_ = RadialTable<S>(panels_, kTerms, threads, [&](const P& v, S* out) {
-      if constexpr (kLanesOf<S> == 1) {
-        terms(image(v * reach_um_), between, out);
-      } else {
-        alignas(64) double place[kLanes], values[kLanes];
-        v.store_aligned(place);
-        std::array<std::array<Single, kTerms>, kLanes> f;
-        for (int k = 0; k < kLanes; ++k)
-          terms(image(Single(place[k] * reach_um_)), between, f[static_cast<std::size_t>(k)].data());
-        for (std::size_t t = 0; t < kTerms; ++t) {
-          const auto gather = [&](const auto& part) {
-            for (std::size_t k = 0; k < kLanes; ++k) values[k] = part(f[k][t]);
-            return Pack::load_aligned(values);
-          };
-          if constexpr (ScalarTraits<S>::derivatives > 0) {
-            out[t].value = gather([](const Single& x) { return x.value; });
-            for (std::size_t j = 0; j < out[t].d.size(); ++j)
-              out[t].d[j] = gather([j](const Single& x) { return x.d[j]; });
-          } else {
-            out[t] = gather([](const Single& x) { return x; });
-          }
-        }
-      }
-    });
+    const RadialImage<Single> image = radial_image();
+    table_ = RadialTable<S>(panels_, light_.functions(true), threads,
+                            [&](const P& v, S* out) { terms(image, v * P(reach_um_), out); });
   }
 
   Symmetry symmetry() const override { return symmetry_; }
 
-  // Behind the analyser the field is (1 + A0) cos(analyser - polarizer) + A2 q, q = cos(2 azimuth - analyser -
-  // polarizer).
   S intensity(const P& column, const P& row) const override {
     const auto place = view_.at(column, row);
     const auto basis = RoundView<S>::basis(place);
     const P v = place.rho_um * P(1 / reach_um_);
     if constexpr (ScalarTraits<S>::derivatives == 0) {
-      return table_.template sum<kTerms>(v, basis.data());
+      return table_.sum(light_.functions(true), v, basis.data());
     } else {
       typename RadialTable<S>::Slopes slopes;
       const auto turned = RoundView<S>::turned(place);
-      S light = table_.template sum<kTerms>(v, basis.data(), turned.data(), &slopes);
+      S light = table_.sum(light_.functions(true), v, basis.data(), turned.data(), &slopes);
       view_.add_moves_and_turns(place, slopes.by_v * P(1 / reach_um_), slopes.turned, light);
       return light;
     }
@@ -110,28 +82,54 @@ class SeriesImage final : public PixelModel<S> {
 
   /// Largest difference between the table and the series, over places that are no nodes of it.
   double table_error() const {
-    const RadialImage<Single> image(series_, na_, SingleOf<S>::of(focus_um_), reach_um_, pupil_);
-    const Single between = SingleOf<S>::of(cos_between_);
+    const RadialImage<Single> image = radial_image();
     double error = 0;
     for (int i = 0; i < 60; ++i) {
       const double turn = (i + 0.5) * 0.6180339887498949, v = turn - std::floor(turn);
-      Single f[kTerms];
-      terms(image(Single(v * reach_um_)), between, f);
-      for (int t = 0; t < kTerms; ++t) {
-        P basis[kTerms] = {P(0.0), P(0.0), P(0.0)};
+      std::array<S, RoundView<S>::kMostTerms> f;
+      terms(image, P(v * reach_um_), f.data());
+      for (std::size_t t = 0; t < static_cast<std::size_t>(light_.functions(true)); ++t) {
+        std::array<P, RoundView<S>::kMostTerms> basis;
+        basis.fill(P(0.0));
         basis[t] = P(1.0);
-        error = std::max(error, std::abs(lane(plain(table_.template sum<kTerms>(P(v), basis)), 0) - plain(f[t])));
+        const S read = table_.sum(light_.functions(true), P(v), basis.data());
+        error = std::max(error, std::abs(lane(plain(read) - plain(f[t]), 0)));
       }
     }
     return error;
   }
 
  private:
-  static void terms(const RadialAmplitudes<Single>& field, const Single& between, Single* f) {
-    const Single re = between * (1.0 + field.a0.re), im = between * field.a0.im;
-    f[0] = field.a2.re * field.a2.re + field.a2.im * field.a2.im;
-    f[1] = 2.0 * (re * field.a2.re + im * field.a2.im);
-    f[2] = re * re + im * im;
+  RadialImage<Single> radial_image() const {
+    return RadialImage<Single>(series_, na_, SingleOf<S>::of(focus_um_), reach_um_, pupil_);
+  }
+  // In the (radial, azimuthal) frame the Jones matrix is diagonal, (1 + A0) +- A2.
+  void terms(const RadialImage<Single>& image, const P& rho_um, S* f) const {
+    std::array<RadialAmplitudes<Single>, static_cast<std::size_t>(kLanesOf<S>)> fields;
+    for (std::size_t k = 0; k < fields.size(); ++k) fields[k] = image(Single(lane(rho_um, static_cast<int>(k))));
+    const auto lanes = [&](const auto& part) {
+      if constexpr (kLanesOf<S> == 1) {
+        return part(fields[0]);
+      } else {
+        alignas(64) double values[kLanes];
+        const auto gather = [&](const auto& of) {
+          for (std::size_t k = 0; k < fields.size(); ++k) values[k] = of(part(fields[k]));
+          return Pack::load_aligned(values);
+        };
+        if constexpr (ScalarTraits<S>::derivatives > 0) {
+          S r(gather([](const Single& x) { return x.value; }));
+          for (std::size_t j = 0; j < r.d.size(); ++j) r.d[j] = gather([j](const Single& x) { return x.d[j]; });
+          return r;
+        } else {
+          return gather([](const Single& x) { return x; });
+        }
+      }
+    };
+    using Fields = RadialAmplitudes<Single>;
+    const Complex<S> direct(1.0 + lanes([](const Fields&a) { return a.a0.re; }),
+                            lanes([](const Fields&a) { return a.a0.im; })),
+        turned(lanes([](const Fields&a) { return a.a2.re; }), lanes([](const Fields&a) { return a.a2.im; }));
+    light_.terms({direct + turned, {}, {}, direct - turned}, S(1.0), true, f);
   }
 
   DropletOptics<S> optics_;
@@ -139,7 +137,8 @@ class SeriesImage final : public PixelModel<S> {
   int panels_;
   double na_;
   Pupil pupil_;
-  S focus_um_, cos_between_;
+  S focus_um_;
+  RoundLight<S> light_;
   RoundView<S> view_;
   Symmetry symmetry_;
   RadialSeries<Single> series_;

@@ -8,6 +8,7 @@
 
 #include "birefit/volume.h"
 #include "medium/build.h"
+#include "medium/references.h"
 #include "samples/sphere/ball.h"
 #include "samples/volume/volume.h"
 #include "samples/waves/objective.h"
@@ -325,24 +326,94 @@ RenderPlan plan_wave(const Planning& planning) {
 namespace {
 
 template <class S>
-WaveLight<S> wave_light(const Scene& scene, const Values<S>& value) {
-  const Polarizers<S> p = polarizers(scene, value);
-  return {wavenumber_per_um(scene, value), host_index(scene, value), p.px, p.py};
+WaveLight<S> wave_light(const Scene& scene, const Values<S>& value, const Field<S>& field) {
+  return {wavenumber_per_um(scene, value), host_index(scene, value), field.x, field.y};
 }
 
+/// What is left of the light behind the sample, one field for each of those that come in.
+using SentFields = std::vector<std::vector<WaveField>>;
+
+/// The light of one field that comes in and one that is let through, in images of their own; they add up.
 template <class S>
 void picture(const Scene& scene, const WaveGrid& grid, const WaveImaging& imaging, const Values<S>& value,
-             const std::vector<WaveField>& fields, int threads, const std::vector<Image*>& images) {
-  const Polarizers<S> p = polarizers(scene, value);
+             const SentFields& fields, int threads, const std::vector<Image*>& images) {
   WaveMicroscope<S> m;
   m.objective_na = scene.microscope.objective_na;
   m.aplanatic = scene.microscope.aplanatic;
   m.focus_um = value.get(scene.microscope.focus_um, 0.0);
-  m.ax = p.ax, m.ay = p.ay;
   m.center_x_px = value(scene.view.center_x_px), m.center_y_px = value(scene.view.center_y_px);
   m.pixel_um = scene.view.pixel_size_um;
   m.width = scene.view.width, m.height = scene.view.height;
-  form_image(grid, imaging, wave_light(scene, value), m, fields, threads, images);
+  const Line<S> line(scene.microscope, value);
+  std::vector<Image> part(images.size());
+  std::vector<Image*> parts;
+  for (Image& image : part) parts.push_back(&image);
+  const bool whole = line.pairs() == 1;
+  bool first = true;
+  for (std::size_t i = 0; i < fields.size(); ++i)
+    for (std::size_t o = 0; o < static_cast<std::size_t>(line.out().count); ++o) {
+      m.ax = line.out().field[o].x, m.ay = line.out().field[o].y;
+      form_image(grid, imaging, wave_light(scene, value, line.in().field[i]), m, fields[i], threads,
+                 whole ? images : parts);
+      if (whole) continue;
+      const S weight = line.in().weight[i] * line.out().weight[o];
+      for (std::size_t p = 0; p < images.size(); ++p) {
+        Image& sum = *images[p];
+        if (first) sum = Image(part[p].width(), part[p].height());
+        double by = 0;
+        if constexpr (ScalarTraits<S>::derivatives > 0)
+          if (p > 0) by = lane(weight.d[p - 1], 0);
+        const double share = lane(plain(weight), 0);
+        for (std::size_t k = 0; k < sum.size(); ++k)
+          sum.values()[k] += share * part[p].values()[k] + by * part[0].values()[k];
+      }
+      first = false;
+    }
+}
+
+/// Parameters that only the picture depends on: no light need be sent through the sample again.
+std::vector<bool> move_only_pictures(const Scene& scene, const std::vector<int>& active) {
+  Scene without = scene;
+  const ParameterRef none;
+  without.view.center_x_px = without.view.center_y_px = none;
+  Microscope& m = without.microscope;
+  m.focus_um = m.analyzer_deg = m.polarizer_extinction_ratio = m.analyzer_extinction_ratio = none;
+  m.behind.clear();
+  std::vector<bool> only(active.size(), true);
+  for_each_ref(without, [&](const ParameterRef& ref) {
+    for (std::size_t j = 0; j < active.size(); ++j)
+      if (ref && ref.index == active[j]) only[j] = false;
+  });
+  return only;
+}
+
+/// A marched field behind the object in the terms of WaveField.
+WaveField flux_field(MarchedField marched, const WaveGrid& g, double k0, double n_host) {
+  WaveField field;
+  field.a[0] = std::move(marched.ex), field.a[1] = std::move(marched.ey);
+  const std::shared_ptr<const Fft2> fft = shared_fft(g.nx, g.ny);
+  for (Plane& plane : field.a) fft->forward(plane);
+  const std::complex<double> back = std::polar(1.0 / static_cast<double>(fft->size()), -k0 * n_host * g.exit_um);
+  for (std::size_t i = 0; i < fft->size(); ++i) {
+    const auto wavevector = [&](int m, int n) {
+      return 2 * std::numbers::pi / (n * g.step_um * k0) * (m < n - m ? m : m - n);
+    };
+    const double x = wavevector(static_cast<int>(i) % g.nx, g.nx), y = wavevector(static_cast<int>(i) / g.nx, g.ny),
+                 k2 = x * x + y * y;
+    auto &ex = field.a[0][i], &ey = field.a[1][i];
+    const double q2 = n_host * n_host - k2;
+    if (q2 <= 1e-3) {
+      ex = ey = 0;
+      continue;
+    }
+    const double length = std::sqrt(k2), px = length > 0 ? x / length : 1, py = length > 0 ? y / length : 0,
+                 s_scale = std::sqrt(std::sqrt(q2) / n_host);
+    const std::complex<double> p = back * (px * ex + py * ey) / s_scale, s = back * (px * ey - py * ex) * s_scale;
+    ex = px * p - py * s;
+    ey = py * p + px * s;
+  }
+  for (Plane& plane : field.a) fft->inverse(plane);
+  return field;
 }
 
 }  // namespace
@@ -354,13 +425,10 @@ void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, c
     std::vector<int> parameters;
     std::vector<Image*> images;
   } of_light, of_picture;
-  const Microscope& m = scene.microscope;
+  const std::vector<bool> only_picture = move_only_pictures(scene, active);
   into.derivatives.resize(active.size());
   for (std::size_t j = 0; j < active.size(); ++j) {
-    const auto is = [&](ParameterRef ref) { return ref && ref.index == active[j]; };
-    const bool only_picture = is(scene.view.center_x_px) || is(scene.view.center_y_px) || is(m.focus_um) ||
-                              (is(m.analyzer_deg) && !is(m.polarizer_deg));
-    Part& part = only_picture ? of_picture : of_light;
+    Part& part = only_picture[j] ? of_picture : of_light;
     part.parameters.push_back(active[j]);
     part.images.push_back(&into.derivatives[j]);
   }
@@ -380,13 +448,16 @@ void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, c
         body.template operator()<Dual1>(chunk, images);
     }
   };
-  std::vector<WaveField> base;  // without derivatives
+  SentFields base;  // without derivatives
   const auto send = [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
     const Values<S> value(theta, chunk);
-    std::vector<WaveField> fields =
-        propagate(plan.grid, wave_light(scene, value), *wave_medium(scene, value, plan.ramp_um), threads);
+    const Line<S> line(scene.microscope, value);
+    const auto medium = wave_medium(scene, value, plan.ramp_um);
+    SentFields fields;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(line.in().count); ++i)
+      fields.push_back(propagate(plan.grid, wave_light(scene, value, line.in().field[i]), *medium, threads));
     picture(scene, plan.grid, plan.imaging, value, fields, threads, images);
-    fields.resize(1);
+    for (auto& of_one : fields) of_one.resize(1);
     base = std::move(fields);
   };
   if (of_light.parameters.empty())
@@ -435,35 +506,16 @@ Image marched_picture(const Scene& scene, const Theta& theta, int threads) {
     return {eo + de * n.x * n.x, eo + de * n.y * n.y, eo + de * n.z * n.z,
             de * n.x * n.y,      de * n.x * n.z,      de * n.y * n.z};
   };
-  const Polarizers<double> polarizer = polarizers(scene, value);
-  MarchWave wave;
-  wave.e = {polarizer.px, polarizer.py};
-  std::vector<MarchedField> marched = march(grid, k0, o.n_host, dielectric, {wave}, threads);
-  // Its transverse field in the terms of WaveField.
-  std::vector<WaveField> fields(1);
-  fields[0].a[0] = std::move(marched[0].ex), fields[0].a[1] = std::move(marched[0].ey);
-  const std::shared_ptr<const Fft2> fft = shared_fft(g.nx, g.ny);
-  for (Plane& plane : fields[0].a) fft->forward(plane);
-  const std::complex<double> back = std::polar(1.0 / static_cast<double>(fft->size()), -k0 * o.n_host * g.exit_um);
-  for (std::size_t i = 0; i < fft->size(); ++i) {
-    const auto wavevector = [&](int m, int n) {
-      return 2 * std::numbers::pi / (n * g.step_um * k0) * (m < n - m ? m : m - n);
-    };
-    const double x = wavevector(static_cast<int>(i) % g.nx, g.nx), y = wavevector(static_cast<int>(i) / g.nx, g.ny),
-                 k2 = x * x + y * y;
-    auto &ex = fields[0].a[0][i], &ey = fields[0].a[1][i];
-    const double q2 = o.n_host * o.n_host - k2;
-    if (q2 <= 1e-3) {
-      ex = ey = 0;
-      continue;
-    }
-    const double length = std::sqrt(k2), px = length > 0 ? x / length : 1, py = length > 0 ? y / length : 0,
-                 s_scale = std::sqrt(std::sqrt(q2) / o.n_host);
-    const std::complex<double> p = back * (px * ex + py * ey) / s_scale, s = back * (px * ey - py * ex) * s_scale;
-    ex = px * p - py * s;
-    ey = py * p + px * s;
+  const Line<double> line(scene.microscope, value);
+  std::vector<MarchWave> waves(static_cast<std::size_t>(line.in().count));
+  for (std::size_t i = 0; i < waves.size(); ++i) {
+    const Field<double>& f = line.in().field[i];
+    waves[i].e = {std::complex<double>(f.x.re, f.x.im), std::complex<double>(f.y.re, f.y.im)};
   }
-  for (Plane& plane : fields[0].a) fft->inverse(plane);
+  std::vector<MarchedField> marched = march(grid, k0, o.n_host, dielectric, waves, threads);
+  SentFields fields(waves.size());
+  for (std::size_t i = 0; i < waves.size(); ++i)
+    fields[i].push_back(flux_field(std::move(marched[i]), g, k0, o.n_host));
   Image image;
   picture<Pack>(scene, g, imaging_of(scene, value, g), lanes, fields, threads, {&image});
   return image;
