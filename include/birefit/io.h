@@ -56,6 +56,7 @@ struct ImageRequest {
   std::optional<int> page;  ///< of a multi-page file; required when there are several
   std::string channel;      ///< "r" | "g" | "b" | "mean"; "" = not chosen
   Where where;              ///< of the config entry, for errors
+  bool mask = false;        ///< black and white are all that is asked for: 1 bit will do
 };
 
 struct LoadedImage {
@@ -63,11 +64,13 @@ struct LoadedImage {
   int bits = 0;                    ///< 8 or 16 for integers, 32 for float
   double top_code = 0;             ///< 255, 65535, or 0 for floats
   double pixel_size_um = 0;        ///< 0 = the file does not state it
+  double stored_zero = 0;          ///< what a stored 0 is in `values`: their top where white is stored as zero
   std::vector<std::string> notes;  ///< "alpha channel ignored", ...
 };
 
-/// Throws UserError: missing, truncated, empty, 1-bit, animated, over 16384 x 16384 images; several pages or
-/// colour channels and none chosen (the message lists them). Palette images are expanded to colours, with a note.
+/// Throws UserError: missing, truncated, empty, 1-bit (but for masks), animated, over 16384 x 16384 images; several
+/// pages or colour channels and none chosen (the message lists them). Palette images are expanded to colours, with a
+/// note.
 LoadedImage load_image(const ImageRequest& request);
 
 /// .tif, .exr: float; .png: 16-bit, value 1.0 = 65535 * scale. Written to a temporary name and renamed.

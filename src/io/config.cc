@@ -16,6 +16,7 @@
 #include "io/config_scene.h"
 #include "io/config_series.h"
 #include "io/config_signal.h"
+#include "io/images/mask.h"
 #include "io/prior.h"
 #include "medium/references.h"
 
@@ -322,9 +323,16 @@ bool check_roi(ConfigReader& reader, const MicrographSettings& settings, const I
   return false;
 }
 
+void say(ConfigReader& reader, const std::filesystem::path& file, const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) reader.warnings.push_back(file.filename().string() + ": " + note);
+}
+
+/// An image with the reader's remarks among the warnings.
 std::optional<LoadedImage> try_load(ConfigReader& reader, const ImageRequest& request) {
   try {
-    return load_image(request);
+    LoadedImage image = load_image(request);
+    say(reader, request.path, image.notes);
+    return image;
   } catch (const UserError& error) {
     reader.problems.add(error);
     return std::nullopt;
@@ -979,11 +987,12 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     if (settings.dark || settings.parallel) calibration = load_calibration(reader, settings);
     std::optional<Mask> user_mask;
     if (settings.mask) {
-      if (const auto loaded =
-              try_load(reader, {reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where})) {
-        user_mask.emplace(loaded->values.width(), loaded->values.height(), 0);
-        for (std::size_t i = 0; i < user_mask->size(); ++i)
-          user_mask->values()[i] = loaded->values.values()[i] != 0 && std::isfinite(loaded->values.values()[i]);
+      try {
+        LoadedMask mask = load_mask({reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where});
+        say(reader, *settings.mask, mask.notes);
+        user_mask = std::move(mask.selected);
+      } catch (const UserError& error) {
+        reader.problems.add(error);
       }
     }
     std::vector<Observable> observables(micrographs.size());
@@ -1001,7 +1010,6 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
                                               ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
                                               : try_load(reader, {file, item.page, settings.channel, where});
       if (!loaded) continue;
-      for (const std::string& note : loaded->notes) reader.warnings.push_back(micrograph.name + ": " + note);
       if (size && (loaded->values.width() != (*size)[0] || loaded->values.height() != (*size)[1]))
         reader.problems.add(root.find("image_size_px")->where,
                             "image_size_px differs from the size of " + micrograph.name + ", " +

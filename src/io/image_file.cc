@@ -7,7 +7,6 @@
 #include <fstream>
 #include <memory>
 #include <new>
-#include <regex>
 #include <string>
 #include <vector>
 
@@ -19,6 +18,9 @@
 
 #include "birefit/io.h"
 #include "io/file.h"
+#include "io/images/signature.h"
+#include "io/images/stated_size.h"
+#include "io/images/tiff_tags.h"
 
 namespace birefit {
 namespace {
@@ -28,179 +30,8 @@ using OIIO::TypeDesc;
 
 constexpr int kLargestSide = 16384;
 constexpr int kListedPages = 12;
-constexpr int kCountedPages = 1000;             // libtiff walks the chain of pages from its start each time
-constexpr std::size_t kBandBytes = 64u << 20;   // read at once; a whole ordinary image
-constexpr double kLargestCrediblePixelUm = 20;  // 72, 96 and 300 dpi are 353, 265 and 85 um: meant for paper
-
-// ---- what the first bytes say ---------------------------------------------------------------------------------------
-
-/// Facts that OpenImageIO does not pass on. Only the formats named here are opened: the type follows from the content,
-/// so that a wrong extension neither confuses nor hands an untrusted file to some rarely used decoder.
-struct Signature {
-  std::string format;       ///< OpenImageIO's name; "" = none of ours
-  std::string format_name;  ///< for people
-  int stored_bits = 0;      ///< per sample or palette index, when the header says; 0 = ask OpenImageIO
-  bool palette = false;
-  bool animated = false;
-  bool truncated = false;
-  bool lossy = false;
-};
-
-std::uint32_t big_endian(const unsigned char* p) {
-  return std::uint32_t{p[0]} << 24 | std::uint32_t{p[1]} << 16 | std::uint32_t{p[2]} << 8 | p[3];
-}
-
-void read_png_signature(std::ifstream& file, std::uintmax_t file_size, Signature& signature) {
-  std::uintmax_t position = 8;
-  bool ended = false;
-  while (!ended && position + 12 <= file_size) {
-    std::array<unsigned char, 8> head{};
-    file.seekg(static_cast<std::streamoff>(position));
-    if (!file.read(reinterpret_cast<char*>(head.data()), head.size())) break;
-    const std::uint32_t length = big_endian(head.data());
-    const std::string type(reinterpret_cast<const char*>(head.data()) + 4, 4);
-    if (type == "IHDR" && length >= 13) {
-      std::array<unsigned char, 13> header{};
-      if (!file.read(reinterpret_cast<char*>(header.data()), header.size())) break;
-      signature.stored_bits = header[8];
-      signature.palette = header[9] == 3;
-    } else if (type == "acTL") {
-      signature.animated = true;
-    }
-    position += std::uintmax_t{12} + length;
-    ended = type == "IEND" && position <= file_size;
-  }
-  signature.truncated = !ended;
-}
-
-Signature read_signature(const fs::path& path, std::uintmax_t file_size) {
-  Signature signature;
-  std::ifstream file(path, std::ios::binary);
-  std::array<unsigned char, 32> head{};
-  file.read(reinterpret_cast<char*>(head.data()), head.size());
-  const std::size_t count = static_cast<std::size_t>(file.gcount());
-  file.clear();
-  const auto starts_with = [&](std::string_view bytes, std::size_t at = 0) {
-    return count >= at + bytes.size() && std::memcmp(head.data() + at, bytes.data(), bytes.size()) == 0;
-  };
-  using namespace std::string_view_literals;
-  if (starts_with("\x89PNG\r\n\x1a\n"sv)) {
-    signature = {"png", "PNG"};
-    read_png_signature(file, file_size, signature);
-  } else if (starts_with("II*\0"sv) || starts_with("MM\0*"sv) || starts_with("II+\0"sv) || starts_with("MM\0+"sv)) {
-    signature = {"tiff", "TIFF"};
-  } else if (starts_with("v/1\x01"sv)) {
-    signature = {"openexr", "OpenEXR"};
-  } else if (starts_with("\xff\xd8\xff"sv)) {
-    signature = {"jpeg", "JPEG"};
-    signature.stored_bits = 8;
-    signature.lossy = true;
-  } else if (starts_with("GIF8"sv)) {
-    signature = {"gif", "GIF"};
-    signature.palette = true;
-  } else if (starts_with("RIFF"sv) && starts_with("WEBP"sv, 8)) {
-    signature = {"webp", "WebP"};
-    signature.stored_bits = 8;
-    signature.lossy = !starts_with("VP8L"sv, 12);
-    signature.animated = starts_with("VP8X"sv, 12) && (head[20] & 0x02) != 0;
-  } else if (starts_with("BM"sv) && count >= 30) {
-    signature = {"bmp", "BMP"};
-    signature.stored_bits = head[28] | head[29] << 8;
-    signature.palette = signature.stored_bits <= 8;
-  }
-  return signature;
-}
-
-// ---- pixel size -----------------------------------------------------------------------------------------------------
-
-/// Micrometres in one `unit`; 0 = no length we know.
-double micrometres_in(std::string unit) {
-  // The two micro signs of Unicode (U+00B5, U+03BC), ImageJ's escape and Latin-1.
-  for (const char* micro : {"\xc2\xb5", "\xce\xbc", "\\u00B5", "\\u00b5", "\xb5"})
-    if (unit.rfind(micro, 0) == 0) unit = "u" + unit.substr(std::strlen(micro));
-  std::transform(unit.begin(), unit.end(), unit.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (unit == "um" || unit == "micron" || unit == "microns" || unit == "micrometer" || unit == "micrometre") return 1;
-  if (unit == "nm" || unit == "nanometer" || unit == "nanometre") return 1e-3;
-  if (unit == "pm") return 1e-6;
-  if (unit == "\xc3\x85" || unit == "\xc3\xa5" || unit == "angstrom") return 1e-4;
-  if (unit == "mm" || unit == "millimeter" || unit == "millimetre") return 1e3;
-  if (unit == "cm" || unit == "centimeter" || unit == "centimetre") return 1e4;
-  if (unit == "m" || unit == "meter" || unit == "metre") return 1e6;
-  if (unit == "in" || unit == "inch" || unit == "inches") return 25400;
-  return 0;
-}
-
-std::string attribute_value(const std::string& tag, const std::string& name) {
-  std::smatch match;
-  const std::regex pattern("\\s" + name + "\\s*=\\s*[\"']([^\"']*)[\"']");
-  return std::regex_search(tag, match, pattern) ? match[1].str() : std::string();
-}
-
-double number_or_zero(const std::string& text) {
-  try {
-    const double value = std::stod(text);
-    return std::isfinite(value) && value > 0 ? value : 0;
-  } catch (const std::exception&) {
-    return 0;
-  }
-}
-
-/// The value of `key=` on a line of its own in an ImageJ description.
-std::string imagej_value(const std::string& description, const std::string& key) {
-  if (description.rfind("ImageJ=", 0) != 0) return {};
-  const std::string start = "\n" + key + "=";
-  const std::size_t at = description.find(start);
-  if (at == std::string::npos) return {};
-  const std::size_t end = description.find_first_of("\r\n", at + start.size());
-  return description.substr(at + start.size(), end == std::string::npos ? end : end - at - start.size());
-}
-
-/// Micrometres per pixel, 0 when the file does not state it credibly; says in `notes` where it comes from.
-double stated_pixel_size_um(const OIIO::ImageSpec& spec, const std::string& description,
-                            std::vector<std::string>& notes) {
-  const auto accept = [&](double x, double y, const std::string& source) -> double {
-    if (y > 0 && std::abs(y / x - 1) > 0.01) {
-      notes.push_back(fmt::format("{} states pixels that are not square ({:.5g} x {:.5g} um): ignored", source, x, y));
-      return 0;
-    }
-    notes.push_back(fmt::format("pixel size {:.5g} um from {}", x, source));
-    return x;
-  };
-
-  if (description.find("<OME") != std::string::npos || description.find("<ome:OME") != std::string::npos) {
-    double x = 0, y = 0;
-    bool several = false;
-    for (std::size_t at = description.find("Pixels"); at != std::string::npos;
-         at = description.find("Pixels", at + 6)) {
-      if (at == 0 || (description[at - 1] != '<' && description[at - 1] != ':')) continue;
-      const std::string tag = description.substr(at, description.find('>', at) - at);
-      const auto length = [&](const std::string& name) {
-        const std::string unit = attribute_value(tag, name + "Unit");
-        return number_or_zero(attribute_value(tag, name)) * (unit.empty() ? 1.0 : micrometres_in(unit));
-      };
-      const double this_x = length("PhysicalSizeX"), this_y = length("PhysicalSizeY");
-      several = several || (x > 0 && std::abs(this_x - x) > 1e-6 * x);
-      if (x == 0) x = this_x, y = this_y;
-    }
-    if (several) {
-      notes.push_back("the OME metadata states several pixel sizes: ignored");
-      return 0;
-    }
-    if (x > 0) return accept(x, y, "the file's OME metadata");
-  }
-
-  const double x_resolution = spec.get_float_attribute("XResolution", 0);
-  const double y_resolution = spec.get_float_attribute("YResolution", 0);
-  const double x = x_resolution > 0 ? 1.0 / x_resolution : 0;
-  const double y = y_resolution > 0 ? 1.0 / y_resolution : 0;
-  if (!(x > 0) || !std::isfinite(x)) return 0;
-  if (const double um = micrometres_in(imagej_value(description, "unit")); um > 0)
-    return accept(x * um, y * um, "the file's ImageJ metadata");
-
-  const double um = micrometres_in(spec.get_string_attribute("ResolutionUnit", ""));
-  if (um > 0 && x * um < kLargestCrediblePixelUm) return accept(x * um, y * um, "the file's resolution tag");
-  return 0;
-}
+constexpr int kCountedPages = 1000;            // libtiff walks the chain of pages from its start each time
+constexpr std::size_t kBandBytes = 64u << 20;  // read at once; a whole ordinary image
 
 // ---- reading --------------------------------------------------------------------------------------------------------
 
@@ -223,6 +54,10 @@ std::string decoder_message(OIIO::ImageInput& input) {
          fmt::format("is truncated or damaged: it starts like a {} file but cannot be read completely{}",
                      signature.format_name, detail),
          "copy it again from its source, or export it again");
+}
+
+[[noreturn]] void refuse_one_bit(const ImageRequest& request) {
+  refuse(request, "has 1 bit per pixel: black and white carry no intensities", "export the original grey image");
 }
 
 std::string describe_type(const OIIO::ImageSpec& spec) {
@@ -281,7 +116,7 @@ std::vector<int> chosen_channels(const ImageRequest& request, const OIIO::ImageS
   if (colours.empty() && spec.nchannels == 1) colours.push_back(0);
 
   if (colours.size() == 1) {
-    if (!choice.empty()) notes.push_back("channel: " + choice + " has no effect: the image is grey");
+    if (!choice.empty() && !request.mask) notes.push_back("channel: " + choice + " has no effect: the image is grey");
     return colours;
   }
   if (colours.size() == 3 && std::count(rgb.begin(), rgb.end(), -1) == 3) std::copy_n(colours.begin(), 3, rgb.begin());
@@ -383,11 +218,23 @@ void restore_packed_counts(int bits, double container_top, Image& values, bool a
   for (double& value : values.values()) value = averaged ? value * scale : std::round(value * scale);
 }
 
+/// White-is-zero turned round: larger is brighter. Unsigned counts by their top code, signed ones by their bits; floats
+/// have no top but the 1 that programs give them. OpenImageIO does so itself for 8 bits and less. What a stored 0
+/// became.
+double invert_white_is_zero(const OIIO::ImageSpec& spec, double top_code, Image& values) {
+  const double top = top_code > 0                      ? top_code
+                     : spec.format.is_floating_point() ? 1
+                     : spec.format == TypeDesc::UINT32 ? 4294967295.0
+                                                       : -1;
+  if (spec.format != TypeDesc::UINT8)
+    for (double& value : values.values()) value = top - value;
+  return top;
+}
+
 LoadedImage load_checked(const ImageRequest& request, const Signature& signature) {
   if (signature.animated)
     refuse(request, "is animated (" + signature.format_name + ")", "extract the frame to be fitted as a still image");
-  if (signature.stored_bits == 1)
-    refuse(request, "has 1 bit per pixel: black and white carry no intensities", "export the original grey image");
+  if (signature.stored_bits == 1 && !request.mask) refuse_one_bit(request);
   if (signature.truncated) refuse_damaged(request, signature, " (its end is missing)");
 
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(signature.format);
@@ -395,6 +242,18 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     (void)OIIO::geterror();
     refuse(request, "cannot be read: this OpenImageIO has no " + signature.format_name + " support",
            "convert it to TIFF");
+  }
+  // Where BitsPerSample is left to its default of 1, OpenImageIO takes 8.
+  const std::size_t wanted_page = static_cast<std::size_t>(std::max(request.page.value_or(0), 0));
+  const TiffTags tags = signature.format == "tiff" ? read_tiff_tags(request.path, wanted_page + 1) : TiffTags{};
+  std::string restated;
+  std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
+  if (tags.pages.size() > wanted_page && !tags.pages[wanted_page].states_bits) {
+    if (!request.mask) refuse_one_bit(request);
+    restated = with_stated_bit(request.path, tags, wanted_page);
+    memory = std::make_unique<OIIO::Filesystem::IOMemReader>(restated.data(), restated.size());
+    if (restated.empty() || !input->set_ioproxy(memory.get()))
+      refuse(request, "has 1 bit per pixel and does not say so", "save it with 8 bits");
   }
   OIIO::ImageSpec settings, spec;
   settings.attribute("oiio:UnassociatedAlpha", 1);
@@ -444,8 +303,7 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   const int photometric = tiff ? spec.get_int_attribute("tiff:PhotometricInterpretation", 1) : -1;
   constexpr int kWhiteIsZero = 0, kPalette = 3, kSubsampledColour = 6;
   const bool palette = signature.palette || photometric == kPalette;
-  if (bits == 1)
-    refuse(request, "has 1 bit per pixel: black and white carry no intensities", "export the original grey image");
+  if (bits == 1 && !request.mask) refuse_one_bit(request);
   if (tiff && photometric > kPalette && photometric != kSubsampledColour)
     refuse(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
   if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
@@ -468,7 +326,8 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     if (bits < loaded.bits && !palette && (tiff || signature.format == "png")) {
       restore_packed_counts(bits, loaded.top_code, loaded.values, channels.size() > 1);
       loaded.top_code = std::exp2(bits) - 1;
-      loaded.notes.push_back(fmt::format("{}-bit samples: counts from 0 to {:.0f}", bits, loaded.top_code));
+      if (!request.mask)
+        loaded.notes.push_back(fmt::format("{}-bit samples: counts from 0 to {:.0f}", bits, loaded.top_code));
     }
   } else {
     loaded.bits = 32;
@@ -477,13 +336,16 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     else if (spec.format == TypeDesc::HALF)
       loaded.notes.push_back("16-bit float samples hold three decimal digits only");
   }
-  if (palette)
+  if (palette && !request.mask)
     loaded.notes.push_back(
         "palette image: its colours, not its indices, are the intensities; fit the original if you can");
   if (signature.lossy || photometric == kSubsampledColour)
     loaded.notes.push_back("lossy compression has changed the counts and their noise; fit the original if you can");
-  if (photometric == kWhiteIsZero)
-    loaded.notes.push_back("white is stored as zero: values inverted on reading, larger is brighter");
+  if (photometric == kWhiteIsZero) {
+    loaded.stored_zero = invert_white_is_zero(spec, loaded.top_code, loaded.values);
+    if (!request.mask)
+      loaded.notes.push_back("white is stored as zero: values inverted on reading, larger is brighter");
+  }
   if (const int orientation = spec.get_int_attribute("Orientation", 1); orientation > 1 && orientation <= 8)
     loaded.notes.push_back(fmt::format("orientation tag {} ignored: rows and columns are as stored", orientation));
   if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width ||

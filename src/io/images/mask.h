@@ -1,0 +1,20 @@
+#pragma once
+// A picture as a choice of pixels.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "birefit/io.h"
+
+namespace birefit {
+
+struct LoadedMask {
+  Mask selected;                   ///< 1 = use the pixel
+  std::vector<std::string> notes;  ///< the reader's, and what was taken as selected
+};
+
+/// Any picture of any depth or lookup table: pixels of value 0 are left out. Throws UserError as load_image does.
+LoadedMask load_mask(const ImageRequest& request);
+
+}  // namespace birefit
