@@ -84,7 +84,8 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
   const Parameter& parameter = q.parameter();
   // Nor has a model that misses the picture by many times its noise a likelihood to follow: it is as wrong elsewhere.
   constexpr double kMissed = 10;
-  if (q.optimum.reduced_chi_square(q.task) > kMissed) return;
+  // (By the result: profiles of others have moved the problem.)
+  if (q.result.reduced_chi_square > kMissed) return;
   // A valley longer than the bounds is no interval but a verdict.
   if (!(t * sd < parameter.upper - parameter.lower)) return;
   constexpr double kBent = 0.1, kBentFar = 0.2;  // 5 % of the interval
