@@ -266,6 +266,13 @@ TEST(ProfilesInAFit, AreThoseOfTheFitWhateverProfileCameBefore) {
   EXPECT_EQ(count.right, 1);
 }
 
+// A lamp's jitter, three times the noise of bright frames and not shown by the sum of squares of all of them: the pitch
+// was 6.6 errors off.
+TEST(LampsInAFit, AJitterThatFewFramesShowIsInTheErrors) {
+  const Count count = solve(family("HelixCell"), 1, 2012);
+  EXPECT_EQ(count.right, 1);
+}
+
 // Two valleys as good as each other: by plans a third of the noise of a frame's mean off, one of them was no minimum.
 TEST(ScanInAFit, IsMadeByPlansFinerThanTheMeanOfAFrame) {
   const Count count = solve(family("TwistedCell"), 1, 476);

@@ -69,7 +69,7 @@ double interval_freedom(const Task& task, const Optimum& optimum, const Covarian
   const MisfitFound& found = optimum.misfit;
   double dof = found.frames_scatter ? found.frame_dof : std::max(1.0, result.degrees_of_freedom / found.largest_area);
   // Of a sum of variances the one of which is known by few frames (F. E. Satterthwaite, Biometrics Bull. 2, 110
-  // (1946)).
+  // (1946)): what is taken for a lamp's jitter need not be one, nor have its prior's tail.
   if (!found.frames_scatter && found.lamp_share > 0)
     dof = std::min(dof, found.frame_dof / (found.lamp_share * found.lamp_share));
   if (covariances.along > 1) dof = std::min(dof, static_cast<double>(LeastSquares::kLeastModulations));
@@ -100,6 +100,9 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
   covariances.factor = optimum.problem->factor();
   covariances.of_noise = invert_normal_equations(covariances.factor);
   covariances.with_misfit = covariances.of_noise;
+  // What the lamp does is not one value: errors are those over all that it may be.
+  if (const Eigen::VectorXd& wider = optimum.misfit.lamp_wider; wider.size() > 0)
+    covariances.with_misfit.covariance = wider.asDiagonal() * covariances.with_misfit.covariance * wider.asDiagonal();
   covariances.with_misfit.covariance += propagation * propagation.transpose();
   covariances.along = pay_for_misfit(*optimum.problem, covariances.of_noise, covariances.with_misfit);
   return covariances;

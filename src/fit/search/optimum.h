@@ -10,7 +10,8 @@ namespace birefit::estimation {
 /// More than noise, as the residual shows it.
 struct MisfitFound {
   double lamp_jitter = 0;       ///< share by which the lamp's brightness scatters from frame to frame
-  double lamp_share = 0;        ///< of the variance of the frame's mean that it makes most of
+  double lamp_share = 0;        ///< of the variance of the frame's mean that it makes most of, where frames show it
+  Eigen::VectorXd lamp_wider;   ///< LampJitter::wider; empty without such a jitter
   double frame_sd = 0;          ///< of the model intensity, common to a frame, and beyond the lamp's jitter
   double frame_dof = 0;         ///< degrees of freedom behind both
   bool frames_scatter = false;  ///< measured between this fit's own frames

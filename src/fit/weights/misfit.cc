@@ -12,12 +12,19 @@
 #include <numeric>
 
 #include "fit/errors/statistics.h"
+#include "fit/weights/lamp.h"
 #include "fit/weights/settle.h"
 
 namespace birefit::estimation {
 namespace {
 
 using FrameSums = std::vector<LeastSquares::FrameMisfit>;
+
+/// Of a frame's mean in the fit, 1 where it is that of its noise.
+double weight_of_mean(const Misfit& now, const LeastSquares::FrameMisfit& frame) {
+  const double ratio = now.mean_sd / frame.mean_noise_sd;
+  return now.mean_follows_shape ? 1 / now.shape_variance : 1 / (1 + ratio * ratio);
+}
 
 /// Degree of freedom left to each frame's mean, from 0 to 1.
 std::vector<double> freedom_of_means(const Task& task, const Optimum& optimum, const FrameSums& frames) {
@@ -26,9 +33,7 @@ std::vector<double> freedom_of_means(const Task& task, const Optimum& optimum, c
   std::vector<double> freedom;
   for (int g = 0; g < task.frames(); ++g) {
     const auto& frame = frames[static_cast<std::size_t>(g)];
-    const Misfit& now = optimum.problem->misfit()[static_cast<std::size_t>(g)];
-    const double ratio = now.mean_sd / frame.mean_noise_sd;
-    const double factor = now.mean_follows_shape ? 1 / now.shape_variance : 1 / (1 + ratio * ratio);
+    const double factor = weight_of_mean(optimum.problem->misfit()[static_cast<std::size_t>(g)], frame);
     const Eigen::VectorXd& row = frame.mean_jacobian_whitened;
     freedom.push_back(1 - std::clamp(factor * row.dot(covariance * row), 0.0, 1.0));
   }
@@ -79,9 +84,6 @@ void weigh_shapes(const Task& task, const Optimum& optimum, const FrameSums& fra
   }
 }
 
-/// Places at which the lamp's jitter is looked at, from none to the largest that still is a lamp's.
-constexpr int kLampPlaces = 400;
-constexpr double kMostJitter = 5 * kLampJitter;
 /// Frames show a scatter where their noise alone would make it less often than once in a hundred fits.
 constexpr double kShown = 0.99;
 
@@ -107,31 +109,22 @@ std::vector<double> lamp_over_noise(const Task& task, const Frames& setup, const
   return ratio;
 }
 
-/// The lamp's jitter as a share of its brightness: the median of its posterior, with a half-normal prior of kLampJitter
-/// and the restricted likelihood of the frames' means; where they do not show it, at most what widens an error bar by
-/// kUnseen.
-double lamp_jitter(const FrameSums& frames, const std::vector<double>& freedom, const std::vector<double>& ratio) {
-  constexpr double kUnseen = 1.2;
-  const double most = *std::max_element(ratio.begin(), ratio.end());
-  if (!(most > 0)) return 0;
-  const double dof = std::accumulate(freedom.begin(), freedom.end(), 0.0);
-  std::vector<double> logarithm;
-  for (int i = 0; i <= kLampPlaces; ++i) {
-    const double jitter = kMostJitter * i / kLampPlaces;
-    double sum = -0.5 * (jitter / kLampJitter) * (jitter / kLampJitter) - 0.5 * sum_of_squares(frames, ratio, jitter);
-    for (std::size_t g = 0; g < frames.size(); ++g)
-      sum -= 0.5 * freedom[g] * std::log1p(std::pow(jitter * ratio[g], 2));
-    logarithm.push_back(sum);
+/// What the lamp's jitter may be, by the frames' means; `optimum` has derivatives.
+LampJitter lamp_of(const Task& task, const Optimum& optimum, const FrameSums& frames,
+                   const std::vector<double>& ratio) {
+  const Eigen::Index rows = task.frames(), unknowns = task.unknowns.size();
+  FrameMeans means;
+  means.residual = means.light = means.weight = Eigen::VectorXd(rows);
+  means.jacobian = Eigen::MatrixXd(rows, unknowns);
+  for (Eigen::Index g = 0; g < rows; ++g) {
+    const auto& frame = frames[static_cast<std::size_t>(g)];
+    means.residual[g] = frame.mean_whitened;
+    means.light[g] = ratio[static_cast<std::size_t>(g)];
+    means.weight[g] = weight_of_mean(optimum.problem->misfit()[static_cast<std::size_t>(g)], frame);
+    means.jacobian.row(g) = frame.mean_jacobian_whitened.transpose();
   }
-  const double top = *std::max_element(logarithm.begin(), logarithm.end());
-  double whole = 0, below = 0;
-  for (double& l : logarithm) l = std::exp(l - top), whole += l;
-  int median = 0;
-  while (median < kLampPlaces && below + logarithm[static_cast<std::size_t>(median)] < 0.5 * whole)
-    below += logarithm[static_cast<std::size_t>(median++)];
-  const double jitter = kMostJitter * median / kLampPlaces, unseen = std::sqrt(kUnseen * kUnseen - 1) / most;
-  const bool shown = sum_of_squares(frames, ratio, 0) > chi_square_quantile(kShown, dof);
-  return shown ? jitter : std::min(jitter, unseen);
+  means.covariance = invert_normal_equations(optimum.problem->factor()).covariance;
+  return lamp_jitter(means);
 }
 
 /// The frames' common standard deviation, units of the model intensity, whose expected scatter is what is seen; 0 where
@@ -186,7 +179,7 @@ double row_correlation(const Task& task, const Theta& theta, const FrameSums& fr
 double deviance_by_lamp(const FrameSums& frames, const std::vector<double>& ratio) {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i <= kLampPlaces; ++i) {
-    const double jitter = kMostJitter * i / kLampPlaces;
+    const double jitter = lamp_place(i);
     double sum = (jitter / kLampJitter) * (jitter / kLampJitter) + sum_of_squares(frames, ratio, jitter);
     for (const double r : ratio) sum += std::log1p(std::pow(jitter * r, 2));
     least = std::min(least, sum);
@@ -222,9 +215,11 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   weigh_shapes(task, optimum, frames, own_scatter, misfit, found);
 
   found.frames_scatter = false;
+  found.lamp_wider.resize(0);
   if (!own_scatter) return misfit;
   const std::vector<double> ratio = lamp_over_noise(task, optimum.frames, frames);
-  found.lamp_jitter = lamp_jitter(frames, freedom, ratio);
+  const LampJitter lamp = lamp_of(task, optimum, frames, ratio);
+  found.lamp_jitter = lamp.share;
   // What scatters by more than a lamp does is not the lamp, nor need it be where frames are not described either.
   constexpr double kSignificant = 0.999;
   const double significant = chi_square_quantile(kSignificant, dof);
@@ -233,8 +228,9 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
                         sum_of_squares(frames, ratio, 0) > chi_square_quantile(kShown, dof) &&
                         deviance_by_scatter(task, optimum.theta, frames) < deviance_by_lamp(frames, ratio);
   if (of_model || sum_of_squares(frames, ratio, found.lamp_jitter) > significant) found.lamp_jitter = 0;
+  found.lamp_wider = found.lamp_jitter > 0 ? lamp.wider : Eigen::VectorXd();
   found.lamp_share = 0;
-  for (const double r : ratio)
+  for (const double r : lamp.shown ? ratio : std::vector<double>{})
     found.lamp_share = std::max(found.lamp_share, 1 - 1 / (1 + std::pow(found.lamp_jitter * r, 2)));
   const double sum = sum_of_squares(frames, ratio, found.lamp_jitter);
   found.frames_scatter = sum > dof && found.lamp_jitter == 0 && (found.beyond_noise || sum > significant);
