@@ -1050,7 +1050,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     else if (root.find("prior"))
       reader.block(root, "prior", {"from", "parameters"}, true);
   }
-  if (std::holds_alternative<Droplet>(config.scene.sample) && config.scene.microscope.objective_na == 0)
+  if (std::holds_alternative<Droplet>(config.scene.sample) && !config.scene.microscope.objective_na)
     config.job.taken_as_exact.push_back(
         "microscope.objective_na is not given: every ray that leaves the droplet is "
         "taken to reach the image, and wave optics, which needs it, is left out.");

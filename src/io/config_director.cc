@@ -1,39 +1,24 @@
 #include "io/config_director.h"
 
-#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
+
+#include "io/described.h"
 
 namespace birefit {
 namespace {
 
-NumberSpec within(double lower, double upper, const char* unit = "") {
-  NumberSpec spec;
-  spec.unit = unit;
-  spec.lower = lower;
-  spec.upper = upper;
-  return spec;
-}
-
-NumberSpec positive(double upper, const char* unit = "") {
-  NumberSpec spec = within(0, upper, unit);
-  spec.lower_open = true;
-  return spec;
-}
-
-NumberSpec azimuth() { return within(-36000, 36000, "deg"); }
-
 /// A pitch of either hand; a fit must not pass through zero, where the helix turns infinitely fast.
-ParameterRef read_pitch(ConfigReader& reader, const Block& block) {
-  const ParameterRef ref = reader.number(block, "pitch_um", within(-100000, 100000, "um"));
+void check_pitch(ConfigReader& reader, const Block& block, ParameterRef ref) {
   const YamlNode* node = block.find("pitch_um");
-  if (!node || !ref) return ref;
+  if (!node || !ref) return;
   const Parameter& pitch = reader.table[ref];
   const double lower = pitch.free ? pitch.lower : pitch.value, upper = pitch.free ? pitch.upper : pitch.value;
   if (lower <= 0 && upper >= 0)
     reader.problems.add(node->where,
                         block.path_of("pitch_um") + (pitch.free ? " is fitted through 0" : " = 0 has no meaning"),
                         "> 0 is right-handed, < 0 left-handed; leave it out for none");
-  return ref;
 }
 
 }  // namespace
@@ -41,15 +26,12 @@ ParameterRef read_pitch(ConfigReader& reader, const Block& block) {
 FreederickszDirector read_freedericksz(ConfigReader& reader, const Block& parent) {
   using Anchoring = FreederickszDirector::Anchoring;
   FreederickszDirector d;
-  const Block block = reader.block(parent, "freedericksz",
-                                   {"reduced_voltage", "voltage_v", "threshold_v", "k33_over_k11", "k22_over_k11",
-                                    "eps_ratio", "k11_pn", "k22_pn", "k33_pn", "eps_parallel", "eps_perpendicular",
-                                    "anchoring", "pretilt_deg", "azimuth_deg", "twist_deg", "pitch_um"},
-                                   true);
-  const auto given = [&](const char* key) {
-    return block.find(key) ||
-           std::count(reader.set_everywhere.begin(), reader.set_everywhere.end(), block.path_of(key)) > 0;
-  };
+  using D = FreederickszDirector;
+  std::vector<std::string> keys = described_keys<D>();
+  keys.push_back("anchoring");
+  const Block block = reader.block(parent, D::kKey, keys, true);
+  const auto given = [&](const char* key) { return reader.given(block, key); };
+  const auto number = [&](const char* key) { return reader.number(block, key, described<D>(key)); };
   const auto superfluous = [&](const char* key, const std::string& why, const std::string& hint) {
     if (const YamlNode* node = block.find(key)) reader.problems.add(node->where, block.path_of(key) + " " + why, hint);
   };
@@ -66,34 +48,31 @@ FreederickszDirector read_freedericksz(ConfigReader& reader, const Block& parent
   if (constants) {
     for (const char* key : {"k33_over_k11", "k22_over_k11"})
       superfluous(key, "is given beside elastic constants in pN", "give one of the two");
-    d.k11_pn = reader.number(block, "k11_pn", positive(1000, "pN"));
-    d.k33_pn = reader.number(block, "k33_pn", positive(1000, "pN"));
-    if (twisted || given("k22_pn")) d.k22_pn = reader.number(block, "k22_pn", positive(1000, "pN"));
+    d.k11_pn = number("k11_pn");
+    d.k33_pn = number("k33_pn");
+    if (twisted || given("k22_pn")) d.k22_pn = number("k22_pn");
   } else {
-    d.k33_over_k11 = reader.number(block, "k33_over_k11", positive(20));
-    if (twisted || given("k22_over_k11")) d.k22_over_k11 = reader.number(block, "k22_over_k11", positive(20));
+    d.k33_over_k11 = number("k33_over_k11");
+    if (twisted || given("k22_over_k11")) d.k22_over_k11 = number("k22_over_k11");
   }
   if (!twisted)
     for (const char* key : {"k22_over_k11", "k22_pn"})
       superfluous(key, "has no effect without twist_deg or pitch_um", "leave it out");
-  const NumberSpec ratio = positive(100), permittivity = positive(1000);
   if (permittivities) {
     superfluous("eps_ratio", "is given beside eps_parallel and eps_perpendicular", "give one of the two");
-    d.eps_parallel = reader.number(block, "eps_parallel", permittivity);
-    d.eps_perpendicular = reader.number(block, "eps_perpendicular", permittivity);
+    d.eps_parallel = number("eps_parallel");
+    d.eps_perpendicular = number("eps_perpendicular");
   } else {
-    d.eps_ratio = reader.number(block, "eps_ratio", ratio);
+    d.eps_ratio = number("eps_ratio");
   }
 
   // A voltage, and the threshold it is measured by.
-  NumberSpec reduced = within(0, 50), volts = within(0, 1e5, "V");
-  reduced.physical_lower = volts.physical_lower = 0;
   if (given("reduced_voltage") && given("voltage_v"))
     superfluous("voltage_v", "is given beside reduced_voltage", "give one of the two");
   if (given("voltage_v") && !given("reduced_voltage")) {
-    d.voltage_v = reader.number(block, "voltage_v", volts);
+    d.voltage_v = number("voltage_v");
     if (given("threshold_v")) {
-      d.threshold_v = reader.number(block, "threshold_v", positive(1e4, "V"));
+      d.threshold_v = number("threshold_v");
       if (constants && permittivities)
         superfluous("threshold_v", "follows from the elastic constants and permittivities",
                     "leave it out, or give k33_over_k11 and eps_ratio");
@@ -105,9 +84,9 @@ FreederickszDirector read_freedericksz(ConfigReader& reader, const Block& parent
     if (!given("reduced_voltage") && block.node) {
       reader.missing(block, "reduced_voltage or voltage_v",
                      "reduced_voltage is V over the threshold of the untwisted cell");
-      d.reduced_voltage = reader.constant(block.path_of("reduced_voltage"), reduced, 0);
+      d.reduced_voltage = reader.constant(block.path_of("reduced_voltage"), described<D>("reduced_voltage"), 0);
     } else {
-      d.reduced_voltage = reader.number(block, "reduced_voltage", reduced);
+      d.reduced_voltage = number("reduced_voltage");
     }
   }
 
@@ -139,29 +118,89 @@ FreederickszDirector read_freedericksz(ConfigReader& reader, const Block& parent
           "keep it on one side of 1");
   }
 
-  NumberSpec pretilt = within(0, 45, "deg");
-  pretilt.physical_lower = 0;
-  d.pretilt_deg = reader.number(block, "pretilt_deg", pretilt, d.anchoring == Anchoring::hybrid ? 0 : 1);
-  d.azimuth_deg = reader.number(block, "azimuth_deg", azimuth(), 0);
+  d.pretilt_deg = reader.number(block, "pretilt_deg", described<D>("pretilt_deg"),
+                                d.anchoring == Anchoring::hybrid ? 0 : described<D>("pretilt_deg").fallback);
+  d.azimuth_deg = read_described<D>(reader, block, "azimuth_deg");
   if (d.anchoring != Anchoring::planar)
     for (const char* key : {"twist_deg", "pitch_um"})
       superfluous(key, "needs anchoring: planar", "an azimuth has no meaning at a homeotropic face");
-  if (given("twist_deg")) d.twist_deg = reader.number(block, "twist_deg", within(-1440, 1440, "deg"));
-  if (given("pitch_um")) d.pitch_um = read_pitch(reader, block);
+  d.twist_deg = read_described<D>(reader, block, "twist_deg");
+  d.pitch_um = read_described<D>(reader, block, "pitch_um");
+  check_pitch(reader, block, d.pitch_um);
   return d;
 }
 
 HelixDirector read_helix(ConfigReader& reader, const Block& parent) {
   HelixDirector d;
-  const Block block = reader.block(parent, "helix", {"pitch_um", "azimuth_deg", "modulus"}, true);
-  d.pitch_um = read_pitch(reader, block);
-  d.azimuth_deg = reader.number(block, "azimuth_deg", azimuth(), 0);
-  if (block.find("modulus")) {
-    NumberSpec modulus = within(0, 1 - 1e-6);
-    modulus.physical_lower = 0;
-    d.modulus = reader.number(block, "modulus", modulus);
-  }
+  const Block block = reader.block(parent, HelixDirector::kKey, described_keys<HelixDirector>(), true);
+  read_numbers(reader, block, d);
+  check_pitch(reader, block, d.pitch_um);
   return d;
+}
+
+UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
+  UniformDirector director;
+  const Block block = reader.block(parent, UniformDirector::kKey, described_keys<UniformDirector>(), true);
+  const YamlNode* axis = block.find("axis");
+  if (axis) {
+    if (block.find("azimuth_deg") || block.find("tilt_deg"))
+      reader.problems.add(axis->where, block.path + " has an axis and angles", "give one of the two");
+    if (!axis->is_sequence() || axis->items.size() != 3) {
+      reader.problems.add(axis->where,
+                          "axis must be three components [x, y, z], found " +
+                              (axis->is_sequence() ? std::to_string(axis->items.size()) + " items" : axis->describe()));
+      return director;
+    }
+    double square = 0;
+    for (int i = 0; i < 3; ++i) {
+      const char* const letters[] = {"x", "y", "z"};
+      director.axis[i] = reader.number_at(axis->items[i], block.path_of("axis") + "." + letters[i],
+                                          described<UniformDirector>("axis"));
+      square += std::pow(reader.table[director.axis[i]].value, 2);
+    }
+    if (square == 0) reader.problems.add(axis->where, "axis = [0, 0, 0] has no direction");
+    return director;
+  }
+  if (block.node && !block.find("azimuth_deg") && !block.find("tilt_deg")) {
+    reader.problems.add(block.where, block.path + " needs an axis: [x, y, z] or azimuth_deg and tilt_deg");
+    return director;
+  }
+  read_numbers(reader, block, director);
+  return director;
+}
+
+/// The reduced field, or the applied one with the two numbers that reduce it.
+AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
+  AxialDirector axial;
+  std::vector<std::string> keys = described_keys<AxialDirector>();
+  keys.push_back("branch");
+  const Block block = reader.block(parent, AxialDirector::kKey, keys, true);
+  const YamlNode *reduced = block.find("reduced_field"), *applied = block.find("field_v_per_um");
+  if (reduced && applied)
+    reader.problems.add(applied->where, block.path + " has a reduced field and an applied one", "give one of the two");
+  if (!reduced && !applied)
+    reader.missing(block, "reduced_field",
+                   "radius over coherence length, 0 without a field; or field_v_per_um with coherence_voltage_v and "
+                   "local_field_factor");
+  for (const char* other : {"coherence_voltage_v", "local_field_factor"}) {
+    const YamlNode* node = block.find(other);
+    if (reduced && node)
+      reader.problems.add(node->where, std::string(other) + " has no effect on a reduced field",
+                          "leave it out, or give field_v_per_um");
+    if (applied && !reduced && !reader.given(block, other)) reader.missing(block, other);
+  }
+  read_numbers(reader, block, axial);
+  if (reduced) axial.field_v_per_um = axial.coherence_voltage_v = axial.local_field_factor = {};
+  const std::string branch =
+      reader.choice(block, "branch", {"hedgehog", "ring", "compare"}).value_or(axial.ring_radius ? "ring" : "hedgehog");
+  axial.compare = branch == "compare";
+  if (branch == "hedgehog" && axial.ring_radius)
+    reader.problems.add(block.find("ring_radius")->where, "a hedgehog has no ring_radius",
+                        "leave it out, or write branch: compare");
+  if (branch != "hedgehog" && !axial.ring_radius)
+    reader.missing(block, "ring_radius",
+                   "the ring's radius over the droplet's, for example {value: 0.9, fit: [0.6, 0.99]}");
+  return axial;
 }
 
 }  // namespace birefit

@@ -1,19 +1,10 @@
 #include "io/config_disc.h"
 
+#include "io/described.h"
 #include "samples/disc/disc.h"
 
 namespace birefit {
 namespace {
-
-NumberSpec positive(double upper, std::string unit) {
-  NumberSpec spec;
-  spec.lower = 0;
-  spec.lower_open = true;
-  spec.upper = upper;
-  spec.unit = std::move(unit);
-  spec.physical_lower = 0;
-  return spec;
-}
 
 std::vector<ParameterRef> read_polynomial(ConfigReader& reader, const Block& block, const std::string& key,
                                           const std::string& terms, const NumberSpec& spec) {
@@ -39,42 +30,28 @@ StressedDisc read_stressed_disc(ConfigReader& reader, const Block& parent) {
                                    {"diameter_um", "thickness_um", "load_n", "stress_optic_brewster",
                                     "load_azimuth_deg", "contact_radius_um", "rim_um", "residual", "illumination"},
                                    true);
-  disc.diameter_um = reader.number(block, "diameter_um", positive(1e7, "um"));
-  NumberSpec load = positive(1e7, "N");
-  load.lower_open = false;  // no load: an unloaded disc may show its residual stress
-  disc.load_n = reader.number(block, "load_n", load);
-  NumberSpec optic;
-  optic.lower = -1e5;
-  optic.upper = 1e5;
-  optic.unit = "brewster";
-  disc.stress_optic_brewster = reader.number(block, "stress_optic_brewster", optic);
-  NumberSpec angle;
-  angle.unit = "deg";
-  angle.lower = -36000;
-  angle.upper = 36000;
-  disc.load_azimuth_deg = reader.number(block, "load_azimuth_deg", angle, 90);
-  disc.contact_radius_um = reader.plain(block, "contact_radius_um", positive(1e7, "um")).value_or(0);
-  disc.rim_um = reader.plain(block, "rim_um", positive(1e7, "um")).value_or(0);
+  using D = StressedDisc;
+  disc.diameter_um = read_described<D>(reader, block, "diameter_um");
+  disc.load_n = read_described<D>(reader, block, "load_n");
+  disc.stress_optic_brewster = read_described<D>(reader, block, "stress_optic_brewster");
+  disc.load_azimuth_deg = read_described<D>(reader, block, "load_azimuth_deg");
+  disc.contact_radius_um = reader.plain(block, "contact_radius_um", numbers::length_um(1e7)).value_or(0);
+  disc.rim_um = reader.plain(block, "rim_um", numbers::length_um(1e7)).value_or(0);
   const bool residual = block.find("residual");
   if (residual) {
     const Block stress = reader.block(block, "residual", {"normal_mpa", "shear_mpa"}, true);
-    NumberSpec mpa;
-    mpa.lower = -1e6;
-    mpa.upper = 1e6;
-    mpa.unit = "MPa";
     const std::string terms = "1, X, Y, X^2, XY, Y^2, ..";
-    disc.residual_normal_mpa = read_polynomial(reader, stress, "normal_mpa", terms, mpa);
-    disc.residual_shear_mpa = read_polynomial(reader, stress, "shear_mpa", terms, mpa);
+    disc.residual_normal_mpa =
+        read_polynomial(reader, stress, "normal_mpa", terms, described<D>("residual.normal_mpa"));
+    disc.residual_shear_mpa = read_polynomial(reader, stress, "shear_mpa", terms, described<D>("residual.shear_mpa"));
     if (stress.node && !stress.find("normal_mpa") && !stress.find("shear_mpa"))
       reader.missing(stress, "normal_mpa or shear_mpa", "coefficients of sxx - syy and 2 sxy");
   }
-  NumberSpec share;
-  share.lower = -100;
-  share.upper = 100;
-  disc.illumination = read_polynomial(reader, block, "illumination", "X, Y, X^2, XY, Y^2, ..", share);
+  disc.illumination =
+      read_polynomial(reader, block, "illumination", "X, Y, X^2, XY, Y^2, ..", described<D>("illumination"));
   // The load's retardance does not depend on the thickness; the residual stress's does.
-  disc.thickness_um = residual ? reader.number(block, "thickness_um", positive(1e7, "um"))
-                               : reader.number(block, "thickness_um", positive(1e7, "um"), 1000);
+  const NumberSpec thickness = described<D>("thickness_um");
+  disc.thickness_um = reader.number(block, "thickness_um", thickness, residual ? std::nullopt : thickness.fallback);
   return disc;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "io/described.h"
 #include "io/material_file.h"
 #include "medium/build.h"
 #include "medium/materials/presets.h"
@@ -24,7 +25,6 @@ NumberSpec within(double lower, double upper, std::string unit = {}) {
   spec.unit = std::move(unit);
   return spec;
 }
-NumberSpec kelvins() { return within(100, 2000, "K"); }
 
 const std::vector<std::string> kRayKeys = {"file", "cauchy", "sellmeier", "range_nm"};
 
@@ -146,28 +146,23 @@ void only_one(ConfigReader& reader, const Block& block, const std::string& chose
 }
 
 FourParameterIndices read_four_parameter(ConfigReader& reader, const Block& material) {
-  const Block block =
-      reader.block(material, "four_parameter",
-                   {"mean_index", "mean_slope_per_k", "birefringence_0k", "exponent", "clearing_k"}, true);
-  FourParameterIndices::Set set;
-  set.mean_index = reader.number(block, "mean_index", within(1, 4));
-  set.mean_slope_per_k = reader.number(block, "mean_slope_per_k", within(-0.1, 0.1), 0);
-  set.birefringence_0k = reader.number(block, "birefringence_0k", within(-2, 2));
-  set.exponent = reader.number(block, "exponent", within(0, 2));
-  set.clearing_k = reader.number(block, "clearing_k", kelvins());
+  using Set = FourParameterIndices::Set;
+  const Block block = reader.block(material, "four_parameter", described_keys<Set>(), true);
+  Set set;
+  read_numbers(reader, block, set);
   return {{set}};
 }
 
 HallerLaw read_haller(ConfigReader& reader, const Block& material, std::optional<double> reference_k) {
-  const Block block =
-      reader.block(material, "haller", {"reference_k", "clearing_k", "exponent", "mean_slope_per_k"}, true);
+  const Block block = reader.block(material, "haller", described_keys<HallerLaw>(), true);
   HallerLaw law;
   if (!reference_k && block.node && !block.find("reference_k"))
     reader.missing(block, "reference_k", "the temperature at which the indices hold");
-  law.reference_k = reader.number(block, "reference_k", kelvins(), reference_k.value_or(298.15));
-  law.clearing_k = reader.number(block, "clearing_k", kelvins());
-  law.exponent = reader.number(block, "exponent", within(0, 2));
-  law.mean_slope_per_k = reader.number(block, "mean_slope_per_k", within(-0.1, 0.1), 0);
+  law.reference_k =
+      reader.number(block, "reference_k", described<HallerLaw>("reference_k"), reference_k.value_or(298.15));
+  for (const auto& [key, ref] : {std::pair("clearing_k", &law.clearing_k), std::pair("exponent", &law.exponent),
+                                 std::pair("mean_slope_per_k", &law.mean_slope_per_k)})
+    *ref = read_described<HallerLaw>(reader, block, key);
   return law;
 }
 
@@ -267,9 +262,8 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
     }
     law.indices = both;
   } else {
-    const ConstantIndices constant{reader.number(block, "ordinary", within(1, 4)),
-                                   reader.number(block, "birefringence", within(-1, 1))};
-    law.indices = constant;
+    law.indices = ConstantIndices{read_described<ConstantIndices>(reader, block, "ordinary"),
+                                  read_described<ConstantIndices>(reader, block, "birefringence")};
   }
   if (block.find("haller")) {
     if (preset && !preset->four_parameter.empty())
@@ -280,7 +274,7 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
   }
   const bool by_temperature = law.haller || std::holds_alternative<FourParameterIndices>(law.indices);
   const YamlNode* temperature = block.find("temperature_k");
-  NumberSpec spec = kelvins();
+  NumberSpec spec = described<LawIndices>("temperature_k");
   if (law.upper_k > 0) {
     spec.lower = law.lower_k;
     spec.upper = law.upper_k;
@@ -306,7 +300,7 @@ Material read_law_material(ConfigReader& reader, const Block& block, const Sampl
           "add haller: {clearing_k: .., exponent: ..}");
   }
   if (block.find("birefringence_factor"))
-    law.birefringence_factor = reader.number(block, "birefringence_factor", within(0, 10));
+    law.birefringence_factor = read_described<LawIndices>(reader, block, "birefringence_factor");
   if (preset) {
     const bool fitted = law.birefringence_factor && reader.table[law.birefringence_factor].free;
     if (fitted) law.birefringence_uncertainty = 0;  // in the intervals, through the factor

@@ -1,47 +1,58 @@
 #include "io/config_microscope.h"
 
 #include <algorithm>
+#include <map>
 #include <string>
+#include <type_traits>
 #include <vector>
 
-#include "io/number_specs.h"
+#include "io/described.h"
 #include "scene/polariscope.h"
 
 namespace birefit {
 namespace {
 
-/// What stands between a polarizer and the sample, by the words for it.
-const std::vector<std::string> kParts = {"retarder", "quarter_wave", "half_wave", "full_wave", "rotator"};
+/// What stands between a polarizer and the sample, by the words for it: the parts, and plates of whole parts of a wave.
+const std::map<std::string, double> kWavePlates = {{"quarter_wave", 0.25}, {"half_wave", 0.5}, {"full_wave", 1}};
+std::vector<std::string> part_words() {
+  std::vector<std::string> words = KindsOf<PolarizingPart>::keys();
+  for (const auto& [word, waves] : kWavePlates) words.push_back(word);
+  return words;
+}
 
 /// A plate of so many wavelengths: of the light's own where it is not said which, or of one that it is made for.
 Retarder read_wave_plate(ConfigReader& reader, const Block& block, double waves) {
   Retarder plate;
-  plate.azimuth_deg = reader.number(block, "azimuth_deg", angle());
-  NumberSpec made_for = number_within(100, 20000);
+  plate.azimuth_deg = reader.number(block, "azimuth_deg", numbers::angle());
+  NumberSpec made_for = numbers::within(100, 20000);
   made_for.unit = "nm";
   if (const auto wavelength = reader.plain(block, "made_for_nm", made_for)) {
-    NumberSpec retardance = number_within(0, 1e5);
+    NumberSpec retardance = numbers::within(0, 1e5);
     retardance.unit = "nm";
     plate.retardance_nm = reader.constant(block.path_of("retardance_nm"), retardance, waves * *wavelength);
   } else {
-    plate.phase_deg = reader.constant(block.path_of("phase_deg"), angle(), 360 * waves);
+    plate.phase_deg = reader.constant(block.path_of("phase_deg"), numbers::angle(), 360 * waves);
   }
   return plate;
 }
 
-Retarder read_retarder(ConfigReader& reader, const Block& block) {
-  Retarder retarder;
-  if (block.find("retardance_nm")) {
-    if (const YamlNode* node = block.find("phase_deg"))
-      reader.problems.add(node->where, "phase_deg is given beside retardance_nm", "give one of the two");
-    NumberSpec retardance = number_within(-1e5, 1e5);
-    retardance.unit = "nm";
-    retarder.retardance_nm = reader.number(block, "retardance_nm", retardance);
-  } else {
-    retarder.phase_deg = reader.number(block, "phase_deg", angle());
-  }
-  retarder.azimuth_deg = reader.number(block, "azimuth_deg", angle());
-  return retarder;
+/// The part of that key.
+PolarizingPart read_part(ConfigReader& reader, const Block& item, const std::string& key) {
+  PolarizingPart part;
+  each_kind<PolarizingPart>([&]<class Part>(const Part*) {
+    if (key != Part::kKey) return;
+    Part read;
+    const Block block = reader.block(item, key, described_keys<Part>(), true);
+    read_numbers(reader, block, read);
+    if constexpr (std::is_same_v<Part, Retarder>) {
+      const YamlNode* phase = block.find("phase_deg");
+      if (phase && read.retardance_nm)
+        reader.problems.add(phase->where, "phase_deg is given beside retardance_nm", "give one of the two");
+      if (block.node && !read.phase_deg && !read.retardance_nm) reader.missing(block, "phase_deg or retardance_nm");
+    }
+    part = read;
+  });
+  return part;
 }
 
 /// A list like [{quarter_wave: {azimuth_deg: 45}}, {rotator: {angle_deg: 10}}], in the order in which light meets them.
@@ -56,24 +67,21 @@ void read_parts(ConfigReader& reader, const Block& microscope, const std::string
     return;
   }
   for (std::size_t i = 0; i < list->items.size(); ++i) {
-    const Block item = reader.block_of(list->items[i], path + "[" + std::to_string(i + 1) + "]", kParts);
+    const Block item = reader.block_of(list->items[i], path + "[" + std::to_string(i + 1) + "]", part_words());
     if (!item.node) continue;
     if (item.node->entries.size() != 1) {
       reader.problems.add(item.where,
                           item.path + " must hold one part, found " + std::to_string(item.node->entries.size()),
-                          "one of " + list_words(kParts) + "; the list has an item for each");
+                          "one of " + list_words(part_words()) + "; the list has an item for each");
       continue;
     }
     const std::string& kind = item.node->entries[0].key;
-    if (kind == "retarder") {
+    if (const auto plate = kWavePlates.find(kind); plate != kWavePlates.end())
       to.emplace_back(
-          read_retarder(reader, reader.block(item, kind, {"phase_deg", "retardance_nm", "azimuth_deg"}, true)));
-    } else if (kind == "rotator") {
-      to.emplace_back(Rotator{reader.number(reader.block(item, kind, {"angle_deg"}, true), "angle_deg", angle())});
-    } else if (std::find(kParts.begin(), kParts.end(), kind) != kParts.end()) {
-      const double waves = kind == "quarter_wave" ? 0.25 : kind == "half_wave" ? 0.5 : 1;
-      to.emplace_back(read_wave_plate(reader, reader.block(item, kind, {"azimuth_deg", "made_for_nm"}, true), waves));
-    }
+          read_wave_plate(reader, reader.block(item, kind, {"azimuth_deg", "made_for_nm"}, true), plate->second));
+    else if (const std::vector<std::string> words = part_words();
+             std::find(words.begin(), words.end(), kind) != words.end())
+      to.push_back(read_part(reader, item, kind));
   }
 }
 
@@ -85,9 +93,7 @@ ParameterRef read_extinction(ConfigReader& reader, const Block& block, const std
     reader.problems.add(node->where, key + " is given of a polarizer that is not there", "leave one of the two out");
     return {};
   }
-  NumberSpec ratio = number_within(1, 1e12);
-  ratio.physical_lower = 1;
-  return reader.number(block, key, ratio);
+  return reader.number(block, key, described<Microscope>(key));
 }
 
 /// Short forms of parts: a circular polariscope, a compensator.
@@ -98,13 +104,13 @@ void read_short_forms(ConfigReader& reader, const Block& block, Microscope& micr
                           "quarter_wave: true stands for a polarizer and all parts of a circular polariscope",
                           "list its plates under before and behind, or leave out what else is there");
     else
-      make_circular_polariscope(microscope, reader.constant("microscope.quarter_wave.phase_deg", angle(), 90));
+      make_circular_polariscope(microscope, reader.constant("microscope.quarter_wave.phase_deg", numbers::angle(), 90));
   }
   if (block.find("compensator")) {
     const Block compensator = reader.block(block, "compensator", {"phase_deg", "azimuth_deg"}, true);
     Retarder retarder;
-    retarder.phase_deg = reader.number(compensator, "phase_deg", angle());
-    retarder.azimuth_deg = reader.number(compensator, "azimuth_deg", angle());
+    retarder.phase_deg = reader.number(compensator, "phase_deg", described<Retarder>("phase_deg"));
+    retarder.azimuth_deg = reader.number(compensator, "azimuth_deg", described<Retarder>("azimuth_deg"));
     microscope.behind.emplace_back(retarder);
   }
 }
@@ -119,8 +125,8 @@ ParameterRef polarizing_element(ConfigReader& reader, const Block& block, const 
   if (!node) node = other;
   if (node && node->is_scalar() && node->text == "none") return {};
   const std::string path = block.path_of(canonical);
-  if (node) return reader.number_at(*node, path, angle());
-  return reader.number(block, canonical, angle(), required ? std::nullopt : std::optional<double>(0));
+  if (node) return reader.number_at(*node, path, numbers::angle());
+  return reader.number(block, canonical, numbers::angle(), required ? std::nullopt : std::optional<double>(0));
 }
 
 }  // namespace
@@ -134,16 +140,10 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
                     "behind", "polarizer_extinction_ratio", "analyzer_extinction_ratio"},
                    true);
   const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
-  NumberSpec wavelength;
-  wavelength.unit = "nm";
-  wavelength.lower = 100;
-  wavelength.upper = 20000;
-  microscope.wavelength_nm = reader.number(light, "wavelength_nm", wavelength);
-  NumberSpec bandwidth;
-  bandwidth.unit = "nm";
-  bandwidth.lower = 0;
-  bandwidth.upper = 5000;
-  microscope.bandwidth_nm = reader.plain(light, "bandwidth_nm", bandwidth).value_or(0);
+  const auto of_light = [&](const char* key) { return described<Microscope>(std::string("light.") + key); };
+  microscope.wavelength_nm = reader.number(light, "wavelength_nm", of_light("wavelength_nm"));
+  if (light.find("bandwidth_nm"))
+    microscope.bandwidth_nm = reader.number(light, "bandwidth_nm", of_light("bandwidth_nm"));
 
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material); constant && constant->resonance_nm) {
     const Parameter &resonance = reader.table[constant->resonance_nm], &light = reader.table[microscope.wavelength_nm];
@@ -162,15 +162,10 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
       polarizing_element(reader, block, "polarizer_deg", "polariser_deg", !slab && reader.polarizers);
   microscope.analyzer_deg =
       polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab && reader.polarizers);
-  microscope.objective_na = reader.plain(block, "objective_na", aperture()).value_or(0);
-  microscope.condenser_na = reader.plain(block, "condenser_na", aperture()).value_or(0);
-  if (block.find("focus_um")) {
-    NumberSpec focus;
-    focus.unit = "um";
-    focus.lower = -1000;
-    focus.upper = 1000;
-    microscope.focus_um = reader.number(block, "focus_um", focus);
-  }
+  for (const auto& [key, ref] :
+       {std::pair("objective_na", &microscope.objective_na), std::pair("condenser_na", &microscope.condenser_na),
+        std::pair("focus_um", &microscope.focus_um)})
+    *ref = read_described<Microscope>(reader, block, key);
   microscope.aplanatic = reader.choice(block, "imaging", {"focal_plane", "aplanatic"}).value_or("") == "aplanatic";
 
   microscope.polarizer_extinction_ratio =
@@ -193,11 +188,11 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
     }
     for (const YamlNode& item : directions->items) {
       const Block direction = reader.block_of(item, "microscope.directions", {"theta_deg", "azimuth_deg"});
-      NumberSpec theta = angle_within(0, 90);
+      NumberSpec theta = numbers::angle(0, 90);
       theta.upper_open = true;
       if (direction.node && !direction.find("theta_deg")) reader.missing(direction, "theta_deg");
       microscope.directions.push_back({reader.plain(direction, "theta_deg", theta).value_or(0),
-                                       reader.plain(direction, "azimuth_deg", angle()).value_or(0)});
+                                       reader.plain(direction, "azimuth_deg", numbers::angle()).value_or(0)});
     }
   } else if (slab) {
     microscope.directions = {{0, 0}};

@@ -62,15 +62,11 @@ std::string list_words(const std::vector<std::string>& words) {
   return text;
 }
 
-bool NumberSpec::contains(double value) const {
-  return (lower_open ? value > lower : value >= lower) && (upper_open ? value < upper : value <= upper);
-}
-
-std::string NumberSpec::range() const {
-  const std::string low = std::isfinite(lower) ? show(lower) : "-infinity";
-  const std::string high = std::isfinite(upper) ? show(upper) : "infinity";
-  return (lower_open || !std::isfinite(lower) ? "(" : "[") + low + ", " + high +
-         (upper_open || !std::isfinite(upper) ? ")" : "]");
+std::string range_of(const NumberSpec& spec) {
+  const std::string low = std::isfinite(spec.lower) ? show(spec.lower) : "-infinity";
+  const std::string high = std::isfinite(spec.upper) ? show(spec.upper) : "infinity";
+  return (spec.lower_open || !std::isfinite(spec.lower) ? "(" : "[") + low + ", " + high +
+         (spec.upper_open || !std::isfinite(spec.upper) ? ")" : "]");
 }
 
 std::string unit_hint(double value, const NumberSpec& spec) {
@@ -184,7 +180,7 @@ std::optional<double> ConfigReader::value_of(const YamlNode& node, const std::st
   const std::optional<double> value = finite(node, name);
   if (!value) return std::nullopt;
   if (!spec.contains(*value)) {
-    problems.add(node.where, name + " = " + show(*value) + " is outside " + spec.range(), unit_hint(*value, spec));
+    problems.add(node.where, name + " = " + show(*value) + " is outside " + range_of(spec), unit_hint(*value, spec));
     return std::nullopt;
   }
   return value;
@@ -274,7 +270,8 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
         for (int i = 0; i < 2; ++i) {
           const double bound = i == 0 ? *low : *high;
           if (!closed.contains(bound))
-            problems.add(fit_node->items[i].where, name + " fit bound " + show(bound) + " is outside " + closed.range(),
+            problems.add(fit_node->items[i].where,
+                         name + " fit bound " + show(bound) + " is outside " + range_of(closed),
                          unit_hint(bound, closed));
         }
         if (value && (*value < *low || *value > *high))

@@ -3,6 +3,7 @@
 // choice of words. Every mistake goes to `problems` and reading goes on with a harmless stand-in, so that one run
 // reports all of them.
 
+#include <algorithm>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -13,26 +14,13 @@
 #include <vector>
 
 #include "birefit/io.h"
+#include "birefit/number_spec.h"
 #include "io/yaml.h"
 
 namespace birefit {
 
-/// What a number may be: unit, range, which of its limits are nature's own, and whether `fit: auto` makes sense.
-struct NumberSpec {
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-  std::string unit;  ///< "um", "nm", "deg", "K", "V", "px" or ""
-  double lower = -kInfinity, upper = kInfinity;
-  bool lower_open = false, upper_open = false;
-  double physical_lower = -kInfinity, physical_upper = kInfinity;  ///< see Parameter
-  bool automatic = false;                                          ///< `fit: auto` is accepted
-  bool linear = false;                                             ///< gain and offset
-  bool percent = false;                                            ///< often given as a percentage by mistake
-  bool fixed = false;                                              ///< cannot be fitted
-
-  bool contains(double value) const;
-  std::string range() const;  ///< "(0, 10000]"
-};
+/// "(0, 10000]".
+std::string range_of(const NumberSpec& spec);
 
 /// The value most likely meant by one outside the range: a lost sign, nm for um, Celsius for kelvin. "" when none is.
 std::string unit_hint(double value, const NumberSpec& spec);
@@ -83,6 +71,12 @@ class ConfigReader {
   Block block_of(const YamlNode& node, const std::string& path, const std::vector<std::string>& known);
   void check_keys(const YamlNode& node, const std::string& path, const std::vector<std::string>& known);
   void missing(const Block& block, const std::string& key, const std::string& hint = {});
+
+  /// A key stands in the block, or every micrograph sets it.
+  bool given(const Block& block, const std::string& key) const {
+    return block.find(key) ||
+           std::find(set_everywhere.begin(), set_everywhere.end(), block.path_of(key)) != set_everywhere.end();
+  }
 
   /// A number or parameter; without a fallback it is required.
   ParameterRef number(const Block& block, const std::string& key, const NumberSpec& spec,

@@ -2,22 +2,14 @@
 
 #include <algorithm>
 
+#include "io/described.h"
 #include "io/table.h"
 
 namespace birefit {
 
 void read_ring_view(ConfigReader& reader, const Block& view, Plate& plate) {
-  NumberSpec distance;
-  distance.unit = "um";
-  distance.lower = 0;
-  distance.lower_open = true;
-  distance.upper = 1e8;
-  distance.physical_lower = 0;
-  plate.screen_distance_um = reader.number(view, "screen_distance_um", distance);
-  NumberSpec offset;
-  offset.lower = -100;
-  offset.upper = 100;
-  plate.ring_offset = reader.number(view, "ring_offset", offset, 0);
+  plate.screen_distance_um = reader.number(view, "screen_distance_um", described<Plate>("view.screen_distance_um"));
+  plate.ring_offset = reader.number(view, "ring_offset", described<Plate>("view.ring_offset"), 0);
 }
 
 bool has_ring_table(const Scene& scene) {

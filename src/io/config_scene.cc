@@ -12,7 +12,7 @@
 #include "io/config_microscope.h"
 #include "io/config_rings.h"
 #include "io/config_volume.h"
-#include "io/number_specs.h"
+#include "io/described.h"
 #include "io/table.h"
 #include "transport/method.h"
 
@@ -52,93 +52,13 @@ std::optional<std::string> one_kind(ConfigReader& reader, const Block& block, co
   return std::nullopt;
 }
 
-UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
-  UniformDirector director;
-  const Block block = reader.block(parent, "uniform", {"axis", "azimuth_deg", "tilt_deg"}, true);
-  const YamlNode* axis = block.find("axis");
-  if (axis) {
-    if (block.find("azimuth_deg") || block.find("tilt_deg"))
-      reader.problems.add(axis->where, block.path + " has an axis and angles", "give one of the two");
-    if (!axis->is_sequence() || axis->items.size() != 3) {
-      reader.problems.add(axis->where,
-                          "axis must be three components [x, y, z], found " +
-                              (axis->is_sequence() ? std::to_string(axis->items.size()) + " items" : axis->describe()));
-      return director;
-    }
-    double square = 0;
-    for (int i = 0; i < 3; ++i) {
-      const char* const letters[] = {"x", "y", "z"};
-      director.axis[i] =
-          reader.number_at(axis->items[i], block.path_of("axis") + "." + letters[i], number_within(-1e6, 1e6));
-      square += std::pow(reader.table[director.axis[i]].value, 2);
-    }
-    if (square == 0) reader.problems.add(axis->where, "axis = [0, 0, 0] has no direction");
-    return director;
-  }
-  if (block.node && !block.find("azimuth_deg") && !block.find("tilt_deg")) {
-    reader.problems.add(block.where, block.path + " needs an axis: [x, y, z] or azimuth_deg and tilt_deg");
-    return director;
-  }
-  director.azimuth_deg = reader.number(block, "azimuth_deg", angle(), 0);
-  director.tilt_deg = reader.number(block, "tilt_deg", angle(), 0);
-  return director;
-}
-
-/// The reduced field, or the applied one with the two numbers that reduce it.
-AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
-  AxialDirector axial;
-  const Block block = reader.block(parent, "axial",
-                                   {"reduced_field", "field_v_per_um", "coherence_voltage_v", "local_field_factor",
-                                    "ring_radius", "branch", "field_azimuth_deg"},
-                                   true);
-  const YamlNode *reduced = block.find("reduced_field"), *applied = block.find("field_v_per_um");
-  if (reduced && applied)
-    reader.problems.add(applied->where, block.path + " has a reduced field and an applied one", "give one of the two");
-  if (!reduced && !applied)
-    reader.missing(block, "reduced_field",
-                   "radius over coherence length, 0 without a field; or field_v_per_um with coherence_voltage_v and "
-                   "local_field_factor");
-  if (reduced) {
-    NumberSpec e = number_within(0, 60);
-    e.physical_lower = 0;
-    axial.reduced_field = reader.number(block, "reduced_field", e);
-    for (const char* other : {"coherence_voltage_v", "local_field_factor"})
-      if (const YamlNode* node = block.find(other))
-        reader.problems.add(node->where, std::string(other) + " has no effect on a reduced field",
-                            "leave it out, or give field_v_per_um");
-  } else if (applied) {
-    NumberSpec field = number_within(0, 100);
-    field.unit = "V/um";
-    field.physical_lower = 0;
-    axial.field_v_per_um = reader.number(block, "field_v_per_um", field);
-    NumberSpec voltage = number_within(0, 10);
-    voltage.unit = "V";
-    voltage.lower_open = true;
-    axial.coherence_voltage_v = reader.number(block, "coherence_voltage_v", voltage);
-    axial.local_field_factor = reader.number(block, "local_field_factor", number_within(0.01, 3));
-  }
-  if (block.find("field_azimuth_deg")) axial.field_azimuth_deg = reader.number(block, "field_azimuth_deg", angle());
-  if (block.find("ring_radius")) axial.ring_radius = reader.number(block, "ring_radius", number_within(0.2, 0.995));
-  const std::string branch =
-      reader.choice(block, "branch", {"hedgehog", "ring", "compare"}).value_or(axial.ring_radius ? "ring" : "hedgehog");
-  axial.compare = branch == "compare";
-  if (branch == "hedgehog" && axial.ring_radius)
-    reader.problems.add(block.find("ring_radius")->where, "a hedgehog has no ring_radius",
-                        "leave it out, or write branch: compare");
-  if (branch != "hedgehog" && !axial.ring_radius)
-    reader.missing(block, "ring_radius",
-                   "the ring's radius over the droplet's, for example {value: 0.9, fit: [0.6, 0.99]}");
-  return axial;
-}
-
 Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   Droplet droplet;
   const Block block = reader.block(parent, "droplet", {"diameter_um", "director"}, true);
-  NumberSpec diameter = open_length(10000);
-  diameter.automatic = true;
-  droplet.diameter_um = reader.number(block, "diameter_um", diameter);
-  const Block director = reader.block(block, "director", {"radial", "bipolar", "axial"}, true);
-  const auto kind = one_kind(reader, director, {"radial", "axial", "bipolar"});
+  droplet.diameter_um = read_described<Droplet>(reader, block, "diameter_um");
+  const std::vector<std::string> kinds = KindsOf<decltype(Droplet::director)>::keys();
+  const Block director = reader.block(block, "director", kinds, true);
+  const auto kind = one_kind(reader, director, kinds);
   if (kind == "axial") {
     droplet.director = read_axial(reader, director);
     return droplet;
@@ -146,10 +66,7 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   if (kind == "bipolar") {
     BipolarDirector bipolar;
     if (director.find("bipolar")->kind != YamlNode::Kind::null) {
-      const Block poles = reader.block(director, "bipolar", {"azimuth_deg", "tilt_deg", "pole_distance"}, true);
-      bipolar.azimuth_deg = reader.number(poles, "azimuth_deg", angle(), 0);
-      bipolar.tilt_deg = reader.number(poles, "tilt_deg", angle_within(-90, 90), 0);
-      bipolar.pole_distance = reader.number(poles, "pole_distance", number_within(1, 1000), 1);
+      read_numbers(reader, reader.block(director, "bipolar", described_keys<BipolarDirector>(), true), bipolar);
     }
     droplet.director = bipolar;
     return droplet;
@@ -159,9 +76,10 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
     const YamlNode* node = director.find("radial");
     if (node->kind == YamlNode::Kind::null) return droplet;
   }
-  const Block radial = reader.block(director, "radial", {"twist_deg"}, false);
   // No twist is a simpler scene, not a twist of zero: its transport is diagonal.
-  if (radial.find("twist_deg")) droplet.director = RadialDirector{reader.number(radial, "twist_deg", angle(), 0)};
+  RadialDirector radial;
+  read_numbers(reader, reader.block(director, "radial", described_keys<RadialDirector>(), false), radial);
+  droplet.director = radial;
   return droplet;
 }
 
@@ -171,14 +89,12 @@ Droplet read_shell(ConfigReader& reader, const Block& parent) {
   ShellDirector shell;
   const Block block =
       reader.block(parent, "shell", {"diameter_um", "wall_um", "core_offset_um", "director", "core"}, true);
-  NumberSpec diameter = open_length(10000);
-  diameter.automatic = true;
-  droplet.diameter_um = reader.number(block, "diameter_um", diameter);
-  shell.wall_um = reader.number(block, "wall_um", open_length(5000));
+  droplet.diameter_um = read_described<Droplet>(reader, block, "diameter_um");
+  shell.wall_um = read_described<ShellDirector>(reader, block, "wall_um");
   const Block director = reader.block(block, "director", {"radial"}, false);
   if (director.node) one_kind(reader, director, {"radial"});
   const Block core = reader.block(block, "core", {"index"}, false);
-  if (core.find("index")) shell.core_index = reader.number(core, "index", index_spec());
+  if (core.find("index")) shell.core_index = reader.number(core, "index", described<ShellDirector>("core.index"));
   double away = 0;
   if (const YamlNode* offset = block.find("core_offset_um")) {
     if (!offset->is_sequence() || offset->items.size() != 3) {
@@ -189,10 +105,8 @@ Droplet read_shell(ConfigReader& reader, const Block& parent) {
       bool zero = true;
       for (std::size_t i = 0; i < 3; ++i) {
         const char* const letters[] = {"x", "y", "z"};
-        NumberSpec spec = number_within(-5000, 5000);
-        spec.unit = "um";
-        shell.offset_um[i] =
-            reader.number_at(offset->items[i], block.path_of("core_offset_um") + "." + letters[i], spec);
+        shell.offset_um[i] = reader.number_at(offset->items[i], block.path_of("core_offset_um") + "." + letters[i],
+                                              described<ShellDirector>("core_offset_um"));
         const Parameter& p = reader.table[shell.offset_um[i]];
         away += std::pow(p.value, 2);
         zero = zero && p.value == 0 && !p.free;
@@ -219,17 +133,15 @@ Droplet read_shell(ConfigReader& reader, const Block& parent) {
 Cell read_cell(ConfigReader& reader, const Block& parent) {
   Cell cell;
   const Block block = reader.block(parent, "cell", {"thickness_um", "director"}, true);
-  cell.thickness_um = reader.number(block, "thickness_um", open_length(10000));
-  const Block director = reader.block(block, "director", {"uniform", "twisted", "freedericksz", "helix"}, true);
-  const auto kind = one_kind(reader, director, {"uniform", "twisted", "freedericksz", "helix"});
+  cell.thickness_um = read_described<Cell>(reader, block, "thickness_um");
+  const std::vector<std::string> kinds = KindsOf<decltype(Cell::director)>::keys();
+  const Block director = reader.block(block, "director", kinds, true);
+  const auto kind = one_kind(reader, director, kinds);
   if (kind == "uniform") {
     cell.director = read_uniform(reader, director);
   } else if (kind == "twisted") {
-    const Block twisted = reader.block(director, "twisted", {"twist_deg", "azimuth_deg", "pretilt_deg"}, true);
     TwistedDirector field;
-    field.twist_deg = reader.number(twisted, "twist_deg", angle());
-    field.azimuth_deg = reader.number(twisted, "azimuth_deg", angle(), 0);
-    field.pretilt_deg = reader.number(twisted, "pretilt_deg", angle_within(-90, 90), 0);
+    read_numbers(reader, reader.block(director, "twisted", described_keys<TwistedDirector>(), true), field);
     cell.director = field;
   } else if (kind == "freedericksz") {
     cell.director = read_freedericksz(reader, director);
@@ -239,22 +151,12 @@ Cell read_cell(ConfigReader& reader, const Block& parent) {
   return cell;
 }
 
-ParameterRef read_half_angle(ConfigReader& reader, const Block& view) {
-  NumberSpec half_angle = angle_within(0, 80);
-  half_angle.lower_open = true;
-  return reader.number(view, "half_angle_deg", half_angle);
-}
-
 /// `camera` of a view in a cone.
 std::optional<SideCamera> read_side_camera(ConfigReader& reader, const Block& view) {
   if (!view.find("camera")) return std::nullopt;
-  const Block block = reader.block(view, "camera", {"tilt_x_deg", "tilt_y_deg", "half_field_deg"}, true);
-  NumberSpec half_field = angle_within(0, 60);
-  half_field.physical_lower = 0;
+  const Block block = reader.block(view, "camera", described_keys<SideCamera>(), true);
   SideCamera camera;
-  camera.tilt_x_deg = reader.number(block, "tilt_x_deg", angle_within(-80, 80), 0);
-  camera.tilt_y_deg = reader.number(block, "tilt_y_deg", angle_within(-80, 80), 0);
-  camera.half_field_deg = reader.number(block, "half_field_deg", half_field, 0);
+  read_numbers(reader, block, camera);
   const Parameter &x = reader.table[camera.tilt_x_deg], &y = reader.table[camera.tilt_y_deg],
                   &field = reader.table[camera.half_field_deg];
   const bool square = x.value == 0 && y.value == 0;
@@ -270,36 +172,23 @@ std::optional<SideCamera> read_side_camera(ConfigReader& reader, const Block& vi
 Plate read_plate(ConfigReader& reader, const Block& parent, View& shown) {
   Plate plate;
   const Block block = reader.block(parent, "plate", {"thickness_um", "director", "heat", "view"}, true);
-  plate.thickness_um = reader.number(block, "thickness_um", open_length(100000));
+  plate.thickness_um = read_described<Plate>(reader, block, "thickness_um");
   const Block director = reader.block(block, "director", {"uniform"}, true);
   if (one_kind(reader, director, {"uniform"})) plate.director = read_uniform(reader, director);
   if (block.find("heat")) {
-    const Block heat = reader.block(
-        block, "heat", {"fourier_number", "time_s", "diffusivity_mm2_s", "cold_k", "hot_k", "initial_k"}, true);
-    NumberSpec fourier = number_within(0, 1e4);
-    fourier.lower_open = true;
-    fourier.physical_lower = 0;
+    const Block heat = reader.block(block, "heat", described_keys<HeatStep>(), true);
     HeatStep step;
     const YamlNode* time = heat.find("time_s");
     if (time && heat.find("fourier_number"))
       reader.problems.add(time->where, "time_s is given beside fourier_number",
                           "give one of the two: fourier_number = diffusivity * time / thickness^2");
-    if (time) {
-      NumberSpec seconds = number_within(0, 1e9), diffusivity = number_within(0, 1e4);
-      seconds.lower_open = diffusivity.lower_open = true;
-      seconds.unit = "s";
-      diffusivity.unit = "mm2/s";
-      step.time_s = reader.number(heat, "time_s", seconds);
-      step.diffusivity_mm2_s = reader.number(heat, "diffusivity_mm2_s", diffusivity);
-    } else {
-      step.fourier_number = reader.number(heat, "fourier_number", fourier);
-      if (const YamlNode* node = heat.find("diffusivity_mm2_s"))
-        reader.problems.add(node->where, "diffusivity_mm2_s has no effect on a Fourier number",
-                            "give time_s in place of fourier_number");
-    }
-    if (heat.find("initial_k")) step.initial_k = reader.number(heat, "initial_k", kelvin());
-    step.cold_k = reader.number(heat, "cold_k", kelvin());
-    step.hot_k = reader.number(heat, "hot_k", kelvin());
+    const YamlNode* diffusivity = heat.find("diffusivity_mm2_s");
+    if (time && !reader.given(heat, "diffusivity_mm2_s")) reader.missing(heat, "diffusivity_mm2_s");
+    if (!time && heat.node && !reader.given(heat, "fourier_number")) reader.missing(heat, "fourier_number");
+    if (!time && diffusivity)
+      reader.problems.add(diffusivity->where, "diffusivity_mm2_s has no effect on a Fourier number",
+                          "give time_s in place of fourier_number");
+    read_numbers(reader, heat, step);
     plate.heat = step;
   }
   const Block view =
@@ -308,7 +197,7 @@ Plate read_plate(ConfigReader& reader, const Block& parent, View& shown) {
     if (const YamlNode* node = view.find("ring_offset"))
       reader.problems.add(node->where, "ring_offset belongs to a table of rings",
                           "give screen_distance_um too, or leave it out");
-    plate.half_angle_deg = read_half_angle(reader, view);
+    plate.half_angle_deg = reader.number(view, "half_angle_deg", described<Plate>("view.half_angle_deg"));
     shown.camera = read_side_camera(reader, view);
     return plate;
   }
@@ -338,28 +227,15 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
                                    {"half_wave_voltage_v", "bias_v", "built_in_bias_v", "field_along", "slow_axis_deg",
                                     "field_legendre", "electrodes_px"},
                                    true);
-  NumberSpec half_wave;
-  half_wave.unit = "V";
-  half_wave.lower = 0;
-  half_wave.lower_open = true;
-  half_wave.upper = 1e7;
-  half_wave.physical_lower = 0;
-  crystal.half_wave_voltage_v = reader.number(block, "half_wave_voltage_v", half_wave);
-  NumberSpec bias;  // the sign is not observable: the magnitude is asked for
-  bias.unit = "V";
-  bias.lower = 0;
-  bias.upper = 1e7;
-  bias.physical_lower = 0;
-  crystal.bias_v = reader.number(block, "bias_v", bias);
-  NumberSpec built_in;  // against the bias as well
-  built_in.unit = "V";
-  built_in.lower = -1e7;
-  built_in.upper = 1e7;
-  if (block.find("built_in_bias_v")) crystal.built_in_bias_v = reader.number(block, "built_in_bias_v", built_in);
+  for (const auto& [key, ref] :
+       {std::pair("half_wave_voltage_v", &crystal.half_wave_voltage_v), std::pair("bias_v", &crystal.bias_v),
+        std::pair("built_in_bias_v", &crystal.built_in_bias_v)})
+    *ref = read_described<Crystal>(reader, block, key);
   if (!block.find("field_along"))
     reader.missing(block, "field_along", "x or y, the direction of the field in the image");
   crystal.field_along_y = reader.choice(block, "field_along", {"x", "y"}).value_or("y") == "y";
-  crystal.slow_axis_deg = reader.number(block, "slow_axis_deg", angle(), crystal.field_along_y ? 135 : 45);
+  crystal.slow_axis_deg =
+      reader.number(block, "slow_axis_deg", described<Crystal>("slow_axis_deg"), crystal.field_along_y ? 135 : 45);
   if (const YamlNode* coefficients = block.find("field_legendre")) {
     if (!coefficients->is_sequence() || coefficients->items.size() > 20) {
       reader.problems.add(coefficients->where,
@@ -370,7 +246,7 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
       for (std::size_t i = 0; i < coefficients->items.size(); ++i)
         crystal.field_legendre.push_back(reader.number_at(
             coefficients->items[i], block.path_of("field_legendre") + "[" + std::to_string(i + 1) + "]",
-            number_within(-100, 100)));
+            described<Crystal>("field_legendre")));
     }
   }
   if (const YamlNode* electrodes = block.find("electrodes_px")) {
@@ -381,8 +257,7 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
                                                          : electrodes->describe()));
     } else {
       const std::size_t problems_before = reader.problems.all().size();
-      NumberSpec pixel = number_within(-1e6, 1e6);
-      pixel.unit = "px";
+      const NumberSpec pixel = described<Crystal>("electrodes_px.low");
       crystal.electrode_low_px = reader.number_at(electrodes->items[0], block.path_of("electrodes_px.low"), pixel);
       crystal.electrode_high_px = reader.number_at(electrodes->items[1], block.path_of("electrodes_px.high"), pixel);
       const bool readable = reader.problems.all().size() == problems_before;
@@ -398,7 +273,7 @@ Slab read_slab(ConfigReader& reader, const Block& parent, View& shown) {
   const Block block = reader.block(parent, "slab", {"profile", "interpolation", "view"}, true);
   if (block.find("view")) {
     const Block view = reader.block(block, "view", {"half_angle_deg", "camera"}, true);
-    slab.half_angle_deg = read_half_angle(reader, view);
+    slab.half_angle_deg = reader.number(view, "half_angle_deg", described<Slab>("view.half_angle_deg"));
     shown.camera = read_side_camera(reader, view);
   }
   const std::string interpolation =
@@ -516,9 +391,7 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
                             "give one of the two");
     if (!reader.choice(block, "name", {"E44-steinberg2020"})) return ConstantIndices{};
     const std::string validity = "where E44-steinberg2020 holds";
-    NumberSpec temperature = kelvin();
-    temperature.lower = 250;
-    temperature.upper = 373;
+    const NumberSpec temperature = described<E44Steinberg2020>("temperature_k");
     E44Steinberg2020 material;
     if (!heat) {
       material.temperature_k = reader.number(block, "temperature_k", temperature);
@@ -540,13 +413,7 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
     reader.problems.add(block.where, "sample.plate.heat has no effect on constant indices",
                         "use material: {name: E44-steinberg2020} or add haller, or leave heat out");
   ConstantIndices material;
-  material.ordinary = reader.number(block, "ordinary", index_spec());
-  material.birefringence = reader.number(block, "birefringence", number_within(-1, 1));
-  if (block.find("resonance_nm")) {
-    NumberSpec resonance = number_within(50, 20000);
-    resonance.unit = "nm";
-    material.resonance_nm = reader.number(block, "resonance_nm", resonance);
-  }
+  read_numbers(reader, block, material);
   const double extraordinary = reader.table[material.ordinary].value + reader.table[material.birefringence].value;
   if (extraordinary < 1 && reader.problems.empty())
     reader.problems.add(block.where, "ordinary + birefringence = " + show(extraordinary) + " is below 1");
@@ -582,7 +449,7 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   if (*kind == "crystal" || *kind == "disc") {
     if (const YamlNode* node = block.find("surround"))
       reader.problems.add(node->where, "unknown key surround: a " + *kind + " needs none");
-    scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
+    scene.surround_index = reader.constant("sample.surround.index", numbers::index(), 1.0);
     reader.specs.erase("sample.surround.index");
     return;
   }
@@ -590,15 +457,15 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   if (surround.find("file")) {
     scene.surround_dispersion = read_surround_file(reader, surround);
   } else if (surround.node || *kind == "droplet") {
-    scene.surround_index = reader.number(surround, "index", index_spec());
+    scene.surround_index = reader.number(surround, "index", numbers::index());
   } else {
-    scene.surround_index = reader.constant("sample.surround.index", index_spec(), 1.0);
+    scene.surround_index = reader.constant("sample.surround.index", numbers::index(), 1.0);
   }
 }
 
 void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   const Block accuracy = reader.block(root, "accuracy", {"intensity"}, false);
-  scene.intensity_accuracy = reader.plain(accuracy, "intensity", number_within(1e-12, 0.1)).value_or(1e-4);
+  scene.intensity_accuracy = reader.plain(accuracy, "intensity", numbers::within(1e-12, 0.1)).value_or(1e-4);
 
   const Block physics = reader.block(root, "physics", {"ceiling", "rays", "max_seconds"}, false);
   if (const YamlNode* rays = physics.find("rays")) {
@@ -627,7 +494,7 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   if (name == "wave" && sampled && !scene.surround_index && !scene.surround_dispersion)
     reader.problems.add(ceiling->where, "ceiling: wave needs sample.surround",
                         "the index of what is around the box, and in it where the file has no liquid crystal");
-  if (name == "wave" && (sphere || sampled) && scene.microscope.objective_na == 0)
+  if (name == "wave" && (sphere || sampled) && !scene.microscope.objective_na)
     reader.problems.add(ceiling->where, "ceiling: wave needs microscope.objective_na",
                         "the number engraved on the objective; without it use one_way");
   if (name == "wave" && physics.find("rays"))
@@ -637,7 +504,7 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
                   : name == "wave"        ? Ceiling::wave
                                           : Ceiling::one_way;
   if (physics.find("max_seconds")) {
-    NumberSpec seconds = number_within(0, 1e7);
+    NumberSpec seconds = numbers::within(0, 1e7);
     seconds.unit = "s";
     reader.max_seconds = reader.plain(physics, "max_seconds", seconds).value_or(60);
   }
@@ -651,7 +518,7 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   const bool defocused = is_defocused(reader, scene);
   // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays. Only waves
   // know defocus.
-  if (name == "auto" && sphere && scene.microscope.objective_na > 0 && !physics.find("rays") &&
+  if (name == "auto" && sphere && scene.microscope.objective_na && !physics.find("rays") &&
       (scene.method == "auto" || wave_method)) {
     if (defocused || wave_method)
       scene.ceiling = Ceiling::wave;

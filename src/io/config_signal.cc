@@ -322,7 +322,7 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
       const double value = row.set[c];
       if (!columns[c].spec->contains(value))
         reader.problems.add({file, line, text.rows[row.number][static_cast<std::size_t>(columns[c].at)].column},
-                            item.columns[c].name + " = " + show(value) + " is outside " + columns[c].spec->range() +
+                            item.columns[c].name + " = " + show(value) + " is outside " + range_of(*columns[c].spec) +
                                 ", the range of " + item.columns[c].path);
       const std::string name =
           "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;

@@ -1,5 +1,6 @@
 #include "io/config_volume.h"
 
+#include "io/described.h"
 #include "io/volume_file.h"
 
 namespace birefit {
@@ -7,11 +8,7 @@ namespace birefit {
 SampledVolume read_sampled_volume(ConfigReader& reader, const Block& parent) {
   SampledVolume volume;
   const Block block = reader.block(parent, "volume", {"file", "axes", "spacing_um", "bulk_order", "scale"}, true);
-  NumberSpec scale;
-  scale.lower = scale.physical_lower = 0;
-  scale.lower_open = true;
-  scale.upper = 1e6;
-  volume.scale = reader.number(block, "scale", scale, 1);
+  volume.scale = read_described<SampledVolume>(reader, block, "scale");
   VolumeRequest request;
   const std::optional<std::string> axes = reader.choice(block, "axes", {"zyx", "xyz"});
   request.x_first = axes.value_or("zyx") == "xyz";

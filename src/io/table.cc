@@ -164,8 +164,7 @@ std::string describe_left_out(const std::string& name, const std::vector<int>& l
     list += (i == 0 ? "" : ", ") + std::to_string(lines[i]);
   if (lines.size() > kShown) list += ", ..";
   return name + ": " + std::to_string(lines.size()) + (lines.size() == 1 ? " row" : " rows") +
-         " without a number left out (" +
-         (lines.size() == 1 ? "line " : "lines ") + list + ").";
+         " without a number left out (" + (lines.size() == 1 ? "line " : "lines ") + list + ").";
 }
 
 TextTable load_text_table(const std::filesystem::path& path, const Where& where, Problems& problems, bool numbered) {

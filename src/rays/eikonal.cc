@@ -259,9 +259,9 @@ T moving_root(double at, const T& f, double slope) {
 }  // namespace
 
 template <class S>
-EikonalFan<S>::EikonalFan(const DropletOptics<S>& o, bool extraordinary, double objective_na)
+EikonalFan<S>::EikonalFan(const DropletOptics<S>& o, bool extraordinary, const S& objective_na)
     : extraordinary_(extraordinary),
-      objective_na_(objective_na),
+      objective_na_(lane_of(objective_na, 0)),
       host_(lane_of(o.n_host, 0)),
       radius_um_(o.radius_um),
       path_phase_(o.k0 * o.radius_um * o.n_o) {
@@ -515,11 +515,11 @@ void EikonalFan<S>::find_ends() {
     if (i == 0 || panels_[i - 1].inner != panel.outer) add_end(panel, -1, One(0.0));
     if ((i + 1 == panels_.size() || panels_[i + 1].outer != panel.inner) && panel.inner > 0)
       add_end(panel, 1, One(0.0));
-    if (objective_na_ <= 0) continue;
+    if (plain(objective_na_) <= 0) continue;
     // Where rays begin or cease to be turned too far for the aperture.
     const double* turn = panel.coefficients.data() + kTurn * kPoints;
     const auto beyond = [&](double x) {
-      return std::abs(std::sin(horner<kPoints>(turn, x).first)) * plain(host_) > objective_na_;
+      return std::abs(std::sin(horner<kPoints>(turn, x).first)) * plain(host_) > plain(objective_na_);
     };
     constexpr int kSteps = 24;
     for (int k = 0; k < kSteps; ++k) {
@@ -584,7 +584,7 @@ auto EikonalFan<S>::read(const One& rho) const -> EikonalRay<One> {
   EikonalRay<One> ray;
   sin_cos(moved(kTurn), ray.sin_turn, ray.cos_turn);
   ray.phase_rad = moved(kPath);
-  if (objective_na_ > 0 && std::abs(plain(ray.sin_turn)) * plain(host_) > objective_na_) return none;
+  if (plain(objective_na_) > 0 && std::abs(plain(ray.sin_turn)) * plain(host_) > plain(objective_na_)) return none;
   // Flux through the mid plane: b db / (rho drho) of what came in, b = sin psi.
   const One ratio2 = square(moved(kRatio)), off2 = square(One(axis_ray_ / s1));
   const One tube = c1 * psi_slope * inverse(slope) * inverse_root(root(ratio2 * ratio2 + off2 * off2));

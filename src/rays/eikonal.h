@@ -70,7 +70,7 @@ template <class S>
 class EikonalFan {
  public:
   /// objective_na 0: all rays that leave.
-  EikonalFan(const DropletOptics<S>&, bool extraordinary, double objective_na);
+  EikonalFan(const DropletOptics<S>&, bool extraordinary, const S& objective_na);
   /// rho_um in the mid plane, where the ray's backward extension meets it.
   EikonalRay<S> at(const S& rho_um) const;
   int rays() const { return rays_; }  ///< that were traced
@@ -133,8 +133,7 @@ class EikonalFan {
   EikonalRay<One> read(const One& rho) const;
 
   bool extraordinary_;
-  double objective_na_;
-  One host_;
+  One objective_na_, host_;
   MeridionalDroplet<T> droplet_;
   One shape_[kShape];
   S radius_um_, path_phase_;   ///< the latter of one unit of path, rad

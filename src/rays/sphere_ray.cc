@@ -107,6 +107,7 @@ DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
   o.n_host = host_index(scene, value);
   o.ratio = o.n_host / o.n_o;
   o.k0 = wavenumber_per_um(scene, value);
+  o.objective_na = value.get(scene.microscope.objective_na, 0.0);
   using Director = typename DropletOptics<S>::Director;
   if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) {
     if (radial->twist_deg) o.director = Director::twisted, o.twist_rad = value.radians(radial->twist_deg);

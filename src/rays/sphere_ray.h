@@ -51,6 +51,7 @@ class RimTable {
 template <class S>
 struct DropletOptics {
   S radius_um, n_o, n_e, n_host, ratio, k0;
+  S objective_na = S(0.0);  ///< 0: not stated, all rays are collected
   enum class Director { radial, twisted, axial, shell } director = Director::radial;
   S twist_rad = S(0.0);                     // not {0.0}: a pack would take that for a list of lanes
   S core_um = S(0.0), core_index = S(1.0);  ///< of a shell's core: radius and index
@@ -85,9 +86,9 @@ DropletRay<S> ray_at(const S& psi, const S& ratio, const S& radius_um) {
 
 template <class S>
 DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value);
-/// rim.rho_max() with its derivatives by the indices.
+/// rim.rho_max() with its derivatives by the indices and the aperture (where it has one).
 template <class S>
-S rim_edge(const RimTable& rim, const S& ratio, const S& n_host) {
+S rim_edge(const RimTable& rim, const S& ratio, const S& n_host, const S& objective_na) {
   const double psi0 = rim.psi_max();
   if (rim.end() == RimTable::End::total_reflection)
     return ratio / (2.0 - ratio * ratio);  // sin psi = 1/m, 2 delta = 2 psi - pi
@@ -100,11 +101,22 @@ S rim_edge(const RimTable& rim, const S& ratio, const S& n_host) {
   // |sin 2 delta| is held: by the aperture at NA / n_host, or at its fixed limit. psi follows by one Newton step, which
   // is exact for value and first derivative.
   const double sign = lane(plain(sin_twice), 0) < 0 ? -1 : 1;
-  const S held = rim.objective_na() > 0 ? S(sign * rim.objective_na()) / n_host : S(plain(sin_twice));
+  const S held = rim.objective_na() > 0 ? S(sign * objective_na) / n_host : S(plain(sin_twice));
   const S slope = 2.0 * cos_twice * (1.0 - ratio * c1 / c2);
   const S change = (held - sin_twice) / slope;  // of psi
   const S tip = cos_twice - 2.0 * sin_twice * (1.0 - ratio * c1 / c2) * change;
   return (s1 + c1 * change) / tip;
+}
+
+/// The same of a droplet: in radii.
+template <class S>
+S rim_edge(const RimTable& rim, const DropletOptics<S>& o) {
+  return rim_edge(rim, o.ratio, o.n_host, o.objective_na);
+}
+/// The rays of a droplet, by its values.
+template <class S>
+RimTable rim_table(const DropletOptics<S>& o) {
+  return {lane(plain(o.ratio), 0), lane(plain(o.n_host), 0), lane(plain(o.objective_na), 0)};
 }
 
 /// Image radius (um) of the rays that touch a shell's core, where its picture has a kink; 0 where the rim comes first.

@@ -125,7 +125,8 @@ bool outgrown(const RenderPlan& now, const RenderPlan& before) {
   if (!now.wave || !before.wave)
     return static_cast<bool>(now.wave) != static_cast<bool>(before.wave) || outgrown_disc(now.disc, before.disc);
   const double ratio = now.wave->radius_um / before.wave->radius_um;
-  return ratio > 1.04 || ratio < 0.8;
+  // The pupil's grid ends 5 % beyond the aperture that it was made for.
+  return ratio > 1.04 || ratio < 0.8 || now.wave->objective_na > 1.04 * before.wave->objective_na;
 }
 
 Image image_by_march(const Scene& scene, const Theta& theta, int threads) {

@@ -1,5 +1,5 @@
 #pragma once
-// Every kind of sample by what it can do. A new one is a folder here, its struct in birefit/scene.h and a line in
+// Every kind of sample by what it can do. A new one is a folder here, its struct in birefit/sample.h and a line in
 // kinds.def.
 
 #include "samples/jones_table.h"

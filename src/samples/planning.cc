@@ -31,8 +31,9 @@ void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double
 
 void note_illumination(const Scene& scene, const Values<double>& value, double largest_phase, RenderPlan& plan) {
   const Microscope& m = scene.microscope;
-  if (m.bandwidth_nm > 0) {
-    const double s = largest_phase * m.bandwidth_nm / 2.355 / value(m.wavelength_nm);
+  const double bandwidth_nm = value.get(m.bandwidth_nm, 0.0), condenser_na = value.get(m.condenser_na, 0.0);
+  if (bandwidth_nm > 0) {
+    const double s = largest_phase * bandwidth_nm / 2.355 / value(m.wavelength_nm);
     const double loss = 0.5 * (1 - std::exp(-0.5 * s * s));
     plan.model_error = std::hypot(plan.model_error, loss);
     if (loss > 1e-3)
@@ -40,16 +41,16 @@ void note_illumination(const Scene& scene, const Values<double>& value, double l
           fmt::format("The light's bandwidth of {:g} nm is not modelled; at the largest retardance here ({:.3g} rad) "
                       "it changes the "
                       "intensity by up to {:.2g}.",
-                      m.bandwidth_nm, largest_phase, loss));
+                      bandwidth_nm, largest_phase, loss));
   }
-  if (m.condenser_na > 0) {
-    const double s = largest_phase * m.condenser_na * m.condenser_na / 8;  // mean phase shift over the cone, n ~ 1.5
+  if (condenser_na > 0) {
+    const double s = largest_phase * condenser_na * condenser_na / 8;  // mean phase shift over the cone, n ~ 1.5
     const double loss = std::min(0.5, 0.5 * std::abs(s));
     plan.model_error = std::hypot(plan.model_error, loss);
     if (loss > 1e-3)
       plan.warnings.push_back(
           fmt::format("The condenser's aperture (NA {:g}) is not modelled; it shifts the phase by about {:.2g} rad.",
-                      m.condenser_na, s));
+                      condenser_na, s));
   }
 }
 

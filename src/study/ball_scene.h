@@ -40,7 +40,7 @@ struct BallScene {
     scene.microscope.wavelength_nm = fixed("wavelength_nm", 590);
     scene.microscope.polarizer_deg = fixed("polarizer_deg", ball.polarizer_deg);
     scene.microscope.analyzer_deg = fixed("analyzer_deg", ball.analyzer_deg);
-    scene.microscope.objective_na = ball.objective_na;
+    scene.microscope.objective_na = fixed("objective_na", ball.objective_na);
     if (ball.focus_um != 0) scene.microscope.focus_um = fixed("focus_um", ball.focus_um);
     scene.view.width = scene.view.height = ball.pixels;
     scene.view.pixel_size_um = (2 * ball.radius_um + 4) / ball.pixels;

@@ -207,7 +207,7 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   });
   const bool tilted = light.kx_per_um != 0 || light.ky_per_um != 0;
   const double k0 = part(light.k0_per_um, 0);
-  const bool collected = std::hypot(light.kx_per_um, light.ky_per_um) <= m.objective_na * k0;
+  const bool collected = std::hypot(light.kx_per_um, light.ky_per_um) <= part(m.objective_na, 0) * k0;
   const Complex<S> direct = conj(m.ax) * light.ex + conj(m.ay) * light.ey;
   const auto direct_part = [&](int f) { return Z(part(direct.re, f), part(direct.im, f)); };
   // Intensity less that of the incident light, which is what remains outside.

@@ -20,7 +20,7 @@ WaveImaging plan_imaging(const WaveGrid&, double k0_per_um, double objective_na,
 
 template <class S>
 struct WaveMicroscope {
-  double objective_na = 0;
+  S objective_na = S(0.0);
   bool aplanatic = false;      ///< docs/conventions.md
   S focus_um = S(0.0);         ///< z of the focal plane
   Complex<S> ax, ay;           ///< the field that is let through, of unit length

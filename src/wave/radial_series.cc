@@ -239,9 +239,9 @@ S scattering_efficiency(const RadialSeries<S>& series) {
 }
 
 template <class S>
-RadialImage<S>::RadialImage(const RadialSeries<S>& series, double objective_na, const S& defocus_um, double rho_max_um,
-                            Pupil pupil, int nodes) {
-  assert(objective_na > 0 && rho_max_um >= 0);
+RadialImage<S>::RadialImage(const RadialSeries<S>& series, const S& objective_na, const S& defocus_um,
+                            double rho_max_um, Pupil pupil, int nodes) {
+  assert(plain(objective_na) > 0 && rho_max_um >= 0);
   const S k = series.k0 * series.n_host;
   // In theta nothing is singular, not even at 90 degrees: q dq / cos = k^2 sin d theta.
   const S edge = objective_na * inverse(series.n_host);

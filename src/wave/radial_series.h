@@ -88,7 +88,7 @@ class RadialImage {
   /// objective_na > 0; from n_host on the whole forward half space is accepted. The plane in focus lies defocus_um
   /// beyond the centre along the light. 0 <= rho_max_um bounds what may be asked later. `nodes` overrides the length of
   /// the rule.
-  RadialImage(const RadialSeries<S>& series, double objective_na, const S& defocus_um, double rho_max_um,
+  RadialImage(const RadialSeries<S>& series, const S& objective_na, const S& defocus_um, double rho_max_um,
               Pupil pupil = Pupil::focal_plane, int nodes = 0);
   /// 0 <= rho_um <= rho_max_um.
   RadialAmplitudes<S> operator()(const S& rho_um) const;

@@ -204,7 +204,7 @@ TEST(StressedDisc, BandwidthIsTheMeanOverTheLine) {
         testing::IndependentDisc one = d;
         one.load_n = load;
         DiscScene s = scene_of(one, 12, analyzer_deg);
-        s.scene.microscope.bandwidth_nm = bandwidth_nm;
+        if (bandwidth_nm > 0) s.scene.microscope.bandwidth_nm = s.t.fixed("bandwidth_nm", bandwidth_nm);
         testing::IndependentDisc heavy = d;  // one plan for all loads: the same points within a pixel
         heavy.load_n = 1.3 * d.load_n;
         const DiscScene most = scene_of(heavy, 12, analyzer_deg);

@@ -295,7 +295,7 @@ void expect_gradients(const Make& make, const Numbers& x, const std::vector<int>
   for (const int index : indices)
     for (const bool extraordinary : {true, false})
       for (const double rho : places) {
-        const EikonalFan<Dual1> fan(moved<Dual1>(make, x, index, 0), extraordinary, 0);
+        const EikonalFan<Dual1> fan(moved<Dual1>(make, x, index, 0), extraordinary, Dual1(0.0));
         const EikonalRay<Dual1> ray = fan.at(Dual1(rho));
         const auto differences = by_differences(
             [&](double by) { return EikonalFan<double>(moved<double>(make, x, index, by), extraordinary, 0).at(rho); },
@@ -477,7 +477,7 @@ struct Seen {
     scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
     scene.microscope.analyzer_deg = b.fixed("analyzer_deg", analyzer_deg);
-    scene.microscope.objective_na = na;
+    if (na > 0) scene.microscope.objective_na = b.fixed("objective_na", na);
     scene.microscope.aplanatic = true;
     scene.view.width = scene.view.height = 96;
     scene.view.pixel_size_um = 0.125;

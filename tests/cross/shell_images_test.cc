@@ -151,7 +151,7 @@ TEST(PeerShell, BendingRaysAtTheSphereGoesTowardsWaves) {
   scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
   scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 45);
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 135);
-  scene.microscope.objective_na = 0.8;
+  scene.microscope.objective_na = b.fixed("objective_na", 0.8);
   scene.view.width = scene.view.height = kSize;
   scene.view.pixel_size_um = kBox / kSize;
   scene.view.center_x_px = scene.view.center_y_px = b.fixed("center", 0.5 * (kSize - 1));

@@ -220,7 +220,7 @@ TEST(Volume, AgreesWithThinSlices) {
 Sampled sampled_waves(std::shared_ptr<const VolumeGrid> grid, double radius_um, double host) {
   Sampled s = sampled(std::move(grid), 0.18, 48, (2 * radius_um + 2) / 48);
   s.scene.ceiling = Ceiling::wave;
-  s.scene.microscope.objective_na = 0.5;
+  s.scene.microscope.objective_na = s.t.fixed("objective_na", 0.5);
   s.scene.surround_index = s.t.fixed("index", host);
   return s;
 }
@@ -313,9 +313,9 @@ TEST(Volume, WavesAreRefusedWhereSomethingIsMissing) {
   s.scene.method = "series";
   EXPECT_TRUE(refused("radial droplets"));
   s.scene.method = "auto";
-  s.scene.microscope.objective_na = 0;
+  s.scene.microscope.objective_na = {};
   EXPECT_TRUE(refused("objective_na"));
-  s.scene.microscope.objective_na = 0.5;
+  s.scene.microscope.objective_na = s.t.fixed("objective_na", 0.5);
   s.scene.surround_index = {};
   EXPECT_TRUE(refused("sample.surround"));
   s.scene.surround_index = s.t.fixed("index2", 1.5);

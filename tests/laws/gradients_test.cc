@@ -400,7 +400,7 @@ std::vector<Case> cases() {
     c.name += ", broad and uneven light";
     disc.illumination = {c.t.fixed("light_x", 0.4), c.t.fixed("light_y", -0.2), c.t.fixed("light_xx", 0.3)};
     c.scene.sample = disc;
-    c.scene.microscope.bandwidth_nm = 60;
+    c.scene.microscope.bandwidth_nm = c.t.fixed("bandwidth_nm", 60);
     all.push_back(c);
   }
   for (const std::string name : {"sampled field", "sampled field, E alone", "waves: sampled field"}) {
@@ -426,7 +426,7 @@ std::vector<Case> cases() {
     if (waves) {
       grid->nodes[9] = {};  // the host: a surface inside
       c.scene.ceiling = Ceiling::wave;
-      c.scene.microscope.objective_na = 0.6;
+      c.scene.microscope.objective_na = c.t.fixed("objective_na", 0.6);
       c.scene.microscope.focus_um = c.t.fixed("focus_um", 0.7);
     }
     all.push_back(c);
@@ -436,7 +436,7 @@ std::vector<Case> cases() {
                                  "waves: hedgehog in a field", "waves: eccentric shell"}) {
     Case c = base(name);
     c.scene.ceiling = Ceiling::wave;
-    c.scene.microscope.objective_na = 0.6;
+    c.scene.microscope.objective_na = c.t.fixed("objective_na", 0.6);
     c.scene.microscope.focus_um = c.t.fixed("focus_um", 0.7);
     c.scene.microscope.aplanatic = name == "waves: series of a shell" || name == "waves: bipolar";
     Droplet d;

@@ -427,7 +427,7 @@ TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
         s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
         s.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
         s.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
-        s.microscope.objective_na = na;
+        if (na > 0) s.microscope.objective_na = b.fixed("objective_na", na);
         const int size = std::min(200, 2 * static_cast<int>(0.7 * diameter / pixel) + 8);
         s.view.width = s.view.height = size;
         s.view.pixel_size_um = pixel;
@@ -503,7 +503,7 @@ TEST(RadialTable, TheRimMovesWithTheIndices) {
     n_o.d[0] = 1, n_host.d[1] = 1;
     const RimTable rim(c.n_host / c.n_o, c.n_host, c.na);
     ASSERT_EQ(rim.end(), c.end);
-    const D edge = rim_edge<D>(rim, n_host / n_o, n_host);
+    const D edge = rim_edge<D>(rim, n_host / n_o, n_host, D(c.na));
     EXPECT_NEAR(edge.value, rim.rho_max(), 1e-7);  // total reflection: the root of the bisection's 1e-16
     const double h = 1e-3;
     EXPECT_NEAR(edge.d[0], (rho_max(c.n_o + h, c.n_host) - rho_max(c.n_o - h, c.n_host)) / (2 * h), 1e-3) << c.na;

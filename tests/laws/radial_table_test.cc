@@ -59,7 +59,7 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
     s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
     s.microscope.polarizer_deg = b.fixed("polarizer_deg", 10);
     s.microscope.analyzer_deg = b.fixed("analyzer_deg", 83);
-    s.microscope.objective_na = c.na;
+    if (c.na > 0) s.microscope.objective_na = b.fixed("objective_na", c.na);
     s.view.width = s.view.height = 160;
     s.view.pixel_size_um = 0.07;
     s.view.center_x_px = b.fixed("center_x", 80.3);

@@ -61,6 +61,47 @@ TEST(PartsRecovery, ACompensatorBesideADroplet) {
   }
 }
 
+// The aperture of the objective, of a droplet by waves: the exact series and propagation.
+TEST(PartsRecovery, TheApertureOfADropletByWaves) {
+  for (const bool bipolar : {false, true}) {
+    constexpr int kSide = 48;
+    constexpr double kAperture = 0.62, kDiameter = 4.1;
+    TableBuilder b;
+    Scene scene;
+    Droplet droplet;
+    droplet.diameter_um = b.fitted("diameter_um", 4.0, 3.5, 4.6);
+    if (bipolar) droplet.director = BipolarDirector{b.fixed("poles_deg", 20), b.fixed("tilt_deg", 0), {}};
+    scene.sample = droplet;
+    scene.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fixed("birefringence", 0.15)};
+    scene.surround_index = b.fixed("surround", 1.5);
+    scene.ceiling = Ceiling::wave;
+    scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 560);
+    scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+    scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+    scene.microscope.objective_na = b.fitted("objective_na", 0.58, 0.5, 0.7);
+    scene.view.width = scene.view.height = kSide;
+    scene.view.pixel_size_um = 0.15;
+    scene.view.center_x_px = b.fixed("center_x", 23.2), scene.view.center_y_px = b.fixed("center_y", 23.9);
+    const ParameterRef gain = b.linear("gain", 1000), offset = b.linear("offset", 0);
+    Theta truth = b.table.values();
+    truth[static_cast<std::size_t>(droplet.diameter_um.index)] = kDiameter;
+    truth[static_cast<std::size_t>(scene.microscope.objective_na.index)] = kAperture;
+    std::vector<double> mean = render(scene, plan(scene, truth), truth).intensity.values();
+    for (double& value : mean) value = kOffset + kGain * value;
+    constexpr double kRead = 5, kPerPhoton = 0.5;
+    FitJob job;
+    job.measurements.push_back(
+        micrograph_of("image", scene, camera(mean, kPerPhoton, kRead, 7, false), gain, offset, {kRead, kPerPhoton}));
+    job.parameters = b.table;
+    job.options.threads = 1;
+    const FitResult r = fit(job);
+    ASSERT_TRUE(r.has_answer()) << r.verdict;
+    const ParameterEstimate* p = find_estimate(r, "objective_na");
+    EXPECT_LT(std::abs(p->value - kAperture), 5 * p->stderr_) << bipolar << ' ' << p->value << " +- " << p->stderr_;
+    EXPECT_LT(p->stderr_, 0.05) << bipolar;
+  }
+}
+
 /// A twisted cell behind a leaking analyser at several azimuths; truth by the closed matrix of a uniform twist: the
 /// light of the analyser and, divided by the ratio, of one across it.
 FitJob leaking_cell(double ratio, bool known_light) {

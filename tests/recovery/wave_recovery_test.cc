@@ -64,7 +64,7 @@ WaveDraw draw(unsigned seed, double largest_um, int size, double focus_um = 0) {
   s.microscope.wavelength_nm = d.b.fixed("wavelength_nm", 590);
   s.microscope.polarizer_deg = d.b.fixed("polarizer_deg", 30);
   s.microscope.analyzer_deg = d.b.fixed("analyzer_deg", 120);
-  s.microscope.objective_na = na;
+  s.microscope.objective_na = d.b.fixed("objective_na", na);
   s.view.width = s.view.height = size;
   const double px = s.view.pixel_size_um = (d.diameter + 4) / size, middle = 0.5 * (size - 1),
                cx = middle + between(-1, 1), cy = middle + between(-1, 1);
@@ -337,7 +337,7 @@ struct BipolarDraw {
     s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
     s.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
     s.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
-    s.microscope.objective_na = aperture;
+    s.microscope.objective_na = b.fixed("objective_na", aperture);
     s.view.width = s.view.height = kSize;
     s.view.pixel_size_um = (2 * radius + 3) / kSize;
     s.view.center_x_px = b.fitted("center_x", middle, middle - 3, middle + 3);

@@ -181,7 +181,7 @@ inline std::vector<Kind> every_kind() {
   for (const bool exactly : {true, false}) {
     Scene& scene = add(exactly ? "waves_series" : "waves_propagated", 160, 0.08, exactly ? radial : bipolar);
     scene.ceiling = Ceiling::wave;
-    scene.microscope.objective_na = 0.8;
+    scene.microscope.objective_na = all.back().number("objective_na", 0.8);
   }
   for (birefit::study::FrameScene& f : birefit::study::frame_scenes()) {
     if (std::holds_alternative<Droplet>(f.scene.sample)) continue;

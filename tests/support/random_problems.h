@@ -98,7 +98,7 @@ inline Posed pose(RandomProblem& p, const std::string& name, Ceiling ceiling = C
   for (Scene& scene : p.scenes) {
     if (ceiling != Ceiling::wave) continue;
     scene.ceiling = ceiling;
-    scene.microscope.objective_na = p.between(0.4, 0.9);
+    scene.microscope.objective_na = p.b.fixed("objective_na", p.between(0.4, 0.9));
   }
   posed.noise = kProblemGain * p.scaled(p.least_noise, 0.05);
   posed.truth = p.b.table.values();

@@ -117,8 +117,7 @@ DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
 /// traced.
 double rays_in_picture(const Scene& scene, const RenderPlan& plan, double radius_um, double index_ratio,
                        double host_index) {
-  const double radius_px =
-      radius_um * RimTable(index_ratio, host_index, scene.microscope.objective_na).rho_max() / scene.view.pixel_size_um;
+  const double radius_px = radius_um * RimTable(index_ratio, host_index, 0).rho_max() / scene.view.pixel_size_um;
   double rays = 0;
   for (int r = 0; r < scene.view.height; ++r)
     for (int c = 0; c < scene.view.width; ++c) {
@@ -189,7 +188,7 @@ void time_waves(int rounds) {
   for (const double diameter : {9.0, 20.0}) {
     DropletScene s = droplet_scene(false, 500, 1.42 * diameter / 500);
     s.table[std::get<Droplet>(s.scene.sample).diameter_um].value = diameter;
-    s.scene.microscope.objective_na = 0.8;
+    s.scene.microscope.objective_na = s.table.add_constant("objective_na", 0.8);
     const Theta theta = s.table.values();
     const RenderPlan rays = plan(s.scene, theta);
     s.scene.ceiling = Ceiling::wave;
@@ -436,7 +435,7 @@ void time_fit_by_waves() {
   bipolar.tilt_deg = s.table.add_constant("tilt_deg", 0);
   std::get<Droplet>(s.scene.sample).director = bipolar;
   s.scene.ceiling = Ceiling::wave;
-  s.scene.microscope.objective_na = 0.8;
+  s.scene.microscope.objective_na = s.table.add_constant("objective_na", 0.8);
   s.table[s.scene.surround_index].value = 1.5;
   const std::array<double, 4> truth{9.0, 0.12, 80.3, 79.2};
   for (std::size_t k = 0; k < truth.size(); ++k) s.table[s.four[k]].value = truth[k];
@@ -467,7 +466,7 @@ void time_fit(int size, int rounds, bool by_waves) {
   std::vector<double> mean;
   if (by_waves) {
     s.scene.ceiling = Ceiling::wave;
-    s.scene.microscope.objective_na = 0.75;
+    s.scene.microscope.objective_na = s.table.add_constant("objective_na", 0.75);
     const std::array<double, 4> values{9.3, 0.22, truth.center_x_px, truth.center_y_px};
     for (std::size_t k = 0; k < values.size(); ++k) s.table[s.four[k]].value = values[k];
     const Theta theta = s.table.values();

@@ -175,7 +175,7 @@ void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::Vecto
   const auto has_waves = [](const Sight& sight) {
     const Scene& scene = sight.picture->scene;
     return std::holds_alternative<Droplet>(scene.sample) && scene.ceiling == Ceiling::one_way &&
-           scene.microscope.objective_na > 0;
+           scene.microscope.objective_na;
   };
   const FitJob& job = task.job;
   if (optimum.stopped || task.unknowns.searched.empty() ||

@@ -1,5 +1,5 @@
 #pragma once
-// A cholesteric helix partly unwound by a field across it (HelixDirector of scene.h). u = depth / thickness.
+// A cholesteric helix partly unwound by a field across it (HelixDirector of director.h). u = depth / thickness.
 
 #include <array>
 

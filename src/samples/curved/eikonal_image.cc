@@ -8,8 +8,8 @@ namespace birefit {
 template <class S>
 EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
     : optics_(droplet_optics(scene, value)),
-      fan_p_(optics_, true, scene.microscope.objective_na),
-      fan_s_(optics_, false, scene.microscope.objective_na),
+      fan_p_(optics_, true, optics_.objective_na),
+      fan_s_(optics_, false, optics_.objective_na),
       light_(Line<S>(scene.microscope, value)),
       view_(scene, value, light_),
       aplanatic_(scene.microscope.aplanatic),

@@ -69,8 +69,9 @@ class DiscModel final : public PixelModel<S> {
  public:
   DiscModel(const Scene& scene, const Values<S>& value)
       : optics_(scene, value),
-        coloured_(scene.microscope.bandwidth_nm > 0),
-        spread_(scene.microscope.bandwidth_nm / 2.3548200450309493 / value(scene.microscope.wavelength_nm)) {
+        coloured_(scene.microscope.bandwidth_nm),
+        spread_(value.get(scene.microscope.bandwidth_nm, 0.0) /
+                (2.3548200450309493 * value(scene.microscope.wavelength_nm))) {
     const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
     const S load =
         value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg) - 0.5 * std::numbers::pi;

@@ -82,7 +82,7 @@ RenderPlan plan_disc(const Planning& planning) {
                     "leaves these out",
                     fastest));
   Scene one_colour = scene;  // the bandwidth is part of a disc's model
-  one_colour.microscope.bandwidth_nm = 0;
+  one_colour.microscope.bandwidth_nm = {};
   note_illumination(one_colour, value, largest_phase, plan);
   return plan;
 }

@@ -205,7 +205,7 @@ RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, con
   o.column->sample(half, &middle);
   for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
   round_trip = 2 * o.k0 * std::sqrt(middle.ordinary) * middle.depth_slope_um;
-  const double bandwidth = scene.microscope.bandwidth_nm / value(scene.microscope.wavelength_nm);
+  const double bandwidth = value.get(scene.microscope.bandwidth_nm, 0.0) / value(scene.microscope.wavelength_nm);
   if (round_trip * bandwidth > 1)
     plan.warnings.push_back(
         fmt::format("Light of this bandwidth does not interfere between the faces (the phase of a round trip spreads "

@@ -169,11 +169,10 @@ class BallRaysIn final : public BallRays<R> {
       : optics_(ball_optics(scene, value)),
         medium_(in_radii(droplet_optics(scene, all))),
         light_(scene.microscope, all),
-        rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0),
-             scene.microscope.objective_na),
+        rim_(rim_table(optics_.sphere)),
         method_(transport_method<S>(plan.method)),
         aplanatic_(scene.microscope.aplanatic),
-        edge_(rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
+        edge_(rim_edge(rim_, optics_.sphere)),
         up_(up),
         places_(places) {
     optics_.sphere.radius_um = S(1.0);  // the medium's k0 knows how long that is
@@ -230,7 +229,7 @@ class BallRaysIn final : public BallRays<R> {
 /// Everything that decides how a ray goes and what director it meets, in radii of the sphere.
 template <class R>
 std::vector<R> ways(const BallOptics<R>& o, const RimTable& rim) {
-  std::vector<R> list{o.sphere.ratio, rim_edge(rim, o.sphere.ratio, o.sphere.n_host)};
+  std::vector<R> list{o.sphere.ratio, rim_edge(rim, o.sphere)};
   std::visit(
       [&](const auto& field) {
         if constexpr (requires { field.axis; }) list.insert(list.end(), {field.axis.x, field.axis.y, field.axis.z});
@@ -306,11 +305,10 @@ class BallImage final : public PixelModel<S> {
       : scene_(scene),
         plan_(plan),
         optics_(ball_optics(scene, value)),
-        rim_(lane(plain(optics_.sphere.ratio), 0), lane(plain(optics_.sphere.n_host), 0),
-             scene.microscope.objective_na),
+        rim_(rim_table(optics_.sphere)),
         light_(scene.microscope, value),
         view_(scene, value),
-        edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere.ratio, optics_.sphere.n_host)),
+        edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere)),
         inverse_edge_(inverse(edge_um_)),
         by_inverse_edge_(inverse_edge_),
         inverse_radius_(inverse(optics_.sphere.radius_um)),
@@ -594,7 +592,7 @@ class StepsOfSquare {
   StepsOfSquare(const Scene& scene, const RenderPlan& plan, const Values<double>& value)
       : optics_(ball_optics(scene, value.as<Pack>())),
         beside_(beside_core(optics_)),
-        rim_(lane(optics_.sphere.ratio, 0), lane(optics_.sphere.n_host, 0), scene.microscope.objective_na),
+        rim_(rim_table(optics_.sphere)),
         method_(transport_method<Pack>(plan.method)),
         target_(0.25 * scene.intensity_accuracy) {
     std::visit(
@@ -793,7 +791,7 @@ constexpr double kWorth = 0.4;
 
 void plan_disc_squares(const Scene& scene, const Values<double>& value, double target, RenderPlan& plan) {
   const DropletOptics<double> sphere = droplet_optics(scene, value);
-  const RimTable rim(sphere.ratio, sphere.n_host, scene.microscope.objective_na);
+  const RimTable rim = rim_table(sphere);
   const PointsOfSquares points_of(scene, plan, value, rim);
   const bool core_apart = points_of.core_apart();
   const BallImage<Pack> image(scene, plan, value.as<Pack>(), core_apart);
@@ -895,7 +893,7 @@ std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderP
   const bool core_apart =
       std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; }) && [&] {
         const BallOptics<double> o = ball_optics(scene, value.template as<double>());
-        return core_has_disc(o, RimTable(o.sphere.ratio, o.sphere.n_host, scene.microscope.objective_na));
+        return core_has_disc(o, rim_table(o.sphere));
       }();
   return std::make_unique<BallImage<S>>(scene, plan, value, core_apart);
 }

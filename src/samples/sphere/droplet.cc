@@ -51,13 +51,13 @@ constexpr double kCentre = 1.0 / 64;
 template <class S>
 DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
     : optics_(droplet_optics(scene, value)),
-      rim_(lane(plain(optics_.ratio), 0), lane(plain(optics_.n_host), 0), scene.microscope.objective_na),
+      rim_(rim_table(optics_)),
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       aplanatic_(scene.microscope.aplanatic),
       light_(Line<S>(scene.microscope, value)),
       view_(scene, value, light_),
-      edge_um_(optics_.radius_um * rim_edge(rim_, optics_.ratio, optics_.n_host)),
+      edge_um_(optics_.radius_um * rim_edge(rim_, optics_)),
       inverse_edge_(inverse(edge_um_)),
       core_um_(0.0),
       centre_panels_(plan.centre_panels),

@@ -19,7 +19,7 @@ void add_sphere_jones(const Scene& scene, const RenderPlan& plan, const Values<d
                     "matrix of one ray",
                     "use `render`, or physics.rays: straight");
   const DropletOptics<double> optics = droplet_optics(scene, value);
-  const RimTable rim(optics.ratio, optics.n_host, scene.microscope.objective_na);
+  const RimTable rim = rim_table(optics);
   const TransportMethod<double>& method = transport_method<double>(plan.method);
   std::optional<BallOptics<double>> ball;
   const StepsByPlace steps(plan);

@@ -15,7 +15,7 @@ namespace {
 Pilots droplet_pilots(const Scene& scene, const Values<double>& value) {
   Pilots pilots;
   const DropletOptics<double> o = droplet_optics(scene, value);
-  const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
+  const RimTable rim = rim_table(o);
   const Mesh fine = uniform_mesh(o.coupled() ? 1024 : 512);
   for (double f : {0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97}) {
     const DropletRay<double> ray = trace(o, rim, f * rim.rho_max() * o.radius_um);
@@ -39,7 +39,7 @@ Pilots droplet_pilots(const Scene& scene, const Values<double>& value) {
 Pilots ball_pilots(const Scene& scene, const Values<double>& value) {
   Pilots pilots;
   const auto o = std::make_shared<const BallOptics<double>>(ball_optics(scene, value));
-  const RimTable rim(o->sphere.ratio, o->sphere.n_host, scene.microscope.objective_na);
+  const RimTable rim = rim_table(o->sphere);
   const Mesh fine = ball_mesh(*o, 256), finer = ball_mesh(*o, 512);
   pilots.breaks = std::visit([](const auto& field) { return ball_breaks(field); }, o->field);
   const auto jones = [=](double fraction, double azimuth, const TransportMethod<double>& method, const Mesh& mesh) {

@@ -179,7 +179,7 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
   if (scene.method == "diagonal")
     throw UserError(Where{}, "transport.method: diagonal cannot do this droplet: its director turns along the rays",
                     "use auto or magnus4");
-  const RimTable rim(o.sphere.ratio, o.sphere.n_host, scene.microscope.objective_na);
+  const RimTable rim = rim_table(o.sphere);
   const Pilots pilots = sphere_pilots(scene, value);
   const Effort effort =
       cheapest_effort(pilots, scene.intensity_accuracy, scene.method == "auto" ? "" : scene.method, true, "modal");
@@ -237,7 +237,7 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
 /// without bound, at `jumps` (all um).
 void sample_round(const Scene& scene, const Values<double>& value, const DropletOptics<double>& o, double edge,
                   const std::vector<double>& jumps, RenderPlan& plan) {
-  const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
+  const RimTable rim = rim_table(o);
   const double px = scene.view.pixel_size_um;
   const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
   if (bins > 100000)
@@ -373,7 +373,7 @@ RenderPlan plan_sphere(const Planning& planning) {
   if (!looks_round(droplet)) return plan_ball(scene, value);
   if (scene.rays == Rays::eikonal) return plan_curved(scene, value);
   const DropletOptics<double> o = droplet_optics(scene, value);
-  const RimTable rim(o.ratio, o.n_host, scene.microscope.objective_na);
+  const RimTable rim = rim_table(o);
   const bool twisted = o.coupled(), axial = o.axial != nullptr;
   if (scene.method == "diagonal" && twisted)
     throw UserError(Where{}, "transport.method: diagonal cannot do a twisted director, its modes are coupled",

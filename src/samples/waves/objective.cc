@@ -6,8 +6,8 @@
 
 namespace birefit {
 
-void check_objective(const Scene& scene, double n_host) {
-  const double na = scene.microscope.objective_na;
+void check_objective(const Scene& scene, const Values<double>& value, double n_host) {
+  const double na = value.get(scene.microscope.objective_na, 0.0);
   if (!(na > 0))
     throw UserError(Where{}, "ceiling: wave needs microscope.objective_na",
                     "the number engraved on the objective; without it use ceiling: one_way");

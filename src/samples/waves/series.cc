@@ -41,7 +41,7 @@ class SeriesImage final : public PixelModel<S> {
       : optics_(droplet_optics(scene, value)),
         reach_um_(plan.series_reach_um),
         panels_(plan.radial_panels),
-        na_(scene.microscope.objective_na),
+        na_(value(scene.microscope.objective_na)),
         pupil_(scene.microscope.aplanatic ? Pupil::aplanatic : Pupil::focal_plane),
         focus_um_(value.get(scene.microscope.focus_um, 0.0)),
         light_(Line<S>(scene.microscope, value)),
@@ -101,7 +101,7 @@ class SeriesImage final : public PixelModel<S> {
 
  private:
   RadialImage<Single> radial_image() const {
-    return RadialImage<Single>(series_, na_, SingleOf<S>::of(focus_um_), reach_um_, pupil_);
+    return RadialImage<Single>(series_, SingleOf<S>::of(na_), SingleOf<S>::of(focus_um_), reach_um_, pupil_);
   }
   // In the (radial, azimuthal) frame the Jones matrix is diagonal, (1 + A0) +- A2.
   void terms(const RadialImage<Single>& image, const P& rho_um, S* f) const {
@@ -135,9 +135,8 @@ class SeriesImage final : public PixelModel<S> {
   DropletOptics<S> optics_;
   double reach_um_;
   int panels_;
-  double na_;
   Pupil pupil_;
-  S focus_um_;
+  S na_, focus_um_;
   RoundLight<S> light_;
   RoundView<S> view_;
   Symmetry symmetry_;
@@ -157,8 +156,8 @@ bool has_series(const Scene& scene) {
 
 RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
   const DropletOptics<double> o = droplet_optics(scene, value);
-  const double na = scene.microscope.objective_na, px = scene.view.pixel_size_um;
-  check_objective(scene, o.n_host);
+  check_objective(scene, value, o.n_host);
+  const double na = value(scene.microscope.objective_na), px = scene.view.pixel_size_um;
   RenderPlan plan;
   plan.method = "series";
   plan.physics = "wave";

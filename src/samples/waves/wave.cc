@@ -83,11 +83,11 @@ struct WaveObject {
   std::string what;
 };
 WaveObject wave_object(const Scene& scene, const Values<double>& value) {
-  const double k0 = wavenumber_per_um(scene, value), na = scene.microscope.objective_na;
+  const double k0 = wavenumber_per_um(scene, value), na = value.get(scene.microscope.objective_na, 0.0);
   if (!scene.surround_index && !scene.surround_dispersion)
     throw UserError(Where{}, "ceiling: wave needs sample.surround",
                     "the index of what is around the sample, and in a sampled box where there is no liquid crystal");
-  check_objective(scene, host_index(scene, value));
+  check_objective(scene, value, host_index(scene, value));
   if (std::holds_alternative<SampledVolume>(scene.sample)) {
     const SampledOptics<double> o = sampled_optics(scene, value);
     const VolumeGrid& v = *o.grid;
@@ -118,8 +118,8 @@ WaveImaging imaging_of(const Scene& scene, const Values<double>& value, const Wa
   const auto reach = [&](double centre, int pixels) {
     return px * (std::max(std::abs(centre), std::abs(pixels - 1 - centre)) + 1);
   };
-  return plan_imaging(grid, wavenumber_per_um(scene, value), scene.microscope.objective_na, reach(cx, scene.view.width),
-                      reach(cy, scene.view.height));
+  return plan_imaging(grid, wavenumber_per_um(scene, value), value(scene.microscope.objective_na),
+                      reach(cx, scene.view.width), reach(cy, scene.view.height));
 }
 
 }  // namespace
@@ -244,6 +244,7 @@ double error_on_twin(RadialTwin twin, double scale, const RenderPicture& picture
 std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {
   auto wave = std::make_shared<WavePlan>();
   wave->radius_um = object.radius_um;
+  wave->objective_na = value(scene.microscope.objective_na);
   const WaveGrid& g = wave->grid = object.grid;
   wave->ramp_um = g.step_um;
   if (static_cast<double>(g.nx) * g.ny > 4e6)
@@ -273,7 +274,7 @@ RenderPlan plan_wave(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
   const WaveObject o = wave_object(scene, value);
-  const double na = scene.microscope.objective_na;
+  const double na = value(scene.microscope.objective_na);
   RenderPlan plan;
   plan.wave = plan_grids(scene, value, o);
   const WaveGrid& g = plan.wave->grid;
@@ -338,7 +339,7 @@ template <class S>
 void picture(const Scene& scene, const WaveGrid& grid, const WaveImaging& imaging, const Values<S>& value,
              const SentFields& fields, int threads, const std::vector<Image*>& images) {
   WaveMicroscope<S> m;
-  m.objective_na = scene.microscope.objective_na;
+  m.objective_na = value(scene.microscope.objective_na);
   m.aplanatic = scene.microscope.aplanatic;
   m.focus_um = value.get(scene.microscope.focus_um, 0.0);
   m.center_x_px = value(scene.view.center_x_px), m.center_y_px = value(scene.view.center_y_px);
@@ -377,7 +378,7 @@ std::vector<bool> move_only_pictures(const Scene& scene, const std::vector<int>&
   const ParameterRef none;
   without.view.center_x_px = without.view.center_y_px = none;
   Microscope& m = without.microscope;
-  m.focus_um = m.analyzer_deg = m.polarizer_extinction_ratio = m.analyzer_extinction_ratio = none;
+  m.focus_um = m.objective_na = m.analyzer_deg = m.polarizer_extinction_ratio = m.analyzer_extinction_ratio = none;
   m.behind.clear();
   std::vector<bool> only(active.size(), true);
   for_each_ref(without, [&](const ParameterRef& ref) {

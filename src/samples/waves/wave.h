@@ -14,6 +14,7 @@ struct WavePlan {
   WaveImaging imaging;
   double radius_um = 0;  ///< of the sphere it was made for, half the longest side of a box
   double ramp_um = 0;    ///< of its surfaces
+  double objective_na = 0;
 };
 
 /// A sphere as it is seen: exactly, by the series; by propagation; and, of sampled fields, by propagation through

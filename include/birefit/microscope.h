@@ -1,0 +1,83 @@
+#pragma once
+// What lights and images a sample.
+
+#include <variant>
+#include <vector>
+
+#include "birefit/number_spec.h"
+#include "birefit/parameters.h"
+
+namespace birefit {
+
+/// A direction in the outside medium.
+struct Direction {
+  double theta_deg = 0;    ///< from +z, [0, 90)
+  double azimuth_deg = 0;  ///< of the plane of incidence, from +x
+};
+
+/// A lossless plate between a polarizer and the sample: the field along its slow axis is behind the other by the phase.
+struct Retarder {
+  static constexpr const char* kKey = "retarder";
+  ParameterRef phase_deg, retardance_nm, azimuth_deg;
+  double turned_deg = 0;  ///< added to the azimuth: of a plate that is mounted at an angle to a polarizer
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("phase_deg", self.phase_deg, numbers::angle().left_out(), "at the light's wavelength; or");
+    visit.number("retardance_nm", self.retardance_nm, numbers::within(-1e5, 1e5, "nm").left_out(),
+                 "which is the same at all wavelengths");
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::angle(), "of the slow axis, from +x");
+  }
+};
+/// Turns the polarization by angle_deg, counter-clockwise in the image.
+struct Rotator {
+  static constexpr const char* kKey = "rotator";
+  ParameterRef angle_deg;
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("angle_deg", self.angle_deg, numbers::angle(),
+                 "by which it turns the polarization, counter-clockwise");
+  }
+};
+using PolarizingPart = std::variant<Retarder, Rotator>;
+
+struct Microscope {
+  ParameterRef wavelength_nm;  ///< vacuum
+  ParameterRef polarizer_deg;  ///< not given: none, the light that comes in is unpolarized
+  ParameterRef analyzer_deg;   ///< not given: none, all that leaves the sample is seen
+  /// Flux that is let through along the polarizer over flux across it, both as they come in; >= 1; not given: ideal.
+  ParameterRef polarizer_extinction_ratio, analyzer_extinction_ratio;
+  /// Between polarizer and sample, between sample and analyser; in the order in which light meets them.
+  std::vector<PolarizingPart> before, behind;
+  /// FWHM; not given: not stated, a line. Modelled by discs (a Gaussian), else it enters the model error.
+  ParameterRef bandwidth_nm;
+  ParameterRef condenser_na;  ///< not given: not stated; not modelled: enters the model error
+  /// Not given: not stated. Waves: the objective's band limit; droplet rays leaving steeper than this are lost.
+  ParameterRef objective_na;
+  /// focal plane, from the middle of the sample along the light; not given: 0. Ceiling::wave only
+  ParameterRef focus_um;
+  bool aplanatic = false;             ///< imaging: focal_plane (default) or aplanatic, docs/conventions.md
+  std::vector<Direction> directions;  ///< slab scenes
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("light.wavelength_nm", self.wavelength_nm, numbers::within(100, 20000, "nm"), "vacuum");
+    visit.number("light.bandwidth_nm", self.bandwidth_nm, numbers::within(0, 5000, "nm").left_out(),
+                 "FWHM of the line");
+    visit.number("polarizer_deg", self.polarizer_deg, numbers::angle(), "from +x");
+    visit.number("analyzer_deg", self.analyzer_deg, numbers::angle(), "from +x");
+    visit.number("polarizer_extinction_ratio", self.polarizer_extinction_ratio,
+                 numbers::within(1, 1e12).physical().left_out(), "flux along over flux across");
+    visit.number("analyzer_extinction_ratio", self.analyzer_extinction_ratio,
+                 numbers::within(1, 1e12).physical().left_out(), "flux along over flux across");
+    visit.number("objective_na", self.objective_na, numbers::positive(1.6).in_percent().left_out(), "of the objective");
+    visit.number("condenser_na", self.condenser_na, numbers::positive(1.6).in_percent().left_out(), "of the condenser");
+    visit.number("focus_um", self.focus_um, numbers::within(-1000, 1000, "um").left_out(),
+                 "plane in focus, from the mid plane along the light");
+    visit.inside("before", self.before);
+    visit.inside("behind", self.behind);
+  }
+};
+
+}  // namespace birefit

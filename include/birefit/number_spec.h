@@ -1,0 +1,80 @@
+#pragma once
+// What a number of a scene may be: said once, by the struct that has it (describe() in scene.h), and read by the config
+// reader, the search for references and the tables of docs/configuration.md.
+
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace birefit {
+
+/// Unit, range, which of its limits are nature's own, and what holds where it is not given.
+struct NumberSpec {
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+  std::string unit;  ///< "um", "nm", "deg", "K", "V", "px" or ""
+  double lower = -kInfinity, upper = kInfinity;
+  bool lower_open = false, upper_open = false;
+  double physical_lower = -kInfinity, physical_upper = kInfinity;  ///< see Parameter
+  bool automatic = false;                                          ///< `fit: auto` is accepted
+  bool linear = false;                                             ///< gain and offset
+  bool percent = false;                                            ///< often given as a percentage by mistake
+  bool fixed = false;                                              ///< cannot be fitted
+  std::optional<double> fallback;                                  ///< value where it is not given
+  bool optional = false;                                           ///< not given: an empty reference
+
+  bool contains(double value) const {
+    return (lower_open ? value > lower : value >= lower) && (upper_open ? value < upper : value <= upper);
+  }
+
+  NumberSpec or_else(double value) const {
+    NumberSpec spec = *this;
+    spec.fallback = value;
+    return spec;
+  }
+  /// May be left out, for which the struct has a meaning of its own, or which another number makes up for.
+  NumberSpec left_out() const {
+    NumberSpec spec = *this;
+    spec.optional = true;
+    return spec;
+  }
+  /// `fit: auto`: pictures tell where to start.
+  NumberSpec found_in_pictures() const {
+    NumberSpec spec = *this;
+    spec.automatic = true;
+    return spec;
+  }
+  /// Often given as a percentage by mistake.
+  NumberSpec in_percent() const {
+    NumberSpec spec = *this;
+    spec.percent = true;
+    return spec;
+  }
+  /// Its lower limit is a physical one.
+  NumberSpec physical() const {
+    NumberSpec spec = *this;
+    spec.physical_lower = lower;
+    return spec;
+  }
+};
+
+namespace numbers {
+
+inline NumberSpec within(double lower, double upper, const char* unit = "") {
+  NumberSpec spec;
+  spec.unit = unit, spec.lower = lower, spec.upper = upper;
+  return spec;
+}
+inline NumberSpec positive(double upper, const char* unit = "") {
+  NumberSpec spec = within(0, upper, unit);
+  spec.lower_open = true;
+  return spec;
+}
+inline NumberSpec length_um(double upper) { return positive(upper, "um").physical(); }
+/// A hundred turns: more is a typing error.
+inline NumberSpec angle() { return within(-36000, 36000, "deg"); }
+inline NumberSpec angle(double lower, double upper) { return within(lower, upper, "deg"); }
+inline NumberSpec index() { return within(1, 4); }
+
+}  // namespace numbers
+}  // namespace birefit
