@@ -277,28 +277,27 @@ std::vector<double> planar_phases(const Scene& scene, const Values<double>& valu
   return result;
 }
 
-RenderPlan plan_planar(const Planning& planning) {
-  const Scene& scene = planning.scene;
-  const Values<double>& value = planning.value;
-  RenderPlan plan;
-  if (scene.view.camera) {
-    // A twentieth of the middle's scale: what is twenty times as far away as the middle is not a picture of a screen
-    // any more.
-    const ConeView<double> view(scene, value);
-    for (const int column : {0, scene.view.width - 1})
-      for (const int row : {0, scene.view.height - 1})
-        if (!(view.nearness(column, row) > 0.05))
-          throw UserError(
-              Where{},
-              fmt::format("the corner of the picture at column {}, row {} looks past the horizon of the screen", column,
-                          row),
-              "lower half_field_deg or the tilt of view.camera");
-  }
-  const PlanarOptics<double> o = planar_optics(scene, value);
-  o.column->freeze();  // no node set comes twice: remembering them would only cost the search
-  const auto directions = pilot_directions(scene, value);
-  const std::optional<ParameterRef> half_angle = cone_half_angle(scene);
-  const bool cone = half_angle.has_value();
+namespace {
+
+using Directions = decltype(pilot_directions(std::declval<const Scene&>(), std::declval<const Values<double>&>()));
+
+/// Every pixel of a side camera's picture looks at the screen.
+void check_horizon(const Scene& scene, const Values<double>& value) {
+  // A twentieth of the middle's scale: what is twenty times as far away as the middle is not a picture of a screen
+  // any more.
+  const ConeView<double> view(scene, value);
+  for (const int column : {0, scene.view.width - 1})
+    for (const int row : {0, scene.view.height - 1})
+      if (!(view.nearness(column, row) > 0.05))
+        throw UserError(
+            Where{},
+            fmt::format("the corner of the picture at column {}, row {} looks past the horizon of the screen", column,
+                        row),
+            "lower half_field_deg or the tilt of view.camera");
+}
+
+/// No direction of the scene is totally reflected.
+void check_total_reflection(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o) {
   for (const auto& [tx, ty] : pilot_directions(scene, value, std::numeric_limits<std::size_t>::max())) {
     const Ray<double> ray = ray_at(o, tx, ty);
     std::vector<double> u{0.0, 0.5, 1.0};
@@ -311,9 +310,13 @@ RenderPlan plan_planar(const Planning& planning) {
             "a direction of this scene is totally reflected: its tangential wavevector exceeds an index of the sample",
             "lower the angle of incidence or the surround's index");
   }
-  if (scene.ceiling == Ceiling::reflections) return plan_reflections(scene, value, o, directions);
+}
+
+/// The method and its effort, into the plan with the reasons.
+void choose_transport(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o,
+                      const Directions& directions, RenderPlan& plan) {
   const double target = scene.intensity_accuracy;
-  const bool slab = std::holds_alternative<Slab>(scene.sample);
+  const bool cone = cone_half_angle(scene).has_value();
   const Pilots pilots = planar_pilots(scene, value);
   const bool choose_freely = scene.method == "auto";
   Effort effort =
@@ -364,47 +367,69 @@ RenderPlan plan_planar(const Planning& planning) {
                                       : "the axis turns out of the ray's plane: full 2 x 2 transport, ") +
                                      what + "; no method needs fewer");
   }
+}
+
+/// Means over the pixels of a picture of directions: in closed form, or from points.
+void plan_cone_pixels(const Planning& planning, const PlanarOptics<double>& o, RenderPlan& plan) {
+  const Scene& scene = planning.scene;
+  const Values<double>& value = planning.value;
+  const ConeView<double> view(scene, value);
+  const double cx = view.center_x, cy = view.center_y;
+  note_camera(scene, value, view, plan);
+  const int bins = static_cast<int>(std::ceil(
+                       std::hypot(std::max(cx, scene.view.width - cx), std::max(cy, scene.view.height - cy)))) +
+                   1;
+  // The gradient changes slowly with radius: measure it on 24 radii and 12 azimuths, interpolate.
+  std::vector<double> gradient(25);
+  for (int i = 0; i <= 24; ++i)
+    for (int k = 0; k < 12; ++k) {
+      const double r = bins * i / 24.0, a = k * kPi / 6;
+      double x = cx + r * std::cos(a), y = cy - r * std::sin(a);
+      // Seen from the side there may be no screen outside the picture: there its edge, which ends in its corners,
+      // stands for what lies beyond.
+      if (scene.view.camera)
+        x = std::clamp(x, 0.0, scene.view.width - 1.0), y = std::clamp(y, 0.0, scene.view.height - 1.0);
+      const auto phase = [&](double column, double row) {
+        const auto t = view.at(column, row);
+        return planar_phase(o, t.x, t.y, 24);
+      };
+      const double gx = phase(x + 0.5, y) - phase(x - 0.5, y), gy = phase(x, y + 0.5) - phase(x, y - 0.5);
+      gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(gx, gy));
+    }
+  const double fastest = *std::max_element(gradient.begin(), gradient.end());
+  plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel", fastest));
+  if ((plan.method == "diagonal" || plan.method == "modal") && plan_fringe_means(planning, o, plan)) {
+    plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
+    plan_fringe_blocks(scene, value, plan);
+  } else {
+    sample_by_radius(plan, cx, cy, bins, [&](double r) {
+      const double f = std::min(23.999, r / bins * 24);
+      const std::size_t i = static_cast<std::size_t>(f);
+      return samples_for(std::max(gradient[i], gradient[i + 1]), scene.intensity_accuracy);
+    });
+    const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+    plan.reasons.push_back(fmt::format("pixel means from up to {} x {} rays a pixel", most, most));
+  }
+}
+
+}  // namespace
+
+RenderPlan plan_planar(const Planning& planning) {
+  const Scene& scene = planning.scene;
+  const Values<double>& value = planning.value;
+  RenderPlan plan;
+  if (scene.view.camera) check_horizon(scene, value);
+  const PlanarOptics<double> o = planar_optics(scene, value);
+  o.column->freeze();  // no node set comes twice: remembering them would only cost the search
+  const Directions directions = pilot_directions(scene, value);
+  check_total_reflection(scene, value, o);
+  if (scene.ceiling == Ceiling::reflections) return plan_reflections(scene, value, o, directions);
+  choose_transport(scene, value, o, directions, plan);
   double largest_phase = 0;
   for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
-  if (cone) {
-    const ConeView<double> view(scene, value);
-    const double cx = view.center_x, cy = view.center_y;
-    note_camera(scene, value, view, plan);
-    const int bins = static_cast<int>(std::ceil(
-                         std::hypot(std::max(cx, scene.view.width - cx), std::max(cy, scene.view.height - cy)))) +
-                     1;
-    // The gradient changes slowly with radius: measure it on 24 radii and 12 azimuths, interpolate.
-    std::vector<double> gradient(25);
-    for (int i = 0; i <= 24; ++i)
-      for (int k = 0; k < 12; ++k) {
-        const double r = bins * i / 24.0, a = k * kPi / 6;
-        double x = cx + r * std::cos(a), y = cy - r * std::sin(a);
-        // Seen from the side there may be no screen outside the picture: there its edge, which ends in its corners,
-        // stands for what lies beyond.
-        if (scene.view.camera)
-          x = std::clamp(x, 0.0, scene.view.width - 1.0), y = std::clamp(y, 0.0, scene.view.height - 1.0);
-        const auto phase = [&](double column, double row) {
-          const auto t = view.at(column, row);
-          return planar_phase(o, t.x, t.y, 24);
-        };
-        const double gx = phase(x + 0.5, y) - phase(x - 0.5, y), gy = phase(x, y + 0.5) - phase(x, y - 0.5);
-        gradient[static_cast<std::size_t>(i)] = std::max(gradient[static_cast<std::size_t>(i)], std::hypot(gx, gy));
-      }
-    const double fastest = *std::max_element(gradient.begin(), gradient.end());
-    plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel", fastest));
-    if ((plan.method == "diagonal" || plan.method == "modal") && plan_fringe_means(planning, o, plan)) {
-      plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
-      plan_fringe_blocks(scene, value, plan);
-    } else {
-      sample_by_radius(plan, cx, cy, bins, [&](double r) {
-        const double f = std::min(23.999, r / bins * 24);
-        const std::size_t i = static_cast<std::size_t>(f);
-        return samples_for(std::max(gradient[i], gradient[i + 1]), scene.intensity_accuracy);
-      });
-      const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
-      plan.reasons.push_back(fmt::format("pixel means from up to {} x {} rays a pixel", most, most));
-    }
-  } else if (!slab) {
+  if (cone_half_angle(scene)) {
+    plan_cone_pixels(planning, o, plan);
+  } else if (!std::holds_alternative<Slab>(scene.sample)) {
     plan.reasons.push_back("every pixel sees the same ray: one transfer for the whole image");
   }
   OpticalPoint<double> faces[2];
