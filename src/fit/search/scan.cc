@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -27,6 +28,8 @@ constexpr double kDiameterStep = 1.0 / 30;
 constexpr double kOneValley = 4;
 /// Of a grid that has axes of one valley, too.
 constexpr std::size_t kMostPlacesWithoutNeed = 1000;
+/// Of the best points of a grid, whose pictures cost next to nothing, that are starts beside its minima.
+constexpr std::size_t kBesideMinima = 16;
 /// Batches of starts looked at; the next one only where chi-square is more standard deviations above its expectation.
 constexpr std::size_t kMostBatches = 4;
 constexpr double kDoubtful = 5;
@@ -190,9 +193,10 @@ class Survey {
          ScanResult& result)
       : problem_(problem), task_(task), axes_(axes), start_(start), result_(result) {}
 
-  /// Every point of the product grid; its minima are points below their neighbours along every axis: a valley across
-  /// the axes has several.
-  Places minima_of_grid() {
+  /// Every point of the product grid; its minima are points below their neighbours along every axis. A valley across
+  /// the axes may have none where it is lowest: so many of the best points follow, two steps and more from each other
+  /// and from the minima in something.
+  Places minima_of_grid(std::size_t others) {
     const std::size_t product = product_of(axes_);
     std::vector<double> chi(product, std::numeric_limits<double>::infinity());
     for (std::size_t i = 0; i < product && !result_.interrupted; ++i) chi[i] = objective_at(point_at(i));
@@ -211,6 +215,16 @@ class Survey {
       if (lowest) minima.emplace_back(chi[i], point_at(i));
     }
     std::stable_sort(minima.begin(), minima.end(), lower);
+    std::vector<std::size_t> order(product);
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return chi[a] < chi[b]; });
+    for (std::size_t i = 0; i < product && others > 0 && std::isfinite(chi[order[i]]); ++i) {
+      Eigen::VectorXd x = point_at(order[i]);
+      constexpr double kApart = 1.5;
+      if (std::any_of(minima.begin(), minima.end(), [&](const auto& m) { return near(x, m.second, kApart); })) continue;
+      minima.emplace_back(chi[order[i]], std::move(x));
+      --others;
+    }
     return minima;
   }
 
@@ -261,9 +275,10 @@ class Survey {
     }
     return x;
   }
-  bool near(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const {
+  /// Fewer than so many steps apart in everything.
+  bool near(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double steps = 1) const {
     return std::all_of(axes_.begin(), axes_.end(), [&](const Axis& axis) {
-      return std::abs(axis.steps.at(a[axis.searched]) - axis.steps.at(b[axis.searched])) < 1;
+      return std::abs(axis.steps.at(a[axis.searched]) - axis.steps.at(b[axis.searched])) < steps;
     });
   }
   const std::string& name_of(const Axis& axis) const {
@@ -352,7 +367,7 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
   Places starts;
   Survey survey(problem, task, axes, start, result);
   if (product > 0)
-    starts = product <= most ? survey.minima_of_grid()
+    starts = product <= most ? survey.minima_of_grid(cheap ? kBesideMinima : 0)
                              : survey.best_of_box(most, 4 * kMostBatches * static_cast<std::size_t>(candidates));
   const Effort effort = effort_of(problem, result.points, candidates);
   // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet
