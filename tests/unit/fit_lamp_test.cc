@@ -141,5 +141,17 @@ TEST(LampJitter, IsMeasuredWhereFramesAreMany) {
   EXPECT_NEAR(lamp.wider[0], 1, 0.02);
 }
 
+// A curve that is only compared with what another fit found has no unknowns, and no errors to widen.
+TEST(LampJitter, OfNoUnknownsIsNone) {
+  FrameMeans means;
+  means.residual = means.light = means.weight = Eigen::VectorXd::Ones(5);
+  means.jacobian.resize(5, 0);
+  means.covariance.resize(0, 0);
+  const LampJitter found = lamp_jitter(means);
+  EXPECT_EQ(found.share, 0);
+  EXPECT_FALSE(found.shown);
+  EXPECT_EQ(found.wider.size(), 0);
+}
+
 }  // namespace
 }  // namespace birefit::estimation

@@ -76,7 +76,7 @@ LampJitter lamp_jitter(const FrameMeans& means) {
   LampJitter found;
   found.wider = Eigen::VectorXd::Ones(means.jacobian.cols());
   const double most = means.light.maxCoeff();
-  if (!(most > 0)) return found;
+  if (!(most > 0) || means.jacobian.cols() == 0) return found;  // nothing is asked of the frames
   const OtherWeights fits(means);
   std::vector<double> density;
   std::vector<OtherWeights::Fit> at;
