@@ -1,6 +1,7 @@
 #pragma once
 // Everything that touches files. Nobody outside io knows that files exist.
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -54,18 +55,22 @@ Config load_config(const std::filesystem::path& path, ConfigUse use,
 struct ImageRequest {
   std::filesystem::path path;
   std::optional<int> page;  ///< of a multi-page file; required when there are several
-  std::string channel;      ///< "r" | "g" | "b" | "mean"; "" = not chosen
+  std::string channel;      ///< "r" | "g" | "b" | "mean" | a number from 0; "" = not chosen
   Where where;              ///< of the config entry, for errors
   bool mask = false;        ///< black and white are all that is asked for: 1 bit will do
+  bool cells = false;       ///< pixels may see different things in cells of 2 x 2 (a mosaic of filters)
 };
 
 struct LoadedImage {
-  Image values;                    ///< as stored: counts for integers, values for floats; linear light not yet applied
-  int bits = 0;                    ///< 8 or 16 for integers, 32 for float
-  double top_code = 0;             ///< 255, 65535, or 0 for floats
-  double pixel_size_um = 0;        ///< 0 = the file does not state it
-  double stored_zero = 0;          ///< what a stored 0 is in `values`: their top where white is stored as zero
-  std::vector<std::string> notes;  ///< "alpha channel ignored", ...
+  Image values;                ///< as stored: counts for integers, values for floats; linear light not yet applied
+  int bits = 0;                ///< 8 or 16 for integers, 32 for float
+  double top_code = 0;         ///< 255, 65535, or 0 for floats
+  double pixel_size_um = 0;    ///< 0 = the file does not state it
+  std::string filter_pattern;  ///< "rggb", ..: of a raw photograph's first cell; "" = not stated
+  std::array<double, 2> uneven_pixel_um{};  ///< stated along x and y where they differ; else 0
+  bool colour = false;                      ///< `values` are one of several channels, or their mean
+  double stored_zero = 0;                   ///< what a stored 0 is in `values`: their top where white is stored as zero
+  std::vector<std::string> notes;           ///< "alpha channel ignored", ...
 };
 
 /// Throws UserError: missing, truncated, empty, 1-bit (but for masks), animated, over 16384 x 16384 images; several

@@ -8,8 +8,11 @@
 #include <set>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "birefit/io.h"
 #include "io/config_disc.h"
+#include "io/config_mosaic.h"
 #include "io/config_pixels.h"
 #include "io/config_reader.h"
 #include "io/config_rings.h"
@@ -17,6 +20,7 @@
 #include "io/config_series.h"
 #include "io/config_signal.h"
 #include "io/images/mask.h"
+#include "io/images/mosaic.h"
 #include "io/prior.h"
 #include "medium/references.h"
 
@@ -39,6 +43,7 @@ struct MicrographSettings {
   Where image_where;
   std::optional<int> page;
   std::string channel;
+  MosaicSettings mosaic;
   std::optional<double> pixel_size_um;
   Transfer transfer;
   ParameterRef gain, offset, center_x, center_y, rotation;
@@ -157,26 +162,60 @@ void read_calibration(ConfigReader& reader, const Block& root, const Block& micr
   }
 }
 
+/// r, g, b, mean or a number.
+std::string read_channel(ConfigReader& reader, const Block& block) {
+  const YamlNode* node = block.find("channel");
+  if (node && node->is_scalar() && !node->text.empty() &&
+      node->text.find_first_not_of("0123456789") == std::string::npos)
+    return node->text;
+  return reader.choice(block, "channel", {"r", "g", "b", "mean"}).value_or("");
+}
+
+std::string not_square(double x, double y) { return fmt::format("{:.5g} x {:.5g} um", x, y); }
+
+/// A number, or [x, y] of pixels that are square after all.
+std::optional<double> read_pixel_size(ConfigReader& reader, const Block& block, const NumberSpec& spec) {
+  const YamlNode* node = block.find("pixel_size_um");
+  if (!node || !node->is_sequence()) return reader.plain(block, "pixel_size_um", spec);
+  if (node->items.size() != 2) {
+    reader.problems.add(node->where, "pixel_size_um must be a number or [x, y], found " +
+                                         std::to_string(node->items.size()) + " items");
+    return std::nullopt;
+  }
+  const auto x = reader.value_of(node->items[0], "pixel_size_um", spec);
+  const auto y = reader.value_of(node->items[1], "pixel_size_um", spec);
+  if (!x || !y) return std::nullopt;
+  // As close as sizes are known from a stage micrometer.
+  constexpr double kSquare = 1e-3;
+  if (std::abs(*x / *y - 1) > kSquare)
+    reader.problems.add(node->where,
+                        "pixel_size_um = [" + show(*x) + ", " + show(*y) + "]: pixels of " + not_square(*x, *y) +
+                            " are not square, which is not modelled",
+                        "resample the image to square pixels (ImageJ: Image > Scale) and state their size");
+  return 0.5 * (*x + *y);
+}
+
 MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene, Quantity quantity) {
   MicrographSettings settings;
   const Block block = reader.block(
       root, "micrograph",
-      {"image", "page", "channel", "pixel_size_um", "transfer", "gain", "offset", "illumination", "background",
-       "center_px", "rotation_deg", "roi_px", "mask", "saturation_counts", "noise", "calibration"},
+      {"image", "page", "channel", "mosaic", "bayer", "pixel_size_um", "transfer", "gain", "offset", "illumination",
+       "background", "center_px", "rotation_deg", "roi_px", "mask", "saturation_counts", "noise", "calibration"},
       false);
   settings.where = block.where;
   const auto place = [&](const char* key) { return block.find(key) ? block.find(key)->where : block.where; };
   settings.image = reader.text(block, "image");
   settings.image_where = place("image");
   settings.page = reader.integer(block, "page", 0, 100000);
-  settings.channel = reader.choice(block, "channel", {"r", "g", "b", "mean"}).value_or("");
+  settings.channel = read_channel(reader, block);
+  settings.mosaic = read_mosaic(reader, block, settings.channel);
 
   NumberSpec pixel_size;
   pixel_size.unit = "um";
   pixel_size.lower = 0;
   pixel_size.lower_open = true;
   pixel_size.upper = std::holds_alternative<StressedDisc>(scene.sample) ? 1000 : 20;
-  settings.pixel_size_um = reader.plain(block, "pixel_size_um", pixel_size);
+  settings.pixel_size_um = read_pixel_size(reader, block, pixel_size);
 
   if (const YamlNode* transfer = block.find("transfer")) {
     if (transfer->is_map()) {
@@ -353,10 +392,17 @@ double smallest_step(const LoadedImage& image) {
   return std::max(1e-6 * largest, 1e-300);
 }
 
+ImageRequest image_request(const MicrographSettings& settings, const std::filesystem::path& file,
+                           std::optional<int> page, const Where& where) {
+  ImageRequest request{file, page, settings.channel, where};
+  request.cells = !settings.mosaic.parts.empty();
+  return request;
+}
+
 std::optional<Calibration> load_calibration(ConfigReader& reader, const MicrographSettings& settings) {
   if (!settings.dark || !settings.parallel) return std::nullopt;
   const auto load = [&](const std::string& name, const Where& where) {
-    return try_load(reader, {reader.resolve(name), std::nullopt, settings.channel, where});
+    return try_load(reader, image_request(settings, reader.resolve(name), std::nullopt, where));
   };
   std::optional<LoadedImage> dark = load(*settings.dark, settings.dark_where);
   std::optional<LoadedImage> parallel = load(*settings.parallel, settings.parallel_where);
@@ -393,7 +439,10 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
     for (std::size_t i = 0; i < frame->values.size(); ++i)
       if (!std::isfinite(frame->values.values()[i]) || calibration.saturated.values()[i])
         calibration.usable.values()[i] = 0;
-    exclude_outliers(frame->values, area, step, Smoothness::frame, calibration.usable);
+    if (settings.mosaic.parts.empty())
+      exclude_outliers(frame->values, area, step, Smoothness::frame, calibration.usable);
+    else
+      exclude_outliers_in_cells(frame->values, area, step, Smoothness::frame, calibration.usable);
   }
 
   calibration.dark = dark->values;
@@ -429,9 +478,11 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
   return calibration;
 }
 
-/// Values, mask and the reasons for exclusion; false when a problem left nothing to work with.
+/// Values, mask and the reasons for exclusion; false when a problem left nothing to work with. Of a mosaic only the
+/// pixels of a `part`.
 bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const Calibration* calibration,
-                 const Mask* user_mask, LoadedImage& image, const Where& where, Picture& micrograph) {
+                 const Mask* user_mask, const MosaicPart* part, LoadedImage image, const Where& where,
+                 Picture& micrograph) {
   const int width = image.values.width(), height = image.values.height();
   const std::string& name = micrograph.name;
   const std::size_t problems_before = reader.problems.all().size();
@@ -462,6 +513,7 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   int frame_dead = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
+      if (part && ((x - part->x0) % 2 != 0 || (y - part->y0) % 2 != 0)) continue;
       if (!area.contains(x, y))
         ++micrograph.outside_roi;
       else if (user_mask && !(*user_mask)(x, y))
@@ -521,6 +573,59 @@ void replace_ref(Picture& micrograph, ParameterRef from, ParameterRef to) {
   swap(micrograph.gain);
   swap(micrograph.offset);
   for (UnevenLight& uneven : micrograph.uneven) swap(uneven.coefficient);
+}
+
+/// A mosaic that the config does not know of: reported.
+bool is_unstated_mosaic(ConfigReader& reader, const MicrographSettings& settings, const LoadedImage& image,
+                        const Where& where, const std::string& name) {
+  if (settings.mosaic.not_looked_for || image.colour) return false;
+  // Frames with and without light take off what a camera's pixels have of their own, and a camera that was calibrated
+  // so is none with a mosaic: its columns and rows may differ by as much.
+  if (settings.dark || settings.parallel) return false;
+  PixelRect area = settings.roi.value_or(whole(image.values));
+  area.x1 = std::min(area.x1, image.values.width()), area.y1 = std::min(area.y1, image.values.height());
+  if (area.x0 < 0 || area.y0 < 0) return false;  // reported
+  const auto kind = find_mosaic(image.values, area, smallest_step(image));
+  if (!kind) return false;
+  reader.problems.add(where, name + ": pixels alternate in cells of 2 x 2: a " + *kind + " mosaic",
+                      "add `bayer: rggb` (or bggr, grbg, gbrg) and `channel: g`, or `mosaic: polarization`; `mosaic: "
+                      "none` takes the pixels as they are");
+  return true;
+}
+
+/// The picture with its pixels, or those that a mosaic holds; none when a problem left nothing to work with.
+std::vector<Picture> pictures_of(ConfigReader& reader, const MicrographSettings& settings,
+                                 const Calibration* calibration, const Mask* user_mask, LoadedImage image,
+                                 const Where& where, const Picture& micrograph) {
+  std::vector<Picture> pictures;
+  if (settings.mosaic.parts.empty()) {
+    pictures.push_back(micrograph);
+    if (is_unstated_mosaic(reader, settings, image, where, micrograph.name) ||
+        !fill_pixels(reader, settings, calibration, user_mask, nullptr, std::move(image), where, pictures[0]))
+      pictures.clear();
+    return pictures;
+  }
+  if (image.colour) {
+    reader.problems.add(settings.mosaic.where, micrograph.name + " has colour channels: it is no mosaic any more",
+                        "leave bayer and mosaic out, or save what the sensor saw");
+    return pictures;
+  }
+  if (!image.filter_pattern.empty() && image.filter_pattern != settings.mosaic.bayer)
+    reader.problems.add(settings.mosaic.where, micrograph.name + " states the filters " + image.filter_pattern,
+                        "bayer: " + image.filter_pattern);
+  NumberSpec angle;
+  angle.unit = "deg";
+  for (const MosaicPart& part : settings.mosaic.parts) {
+    Picture picture = micrograph;
+    picture.name += " (" + part.name + ")";
+    if (part.analyzer_deg) {
+      const ParameterRef own = reader.constant(picture.name + ".microscope.analyzer_deg", angle, *part.analyzer_deg);
+      replace_ref(picture.scene, picture.scene.microscope.analyzer_deg, own);
+    }
+    if (!fill_pixels(reader, settings, calibration, user_mask, &part, image, where, picture)) return {};
+    pictures.push_back(std::move(picture));
+  }
+  return pictures;
 }
 
 /// A micrograph of the shared scene with its own values of what its `set:` names.
@@ -813,9 +918,20 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     if (item.quantity != quantity)
       reader.problems.add(item.where, "every table of a config must have the same quantity");
   reader.polarizers = quantity == Quantity::intensity;
+  const bool own_analyzers = states_polarization_mosaic(tree);
+  if (own_analyzers) reader.set_everywhere.push_back("microscope.analyzer_deg");
   shared.scene = read_scene(reader, root);
   config.observable.quantity = quantity;
   MicrographSettings settings = read_micrograph(reader, root, shared.scene, quantity);
+  if (own_analyzers)
+    if (const YamlNode* microscope = root.find("microscope"); microscope && microscope->is_map())
+      for (const char* key : {"analyzer_deg", "analyser_deg"})
+        if (const YamlNode* node = microscope->find(key))
+          reader.problems.add(node->where,
+                              std::string(key) +
+                                  " is given beside mosaic: polarization, whose pixels "
+                                  "have an analyser each",
+                              "leave it out");
   if (list && settings.image)
     reader.problems.add(settings.image_where, "micrograph.image is given beside micrographs", "give one of the two");
   if (list && image)
@@ -932,10 +1048,17 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
   const bool needs_pixel_size = std::holds_alternative<Droplet>(shared.scene.sample) ||
                                 std::holds_alternative<StressedDisc>(shared.scene.sample) ||
                                 std::holds_alternative<SampledVolume>(shared.scene.sample);
-  const auto demand_pixel_size = [&](const Scene& scene) {
-    if (needs_pixel_size && !(scene.view.pixel_size_um > 0) && reader.problems.empty())
-      reader.problems.add(settings.where.line > 0 ? settings.where : Where{reader.file},
-                          "micrograph needs pixel_size_um: the image does not state it",
+  const auto demand_pixel_size = [&](const Scene& scene, const std::array<double, 2>& uneven_um = {}) {
+    if (!needs_pixel_size || scene.view.pixel_size_um > 0 || !reader.problems.empty()) return;
+    const Where where = settings.where.line > 0 ? settings.where : Where{reader.file};
+    if (uneven_um[0] > 0)
+      reader.problems.add(where,
+                          "the file states pixels of " + not_square(uneven_um[0], uneven_um[1]) +
+                              ": they are not square, which is not modelled",
+                          "resample the image to square pixels (ImageJ: Image > Scale), or state pixel_size_um if the "
+                          "file is wrong");
+    else
+      reader.problems.add(where, "micrograph needs pixel_size_um: the image does not state it",
                           "the size of a pixel on the sample, for example 0.05");
   };
 
@@ -943,6 +1066,11 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     if (!tables.empty()) config.scene = tables[0].rows[0];
   } else if (view_only && !micrographs.empty()) {  // none: their list's mistake was reported
     Scene& scene = micrographs[0].scene;
+    if (own_analyzers && !settings.mosaic.parts.empty()) {
+      reader.table[scene.microscope.analyzer_deg].value = *settings.mosaic.parts[0].analyzer_deg;
+      reader.warnings.push_back("Of a polarization mosaic the picture behind its first analyser is shown, at " +
+                                settings.mosaic.parts[0].name + ".");
+    }
     const Item& item = items[0];
     const std::string name = item.image.value_or("the image");
     if (size) {
@@ -951,13 +1079,13 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       resolve_automatic(reader, scene, nullptr, nullptr, name);
       if (reader.problems.empty()) check_overlap(reader, scene, "the image");
     } else if (image || item.image) {
-      const ImageRequest request{image ? *image : reader.resolve(*item.image), item.page, settings.channel,
-                                 image ? Where{image->string()} : item.image_where};
+      const ImageRequest request = image_request(settings, image ? *image : reader.resolve(*item.image), item.page,
+                                                 image ? Where{image->string()} : item.image_where);
       if (const std::optional<LoadedImage> loaded =
               has_ring_table(scene) ? load_ring_table(reader, request.path, request.where, scene, config.observable)
                                     : try_load(reader, request)) {
         set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
-        demand_pixel_size(scene);
+        demand_pixel_size(scene, loaded->uneven_pixel_um);
         if (reader.problems.empty()) {
           Mask all(loaded->values.width(), loaded->values.height(), 1);
           for (std::size_t i = 0; i < all.size(); ++i) all.values()[i] = std::isfinite(loaded->values.values()[i]);
@@ -996,6 +1124,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       }
     }
     std::vector<Observable> observables(micrographs.size());
+    std::vector<std::vector<Picture>> filled(micrographs.size());
+    std::string of_colours;  // the first picture that is one colour of several
     const bool frames_missing = (settings.dark || settings.parallel) && !calibration;
     const bool mask_missing = settings.mask && !user_mask;
     for (std::size_t i = 0; i < items.size(); ++i) {
@@ -1008,7 +1138,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       micrograph.name = file.filename().string();
       std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene)
                                               ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
-                                              : try_load(reader, {file, item.page, settings.channel, where});
+                                              : try_load(reader, image_request(settings, file, item.page, where));
       if (!loaded) continue;
       if (size && (loaded->values.width() != (*size)[0] || loaded->values.height() != (*size)[1]))
         reader.problems.add(root.find("image_size_px")->where,
@@ -1018,28 +1148,43 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
                             "leave it out");
       set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um,
                micrograph.name, micrograph.scene);
-      if (sound) demand_pixel_size(micrograph.scene);
+      if (sound) demand_pixel_size(micrograph.scene, loaded->uneven_pixel_um);
       if (frames_missing || mask_missing) continue;
-      if (!fill_pixels(reader, settings, calibration ? &*calibration : nullptr, user_mask ? &*user_mask : nullptr,
-                       *loaded, where, micrograph))
-        continue;
-      if (!sound || !reader.problems.empty() || !starts) continue;
-      resolve_automatic(reader, micrograph.scene, &micrograph.values, &micrograph.mask, micrograph.name);
-      check_overlap(reader, micrograph.scene, micrograph.name);
-      check_stressed_disc(reader, micrograph);
+      if (loaded->colour || !settings.mosaic.bayer.empty())
+        of_colours = of_colours.empty() ? micrograph.name : of_colours;
+      filled[i] = pictures_of(reader, settings, calibration ? &*calibration : nullptr,
+                              user_mask ? &*user_mask : nullptr, std::move(*loaded), where, micrograph);
+      for (Picture& picture : filled[i]) {
+        if (!sound || !reader.problems.empty() || !starts) continue;
+        resolve_automatic(reader, picture.scene, &picture.values, &picture.mask, picture.name);
+        check_overlap(reader, picture.scene, picture.name);
+        check_stressed_disc(reader, picture);
+      }
     }
+    if (!of_colours.empty() && !shared.scene.microscope.bandwidth_nm)
+      reader.warnings.push_back(
+          of_colours +
+          ": a channel of a colour camera passes light about 100 nm wide, unless a filter or the lamp's "
+          "line makes it less; the model takes one wavelength. State microscope.light.bandwidth_nm (1 for "
+          "a laser); in white light the intervals do not hold.");
     if (calibration && calibration->has_crossed && settings.offset_automatic) {
       Parameter& offset = reader.table[settings.offset];
       offset.value = calibration->crossed_median;
       offset.prior_sd = calibration->crossed_sd;
     }
-    if (!micrographs.empty()) config.scene = micrographs[0].scene, config.observable = observables[0];
+    if (!micrographs.empty()) {
+      config.scene = filled[0].empty() ? micrographs[0].scene : filled[0][0].scene;
+      config.observable = observables[0];
+    }
     if (!tables.empty()) config.scene = tables[0].rows[0];
     for (std::size_t i = 0; i < micrographs.size(); ++i) {
-      if (observables[i].quantity != Quantity::ring_radius_cm)
-        config.job.measurements.push_back(std::move(micrographs[i]));
-      else if (!micrographs[i].mask.empty())
-        config.job.measurements.push_back(ring_readings(micrographs[i], observables[i]));
+      if (filled[i].empty()) filled[i].push_back(std::move(micrographs[i]));
+      for (Picture& picture : filled[i]) {
+        if (observables[i].quantity != Quantity::ring_radius_cm)
+          config.job.measurements.push_back(std::move(picture));
+        else if (!picture.mask.empty())
+          config.job.measurements.push_back(ring_readings(picture, observables[i]));
+      }
     }
     for (Readings& table : tables) config.job.measurements.push_back(std::move(table));
     if (const auto* droplet = std::get_if<Droplet>(&config.scene.sample))
@@ -1050,6 +1195,10 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     else if (root.find("prior"))
       reader.block(root, "prior", {"from", "parameters"}, true);
   }
+  const YamlNode* sample = root.find("sample");
+  if (sample && sample->is_map() && !sample->find("surround") && reader.specs.count("sample.surround.index"))
+    config.job.taken_as_exact.push_back(
+        "sample.surround is not given: air, an index of 1.0, is taken around the sample.");
   if (std::holds_alternative<Droplet>(config.scene.sample) && !config.scene.microscope.objective_na)
     config.job.taken_as_exact.push_back(
         "microscope.objective_na is not given: every ray that leaves the droplet is "

@@ -13,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/robust.h"
+#include "core/sub_grid.h"
 
 namespace birefit {
 namespace {
@@ -83,6 +84,17 @@ Saturation find_saturation(const LoadedImage& image, const PixelRect& area, std:
 
 int exclude_outliers(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness,
                      Mask& mask) {
+  if (const SubGrid grid = sub_grid(mask); grid.spacing > 1) {
+    const auto along = [&](int edge, int first) {
+      return std::max(0, (edge - first + grid.spacing - 1) / grid.spacing);
+    };
+    const PixelRect part{along(area.x0, grid.x0), along(area.y0, grid.y0), along(area.x1, grid.x0),
+                         along(area.y1, grid.y0)};
+    Mask used = on_grid(mask, grid);
+    const int excluded = exclude_outliers(on_grid(values, grid), part, smallest_step, smoothness, used);
+    put_back(used, grid, mask);
+    return excluded;
+  }
   // Two pixels of margin keep the neighbourhoods of the area's border whole.
   const PixelRect frame{std::max(0, area.x0 - 2), std::max(0, area.y0 - 2), std::min(values.width(), area.x1 + 2),
                         std::min(values.height(), area.y1 + 2)};
@@ -152,6 +164,23 @@ int exclude_outliers(const Image& values, const PixelRect& area, double smallest
       mask(pixel.x, pixel.y) = 0;
       ++excluded;
     }
+  }
+  return excluded;
+}
+
+int exclude_outliers_in_cells(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness,
+                              Mask& mask) {
+  int excluded = 0;
+  for (int kind = 0; kind < 4; ++kind) {
+    const auto of_kind = [&](int x, int y) { return x % 2 == kind % 2 && y % 2 == kind / 2; };
+    Mask part(mask.width(), mask.height(), 0);
+    for (int y = 0; y < mask.height(); ++y)
+      for (int x = 0; x < mask.width(); ++x)
+        if (of_kind(x, y)) part(x, y) = mask(x, y);
+    excluded += exclude_outliers(values, area, smallest_step, smoothness, part);
+    for (int y = 0; y < mask.height(); ++y)
+      for (int x = 0; x < mask.width(); ++x)
+        if (of_kind(x, y)) mask(x, y) = part(x, y);
   }
   return excluded;
 }

@@ -35,6 +35,10 @@ enum class Smoothness {
 int exclude_outliers(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness,
                      Mask& mask);
 
+/// The same where pixels see different things in cells of 2 x 2: among the neighbours of each kind.
+int exclude_outliers_in_cells(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness,
+                              Mask& mask);
+
 /// Median of the usable pixels of the area and 1.4826 times their median absolute deviation; NaN without any.
 struct RobustSpread {
   double median = 0, sd = 0;

@@ -9,6 +9,7 @@
 
 #include "birefit/io.h"
 #include "core/robust.h"
+#include "core/sub_grid.h"
 
 namespace birefit {
 namespace {
@@ -168,6 +169,13 @@ double parabola_peak(double left, double middle, double right) {
 }  // namespace
 
 DiscGuess find_disc(const Image& values, const Mask& mask) {
+  if (const SubGrid grid = sub_grid(mask); grid.spacing > 1) {
+    DiscGuess guess = find_disc(on_grid(values, grid), on_grid(mask, grid));
+    guess.center_x_px = grid.x0 + grid.spacing * guess.center_x_px;
+    guess.center_y_px = grid.y0 + grid.spacing * guess.center_y_px;
+    guess.radius_px *= grid.spacing;
+    return guess;
+  }
   DiscGuess guess;
   guess.center_x_px = 0.5 * (values.width() - 1);
   guess.center_y_px = 0.5 * (values.height() - 1);

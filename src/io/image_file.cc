@@ -18,6 +18,7 @@
 
 #include "birefit/io.h"
 #include "io/file.h"
+#include "io/images/raw_photograph.h"
 #include "io/images/signature.h"
 #include "io/images/stated_size.h"
 #include "io/images/tiff_tags.h"
@@ -97,8 +98,10 @@ std::vector<int> chosen_channels(const ImageRequest& request, const OIIO::ImageS
                                  std::vector<std::string>& notes) {
   static const std::array<std::string, 4> kChoices = {"r", "g", "b", "mean"};
   const std::string choice = lower_case(request.channel);
-  if (!choice.empty() && std::find(kChoices.begin(), kChoices.end(), choice) == kChoices.end())
-    throw UserError(request.where, "channel: '" + request.channel + "' is none of r, g, b, mean", "choose one of them");
+  const bool by_number = !choice.empty() && choice.find_first_not_of("0123456789") == std::string::npos;
+  if (!choice.empty() && !by_number && std::find(kChoices.begin(), kChoices.end(), choice) == kChoices.end())
+    throw UserError(request.where, "channel: '" + request.channel + "' is none of r, g, b, mean, nor a number",
+                    "choose one of them, or the channel's number, from 0");
 
   std::vector<int> colours;
   std::array<int, 3> rgb = {-1, -1, -1};
@@ -115,15 +118,23 @@ std::vector<int> chosen_channels(const ImageRequest& request, const OIIO::ImageS
   if (colours.size() < static_cast<std::size_t>(spec.nchannels)) notes.push_back("alpha channel ignored");
   if (colours.empty() && spec.nchannels == 1) colours.push_back(0);
 
+  if (by_number) {
+    const int number = choice.size() < 9 ? std::stoi(choice) : spec.nchannels;
+    if (number >= spec.nchannels)
+      refuse(request, fmt::format("has no channel {}: it has {} ({})", choice, spec.nchannels, names),
+             "channels count from 0");
+    return {number};
+  }
   if (colours.size() == 1) {
-    if (!choice.empty() && !request.mask) notes.push_back("channel: " + choice + " has no effect: the image is grey");
+    if (!choice.empty() && !request.mask && !request.cells)
+      notes.push_back("channel: " + choice + " has no effect: the image is grey");
     return colours;
   }
   if (colours.size() == 3 && std::count(rgb.begin(), rgb.end(), -1) == 3) std::copy_n(colours.begin(), 3, rgb.begin());
   if (std::count(rgb.begin(), rgb.end(), -1) > 0)
     refuse(request,
            fmt::format("has {} channels ({}) that are neither grey nor red, green and blue", spec.nchannels, names),
-           "save the one to be fitted as a grey image");
+           "add `channel: 0` for the first, or save the one to be fitted as a grey image");
   if (choice.empty())
     refuse(
         request,
@@ -231,7 +242,20 @@ double invert_white_is_zero(const OIIO::ImageSpec& spec, double top_code, Image&
   return top;
 }
 
-LoadedImage load_checked(const ImageRequest& request, const Signature& signature) {
+/// Where BitsPerSample is left to its default of 1, OpenImageIO takes 8: the file with the tag; else nothing.
+std::string with_one_bit_stated(const ImageRequest& request) {
+  const std::size_t page = static_cast<std::size_t>(std::max(request.page.value_or(0), 0));
+  const TiffTags tags = read_tiff_tags(request.path, page + 1);
+  if (tags.pages.size() <= page || tags.pages[page].states_bits) return {};
+  if (!request.mask) refuse_one_bit(request);
+  std::string content = with_stated_bit(request.path, tags, page);
+  if (content.empty() || tags.pages[page].samples != 1)
+    refuse(request, "has 1 bit per sample and does not say so", "save it with 8 bits");
+  return content;
+}
+
+/// `content`: of the file, where it is to be read otherwise than it stands there; else empty.
+LoadedImage load_checked(const ImageRequest& request, const Signature& signature, std::string content = {}) {
   if (signature.animated)
     refuse(request, "is animated (" + signature.format_name + ")", "extract the frame to be fitted as a still image");
   if (signature.stored_bits == 1 && !request.mask) refuse_one_bit(request);
@@ -243,17 +267,11 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     refuse(request, "cannot be read: this OpenImageIO has no " + signature.format_name + " support",
            "convert it to TIFF");
   }
-  // Where BitsPerSample is left to its default of 1, OpenImageIO takes 8.
-  const std::size_t wanted_page = static_cast<std::size_t>(std::max(request.page.value_or(0), 0));
-  const TiffTags tags = signature.format == "tiff" ? read_tiff_tags(request.path, wanted_page + 1) : TiffTags{};
-  std::string restated;
   std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
-  if (tags.pages.size() > wanted_page && !tags.pages[wanted_page].states_bits) {
-    if (!request.mask) refuse_one_bit(request);
-    restated = with_stated_bit(request.path, tags, wanted_page);
-    memory = std::make_unique<OIIO::Filesystem::IOMemReader>(restated.data(), restated.size());
-    if (restated.empty() || !input->set_ioproxy(memory.get()))
-      refuse(request, "has 1 bit per pixel and does not say so", "save it with 8 bits");
+  if (content.empty() && signature.format == "tiff") content = with_one_bit_stated(request);
+  if (!content.empty()) {
+    memory = std::make_unique<OIIO::Filesystem::IOMemReader>(content.data(), content.size());
+    if (!input->set_ioproxy(memory.get())) throw std::runtime_error("OpenImageIO cannot read TIFF from memory");
   }
   OIIO::ImageSpec settings, spec;
   settings.attribute("oiio:UnassociatedAlpha", 1);
@@ -304,7 +322,11 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   constexpr int kWhiteIsZero = 0, kPalette = 3, kSubsampledColour = 6;
   const bool palette = signature.palette || photometric == kPalette;
   if (bits == 1 && !request.mask) refuse_one_bit(request);
-  if (tiff && photometric > kPalette && photometric != kSubsampledColour)
+  if (photometric == kCfaPhotometric && !request.cells)
+    refuse(request, "is a colour filter mosaic: its pixels see red, green and blue in cells of 2 x 2",
+           "add `bayer: rggb` (or bggr, grbg, gbrg) and `channel: g`");
+  if (tiff && photometric > kPalette && photometric != kSubsampledColour && photometric != kCfaPhotometric &&
+      photometric != kLinearRawPhotometric)
     refuse(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
   if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
     refuse(request, "is stored in the print colour space " + space, "save it as grey or RGB");
@@ -317,6 +339,7 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   LoadedImage loaded;
   const std::string description = spec.get_string_attribute("ImageDescription", "");
   const std::vector<int> channels = chosen_channels(request, spec, palette, loaded.notes);
+  loaded.colour = spec.nchannels >= 3;
   loaded.values = read_samples(request, signature, *input, page, spec, channels);
 
   const bool small_integer = spec.format == TypeDesc::UINT8 || spec.format == TypeDesc::UINT16;
@@ -356,8 +379,56 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     if (!request.page) refuse(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
     loaded.notes.push_back("it " + found + ": the first is used");
   }
-  loaded.pixel_size_um = stated_pixel_size_um(spec, description, loaded.notes);
+  loaded.pixel_size_um = stated_pixel_size_um(spec, description, loaded.notes, loaded.uneven_pixel_um);
   return loaded;
+}
+
+/// The picture of a raw photograph, never its thumbnail.
+LoadedImage load_raw(const ImageRequest& request, const TiffTags& tags) {
+  std::vector<TiffDirectory> whole_pictures;
+  for (const auto& directories : {tags.pages, tags.children})
+    for (const TiffDirectory& directory : directories)
+      if (!directory.reduced()) whole_pictures.push_back(directory);
+  const auto picture = std::max_element(
+      whole_pictures.begin(), whole_pictures.end(),
+      [](const TiffDirectory& a, const TiffDirectory& b) { return a.width * a.height < b.width * b.height; });
+  const std::string develop = "save it as a linear 16-bit TIFF (dcraw -D -4 -T keeps the mosaic, for `bayer: rggb`)";
+  if (picture != whole_pictures.end() && picture->photometric != kCfaPhotometric && !tags.canon_raw) {
+    // Not under filters: a sub-image of colours or grey.
+    try {
+      ImageRequest asked = request;
+      asked.page.reset();
+      LoadedImage loaded = load_checked(asked, {"tiff", "TIFF"}, beginning_with(request.path, tags, *picture));
+      loaded.notes.insert(loaded.notes.begin(),
+                          fmt::format("raw photograph: its picture of {} x {} pixels is read, not its thumbnail",
+                                      loaded.values.width(), loaded.values.height()));
+      return loaded;
+    } catch (const UserError& error) {
+      // What is wrong with the request is to be said as it is.
+      if (std::string(error.what()).find("damaged") == std::string::npos) throw;
+    }
+  } else if (std::optional<RawPhotograph> raw = read_raw_photograph(request.path)) {
+    if (picture != whole_pictures.end() && picture->pattern.size() == 4) raw->pattern = picture->pattern;
+    const std::string filters = raw->pattern.empty() ? "in an order that it does not state" : "(" + raw->pattern + ")";
+    if (!request.cells)
+      refuse(request,
+             fmt::format("is a raw photograph: {} x {} pixels under a mosaic of colour filters {}", raw->counts.width(),
+                         raw->counts.height(), filters),
+             "add `bayer: " + (raw->pattern.empty() ? "rggb" : raw->pattern) + "` and `channel: g` (or r, b)");
+    LoadedImage loaded;
+    loaded.values = std::move(raw->counts);
+    loaded.bits = 16;
+    loaded.top_code = 65535;
+    loaded.filter_pattern = raw->pattern;
+    loaded.notes.push_back("raw photograph: counts of the sensor under filters " + filters +
+                           ", before any white balance or curve");
+    return loaded;
+  }
+  const std::string readable = tags.pages.empty()
+                                   ? "this program cannot read its picture"
+                                   : fmt::format("the readable image in it is a thumbnail of {} x {} pixels",
+                                                 tags.pages.front().width, tags.pages.front().height);
+  refuse(request, "is a raw photograph; " + readable, develop);
 }
 
 // ---- writing --------------------------------------------------------------------------------------------------------
@@ -416,6 +487,8 @@ LoadedImage load_image(const ImageRequest& request) {
   if (signature.format.empty())
     refuse(request, "is no image of a kind birefit reads", "use PNG, TIFF, OpenEXR, JPEG, BMP, GIF or WebP");
   try {
+    const TiffTags tags = signature.format == "tiff" ? read_tiff_tags(request.path, 1) : TiffTags{};
+    if (signature.format == "raw" || is_raw_photograph(tags)) return load_raw(request, tags);
     return load_checked(request, signature);
   } catch (const std::bad_alloc&) {
     refuse(request, "does not fit into memory", "crop it to the object, or bin it");

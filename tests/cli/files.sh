@@ -50,6 +50,13 @@ holds() {  # CASE NAME TRUTH
     }
     END { exit !(found && inside) }' "$1.txt" || fail "$1: $2 = $3 is not $(grep -m1 "$2 *=" "$1.txt")"
 }
+# The four pictures of that mosaic were drawn around one middle of their own grids, half a pixel from where a camera's
+# cells have it: to a thousandth.
+near_droplet() {
+  ends "$1" 0
+  awk '$1 ~ "diameter_um$" && $2 == "=" { d = $3 / 9.3 - 1 } $1 ~ "birefringence$" && $2 == "=" { b = $3 / 0.22 - 1 }
+    END { exit !(d * d < 1e-6 && b * b < 1e-6 && d != 0) }' "$1.txt" || fail "$1: not 9.3 and 0.22"
+}
 is_droplet() { ends "$1" 0; holds "$1" diameter_um 9.3; holds "$1" birefringence 0.22; }
 
 # ---- white is zero; masks ---------------------------------------------------------------------------------------------
@@ -62,6 +69,56 @@ for mask in 1bit inverting; do
   says "mask_$mask" "of the mask's 16384 pixels 9853 are taken as selected"
 done
 says mask_inverting 'white is zero in this file'
+
+# ---- raw photographs --------------------------------------------------------------------------------------------------
+droplet thumbnail "$data/droplet_thumbnail_first.dng" 'channel: g' 'pixel_size_um: 0.1'
+ends thumbnail 2
+says thumbnail 'is a raw photograph'
+droplet cfa "$data/droplet_cfa.tif" 'pixel_size_um: 0.1'
+ends cfa 2
+says cfa 'is a colour filter mosaic'
+
+# ---- mosaics ----------------------------------------------------------------------------------------------------------
+droplet bayer_unstated "$data/droplet_bayer.tif" 'pixel_size_um: 0.1'
+ends bayer_unstated 2
+says bayer_unstated 'pixels alternate in cells of 2 x 2: a colour (Bayer) mosaic'
+droplet polarization_unstated "$data/droplet_polarization.tif" 'pixel_size_um: 0.05'
+ends polarization_unstated 2
+says polarization_unstated 'pixels alternate in cells of 2 x 2: a polarization mosaic'
+for channel in r g b; do
+  droplet "bayer_$channel" "$data/droplet_bayer.tif" 'pixel_size_um: 0.1' 'bayer: rggb' "channel: $channel"
+  is_droplet "bayer_$channel"
+done
+grep -qF 'droplet_bayer.tif (g2)' bayer_g/fit.json || fail 'bayer_g: greens of both rows are not two pictures'
+says bayer_g 'a channel of a colour camera passes light'
+droplet polarization "$data/droplet_polarization.tif" 'pixel_size_um: 0.05' 'mosaic: polarization'
+ends polarization 2
+says polarization 'analyzer_deg is given beside mosaic: polarization'
+grep -v analyzer_deg polarization.yaml > polarization_four.yaml
+run polarization_four
+near_droplet polarization_four
+grep -qF 'droplet_polarization.tif (135 deg)' polarization_four/fit.json || fail 'polarization_four: no picture at 135 deg'
+sed 's/mosaic: polarization/mosaic: {polarization: [[90, 45], [135, 0]]}/' polarization_four.yaml > polarization_layout.yaml
+run polarization_layout
+near_droplet polarization_layout
+# The truth is not in another layout, and the picture says so.
+sed 's/mosaic: polarization/mosaic: {polarization: [[0, 45], [135, 90]]}/' polarization_four.yaml > polarization_wrong.yaml
+run polarization_wrong
+ends polarization_wrong 1
+droplet two_taps "$data/droplet_two_taps.tif" 'pixel_size_um: 0.1'
+is_droplet two_taps  # taps that differ along one side are no mosaic
+droplet mosaic_none "$data/droplet_bayer.tif" 'pixel_size_um: 0.1' 'mosaic: none'
+! grep -q 'alternate' mosaic_none.err || fail 'mosaic: none still looks for one'
+
+# ---- pixels that are not square ---------------------------------------------------------------------------------------
+droplet not_square_file "$data/droplet_not_square.tif"
+ends not_square_file 2
+says not_square_file 'states pixels of 0.1 x 0.12 um: they are not square'
+droplet not_square_stated "$data/droplet.tif" 'pixel_size_um: [0.1, 0.12]'
+ends not_square_stated 2
+says not_square_stated 'pixels of 0.1 x 0.12 um are not square'
+droplet square_stated "$data/droplet.tif" 'pixel_size_um: [0.1, 0.1]'
+is_droplet square_stated
 
 [ $failures -eq 0 ] && echo 'all as required' || echo "$failures failures"
 exit $((failures > 0))

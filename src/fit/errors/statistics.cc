@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/sub_grid.h"
+
 namespace birefit::estimation {
 namespace {
 
@@ -138,6 +140,8 @@ Inverse invert_normal_equations(const Eigen::MatrixXd& factor) {
 }
 
 double correlation_area(const Image& whitened, const Mask& mask) {
+  if (const SubGrid grid = sub_grid(mask); grid.spacing > 1)
+    return correlation_area(on_grid(whitened, grid), on_grid(mask, grid));
   const int width = whitened.width(), height = whitened.height();
   // Enough rows for a correlation known to 0.01; more of a large image adds time only.
   const int row_step = std::max(1, static_cast<int>(whitened.size() / 400000));

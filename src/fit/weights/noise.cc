@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/robust.h"
+#include "core/sub_grid.h"
 
 namespace birefit::estimation {
 namespace {
@@ -298,6 +299,13 @@ VarianceLine variance_line(const std::vector<Bin>& bins, double floor, std::opti
 }  // namespace
 
 NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
+  if (const SubGrid grid = sub_grid(micrograph.mask); grid.spacing > 1) {
+    Picture part;
+    part.values = on_grid(micrograph.values, grid), part.mask = on_grid(micrograph.mask, grid);
+    part.variance_scale = on_grid(micrograph.variance_scale, grid);
+    const Image model = fitted ? on_grid(*fitted, grid) : Image();
+    return estimate_noise(part, fitted ? &model : nullptr);
+  }
   constexpr std::size_t kEnough = 200;
   const Codes codes(micrograph);
   double order = 4;
@@ -334,12 +342,13 @@ NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
 
 Image smoothed(const Picture& micrograph) {
   const int width = micrograph.values.width(), height = micrograph.values.height();
+  const int spacing = sub_grid(micrograph.mask).spacing;
   Image result(width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       double sum = 0, count = 0;
-      for (int j = std::max(0, y - 1); j <= std::min(height - 1, y + 1); ++j)
-        for (int i = std::max(0, x - 1); i <= std::min(width - 1, x + 1); ++i)
+      for (int j = y < spacing ? y : y - spacing; j <= std::min(height - 1, y + spacing); j += spacing)
+        for (int i = x < spacing ? x : x - spacing; i <= std::min(width - 1, x + spacing); i += spacing)
           if (micrograph.mask(i, j)) sum += micrograph.values(i, j), ++count;
       result(x, y) = count > 0 ? sum / count : 0;
     }

@@ -53,6 +53,10 @@ Signature read_signature(const std::filesystem::path& path, std::uintmax_t file_
     read_png_signature(file, file_size, signature);
   } else if (starts_with("II*\0"sv) || starts_with("MM\0*"sv) || starts_with("II+\0"sv) || starts_with("MM\0+"sv)) {
     signature = {"tiff", "TIFF"};
+  } else if (starts_with("FUJIFILMCCD-RAW"sv) || starts_with("ftypcrx "sv, 4) || starts_with("IIRO"sv) ||
+             starts_with("IIRS"sv) || starts_with("MMOR"sv) || starts_with("IIU\0"sv) || starts_with("\0MRM"sv) ||
+             starts_with("FOVb"sv)) {
+    signature = {"raw", "raw photograph"};  // Fujifilm, Canon, Olympus, Panasonic, Minolta, Sigma; others are TIFFs
   } else if (starts_with("v/1\x01"sv)) {
     signature = {"openexr", "OpenEXR"};
   } else if (starts_with("\xff\xd8\xff"sv)) {

@@ -57,10 +57,11 @@ std::string imagej_value(const std::string& description, const std::string& key)
 }
 
 double stated_pixel_size_um(const OIIO::ImageSpec& spec, const std::string& description,
-                            std::vector<std::string>& notes) {
+                            std::vector<std::string>& notes, std::array<double, 2>& uneven_um) {
   const auto accept = [&](double x, double y, const std::string& source) -> double {
     if (y > 0 && std::abs(y / x - 1) > 0.01) {
       notes.push_back(fmt::format("{} states pixels that are not square ({:.5g} x {:.5g} um): ignored", source, x, y));
+      uneven_um = {x, y};
       return 0;
     }
     notes.push_back(fmt::format("pixel size {:.5g} um from {}", x, source));

@@ -18,6 +18,7 @@ enum Tag {
   kPhotometric = 262,
   kSamples = 277,
   kSubIfds = 330,
+  kCfaPattern = 33422,
   kDngVersion = 50706
 };
 constexpr std::uint64_t kMostEntries = 4096, kMostChildren = 16;
@@ -31,6 +32,7 @@ class TiffFile {
     big_endian = head == "MM\0*"sv || head == "MM\0+"sv;
     big_tiff = head == "II+\0"sv || head == "MM\0+"sv;
     good = big_endian || big_tiff || head == "II*\0"sv;
+    canon_raw = good && bytes(8, 2) == "CR";
   }
 
   std::optional<std::uint64_t> number(std::uint64_t at, int size) {
@@ -42,7 +44,7 @@ class TiffFile {
     return value;
   }
 
-  bool good = false, big_endian = false, big_tiff = false;
+  bool good = false, big_endian = false, big_tiff = false, canon_raw = false;
 
  private:
   std::string bytes(std::uint64_t at, std::size_t count) {
@@ -106,6 +108,11 @@ std::optional<TiffDirectory> read_directory(TiffFile& file, std::uint64_t offset
       case kSubIfds:
         for (std::uint64_t k = 0; k < std::min(*values, kMostChildren); ++k) directory.children.push_back(value(k));
         break;
+      case kCfaPattern:
+        if (*values == 4)
+          for (std::uint64_t k = 0; k < 4; ++k)
+            if (const std::uint64_t colour = value(k); colour < 3) directory.pattern += "rgb"[colour];
+        break;
       case kDngVersion:
         directory.dng = true;
         break;
@@ -116,13 +123,27 @@ std::optional<TiffDirectory> read_directory(TiffFile& file, std::uint64_t offset
   return directory;
 }
 
+std::string bytes_of(std::uint64_t value, int size, bool big_endian) {
+  std::string text;
+  for (int i = 0; i < size; ++i) text += static_cast<char>(value >> (8 * (big_endian ? size - 1 - i : i)) & 255);
+  return text;
+}
+
+/// Empty where offsets are not of 4 bytes, or the file is too large to hold.
+std::string whole(const std::filesystem::path& path, const TiffTags& tags) {
+  constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 31;
+  if (tags.big_tiff || std::filesystem::file_size(path) > kMostBytes) return {};
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
 }  // namespace
 
 TiffTags read_tiff_tags(const std::filesystem::path& path, std::size_t most_pages) {
   TiffFile file(path);
   TiffTags tags;
   if (!file.good) return tags;
-  tags.big_endian = file.big_endian, tags.big_tiff = file.big_tiff;
+  tags.big_endian = file.big_endian, tags.big_tiff = file.big_tiff, tags.canon_raw = file.canon_raw;
   const int word = file.big_tiff ? 8 : 4;
   std::uint64_t link = file.big_tiff ? 8 : 4;
   std::set<std::uint64_t> visited;  // a damaged chain may turn back
@@ -144,15 +165,9 @@ TiffTags read_tiff_tags(const std::filesystem::path& path, std::size_t most_page
 }
 
 std::string with_stated_bit(const std::filesystem::path& path, const TiffTags& tags, std::size_t page) {
-  constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 31;
-  if (tags.big_tiff || page >= tags.pages.size() || std::filesystem::file_size(path) > kMostBytes) return {};
-  std::ifstream in(path, std::ios::binary);
-  std::string content{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  const auto number = [&](std::uint64_t value, int size) {
-    std::string text;
-    for (int i = 0; i < size; ++i) text += static_cast<char>(value >> (8 * (tags.big_endian ? size - 1 - i : i)) & 255);
-    return text;
-  };
+  if (page >= tags.pages.size()) return {};
+  std::string content = whole(path, tags);
+  const auto number = [&](std::uint64_t value, int size) { return bytes_of(value, size, tags.big_endian); };
   const auto tag_at = [&](std::size_t at) {
     const unsigned first = static_cast<unsigned char>(content[at]),
                    second = static_cast<unsigned char>(content[at + 1]);
@@ -160,6 +175,7 @@ std::string with_stated_bit(const std::filesystem::path& path, const TiffTags& t
   };
   const TiffDirectory& directory = tags.pages[page];
   const std::size_t start = directory.offset;
+  if (start + 2 > content.size()) return {};
   const std::size_t count = tag_at(start), end = start + 2 + 12 * count;
   if (end + 4 > content.size()) return {};
   // Entries are sorted by their tags.
@@ -171,6 +187,12 @@ std::string with_stated_bit(const std::filesystem::path& path, const TiffTags& t
   if (content.size() % 2) content += '\0';  // directories start at even places
   content.replace(directory.link, 4, number(content.size(), 4));
   return content + copy;
+}
+
+std::string beginning_with(const std::filesystem::path& path, const TiffTags& tags, const TiffDirectory& directory) {
+  std::string content = whole(path, tags);
+  if (content.size() >= 8) content.replace(4, 4, bytes_of(directory.offset, 4, tags.big_endian));
+  return content;
 }
 
 }  // namespace birefit

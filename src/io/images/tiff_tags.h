@@ -17,11 +17,13 @@ struct TiffDirectory {
   bool states_bits = false;
   bool dng = false;  ///< has a DNGVersion
   bool reduced() const { return (subfile & 1) != 0; }
+  std::string pattern;                  ///< of colour filters in cells of 2 x 2: "rggb", ..
   std::vector<std::uint64_t> children;  ///< offsets of its SubIFDs
 };
 
 struct TiffTags {
   bool big_endian = false, big_tiff = false;
+  bool canon_raw = false;               ///< "CR" behind the header
   std::vector<TiffDirectory> pages;     ///< the chain, as far as it was asked for
   std::vector<TiffDirectory> children;  ///< SubIFDs of the first page
 };
@@ -34,5 +36,8 @@ TiffTags read_tiff_tags(const std::filesystem::path& path, std::size_t most_page
 /// The file with BitsPerSample = 1 written out in a page that leaves it to the default, at the end of the file: for
 /// readers that take the default to be 8. Empty for BigTIFF and for files too large to hold (2 GB).
 std::string with_stated_bit(const std::filesystem::path& path, const TiffTags& tags, std::size_t page);
+
+/// The file as if the chain began with this directory: for readers that see no SubIFDs. Empty as above.
+std::string beginning_with(const std::filesystem::path& path, const TiffTags& tags, const TiffDirectory& directory);
 
 }  // namespace birefit
