@@ -7,7 +7,8 @@ namespace birefit {
 
 SampledVolume read_sampled_volume(ConfigReader& reader, const Block& parent) {
   SampledVolume volume;
-  const Block block = reader.block(parent, "volume", {"file", "axes", "spacing_um", "bulk_order", "scale"}, true);
+  const Block block =
+      reader.block(parent, "volume", {"file", "array", "axes", "spacing_um", "bulk_order", "q_norm", "scale"}, true);
   volume.scale = read_described<SampledVolume>(reader, block, "scale");
   VolumeRequest request;
   const std::optional<std::string> axes = reader.choice(block, "axes", {"zyx", "xyz"});
@@ -17,6 +18,12 @@ SampledVolume read_sampled_volume(ConfigReader& reader, const Block& parent) {
   order.lower_open = true;
   order.upper = 1e6;
   request.bulk_order = reader.plain(block, "bulk_order", order).value_or(0);
+  NumberSpec norm;
+  norm.lower = 0;
+  norm.lower_open = true;
+  norm.upper = 100;
+  request.q_norm = reader.plain(block, "q_norm", norm).value_or(0);
+  request.array = reader.text(block, "array").value_or("");
   bool readable = true;
   if (const YamlNode* spacing = block.find("spacing_um")) {
     NumberSpec step;
@@ -40,12 +47,13 @@ SampledVolume read_sampled_volume(ConfigReader& reader, const Block& parent) {
     request.spacing_um = values;
     request.where = spacing->where;
   }
-  if (!block.find("file")) reader.missing(block, "file", "a director field, .npy or .vti");
+  if (!block.find("file"))
+    reader.missing(block, "file", "a director field, .npy, .npz, .vti, .vtk or text of open-Qmin");
   const std::optional<std::string> name = reader.text(block, "file");
   if (!name || !readable) return volume;
   request.path = reader.resolve(*name);
   if (!request.spacing_um) request.where = block.find("file")->where;
-  if (axes && request.path.extension() == ".vti")
+  if (axes && (request.path.extension() == ".vti" || request.path.extension() == ".vtk"))
     reader.problems.add(block.find("axes")->where, "axes belongs to .npy files: in a .vti x runs fastest",
                         "leave it out");
   try {

@@ -1,27 +1,15 @@
 #pragma once
-// Director fields from files: NumPy arrays (.npy) and VTK image data (.vti). Formats: docs/configuration.md, "Sampled
-// fields".
+// Director fields from files: NumPy arrays (.npy, .npz), VTK's image data (.vti) and legacy files (.vtk), the text of
+// open-Qmin. Formats: docs/configuration.md, "Sampled fields".
 
-#include <array>
-#include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "birefit/error.h"
 #include "birefit/volume.h"
+#include "io/fields/request.h"
 
 namespace birefit {
-
-struct VolumeRequest {
-  std::filesystem::path path;
-  Where where;                                      ///< of the config entry, for what is wrong with the request
-  bool x_first = false;                             ///< .npy: array[x, y, z] instead of array[z, y, x]
-  std::optional<std::array<double, 3>> spacing_um;  ///< .npy: needed; .vti: not allowed, the file says it
-  /// order of the bulk, in the units of the file's S or Q; 0 = the largest in the file
-  double bulk_order = 0;
-};
 
 struct LoadedVolume {
   std::shared_ptr<const VolumeGrid> grid;

@@ -120,5 +120,25 @@ says not_square_stated 'pixels of 0.1 x 0.12 um are not square'
 droplet square_stated "$data/droplet.tif" 'pixel_size_um: [0.1, 0.1]'
 is_droplet square_stated
 
+# ---- fields: 0.5 everywhere -------------------------------------------------------------------------------------------
+field() {  # NAME KEYS
+  printf '%s\n' 'image_size_px: [8, 8]' 'micrograph: {pixel_size_um: 0.3}' 'sample:' "  volume: {$2}" \
+    '  material: {ordinary: 1.5, birefringence: 0.1}' \
+    'microscope: {light: {wavelength_nm: 800}, polarizer_deg: 0, analyzer_deg: 90}' > "$1.yaml"
+  "$birefit" render "$1.yaml" --out "$1.exr" > "$1.txt" 2> "$1.err"; echo $? > "$1.code"
+}
+field zlib "file: $data/director_zlib.vti"
+ends zlib 0
+field norm "file: $data/q_three_halves.npy, spacing_um: [0.5, 0.5, 0.5], bulk_order: 0.53"
+ends norm 2
+says norm 'add q_norm: 1.5 to sample.volume'
+field norm_stated "file: $data/q_three_halves.npy, spacing_um: [0.5, 0.5, 0.5], bulk_order: 0.53, q_norm: 1.5"
+ends norm_stated 0
+field open_qmin "file: $data/open_qmin.txt, spacing_um: [0.5, 0.5, 0.5]"
+ends open_qmin 0
+for picture in zlib norm_stated open_qmin; do
+  oiiotool --stats "$picture.exr" | grep -q 'Stats Avg: 0.500000' || fail "$picture: not 0.5 everywhere"
+done
+
 [ $failures -eq 0 ] && echo 'all as required' || echo "$failures failures"
 exit $((failures > 0))

@@ -189,9 +189,8 @@ TEST_F(VolumeFile, LongDirectorsAreNormalisedWithAWarning) {
 
 TEST_F(VolumeFile, BadNumpyFiles) {
   const std::string good = npy_data<float>(false, false, 3, component), shape = "(4, 3, 2, 3)";
-  EXPECT_THAT(npy_error("PK\3\4 something else"), HasSubstr("is no NumPy array"));
+  EXPECT_THAT(npy_error("PK\3\4 something else"), HasSubstr("damaged or cut off archive"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, shape), good, 9)), HasSubstr("version 9"));
-  EXPECT_THAT(npy_error(npy_text(header(">f4", false, shape), good)), HasSubstr("'>f4', not little-endian floats"));
   EXPECT_THAT(npy_error(npy_text(header("<i8", false, shape), good)), HasSubstr("astype"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(4, 3, 2)"), good)), HasSubstr("expected (nz, ny, nx, 3)"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(3, 4, 3, 2)"), good)), HasSubstr("moveaxis"));
@@ -214,7 +213,7 @@ TEST_F(VolumeFile, BadNumpyFiles) {
   request.path = folder_ / "none.npy";
   EXPECT_THAT(error_of([&] { load_volume(request); }), HasSubstr("does not exist"));
   request.path = write("field.npz", "PK");
-  EXPECT_THAT(error_of([&] { load_volume(request); }), HasSubstr("neither .npy nor .vti"));
+  EXPECT_THAT(error_of([&] { load_volume(request); }), HasSubstr("neither .npy, .npz, .vti"));
 }
 
 // ---- .vti ----------------------------------------------------------------------------------------------------------
@@ -331,11 +330,12 @@ TEST_F(VolumeFile, BadVtkFiles) {
   const std::string floats = bytes_of(nodes<float>(3, component)),
                     good = array_text("n", 3, "Float64", "ascii", ascii(3, component));
   const std::string binary = array_text("n", 3, "Float32", "binary", base64(with_length<std::uint32_t>(floats)));
-  EXPECT_THAT(vti_error("# vtk DataFile Version 3.0\nASCII\n"), HasSubstr("legacy .vtk files are not"));
   EXPECT_THAT(vti_error("<VTKFile type=\"UnstructuredGrid\"></VTKFile>"), HasSubstr("Resample To Image"));
+  EXPECT_THAT(vti_error(vti_text(binary, "", "compressor=\"vtkZfpDataCompressor\" byte_order=\"LittleEndian\"")),
+              HasSubstr("is compressed by vtkZfpDataCompressor"));
   EXPECT_THAT(vti_error(vti_text(binary, "", "compressor=\"vtkZLibDataCompressor\" byte_order=\"LittleEndian\"")),
-              HasSubstr("is compressed (vtkZLibDataCompressor)"));
-  EXPECT_THAT(vti_error(vti_text(binary, "", "byte_order=\"BigEndian\"")), HasSubstr("is BigEndian"));
+              HasSubstr("n is cut short or damaged"));
+  EXPECT_THAT(vti_error(vti_text(binary, "", "byte_order=\"MiddleEndian\"")), HasSubstr("is unknown"));
   EXPECT_THAT(vti_error(vti_text(good, "", "", "WholeExtent=\"3 4 0 2 0 3\" Spacing=\"0.2 0.3 0.4\"", "CellData")),
               HasSubstr("Cell Data To Point Data"));
   EXPECT_THAT(vti_error(vti_text(array_text("velocity", 3, "Float64", "ascii", ascii(3, component)))),
