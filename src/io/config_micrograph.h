@@ -1,0 +1,45 @@
+#pragma once
+// The block `micrograph` of a config: what it gives to every image.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "birefit/measurement.h"
+#include "io/config_mosaic.h"
+#include "io/config_pixels.h"
+#include "io/config_reader.h"
+
+namespace birefit {
+
+/// What the `micrograph:` block gives to every image.
+struct MicrographSettings {
+  std::optional<std::string> image;
+  Where image_where;
+  std::optional<int> page;
+  std::string channel;
+  MosaicSettings mosaic;
+  std::optional<double> pixel_size_um;
+  Transfer transfer;
+  ParameterRef gain, offset, center_x, center_y, rotation;
+  std::vector<UnevenLight> uneven;
+  bool offset_automatic = false;
+  std::optional<PixelRect> roi;
+  Where roi_where;
+  std::optional<std::string> mask;
+  Where mask_where;
+  std::optional<double> saturation_counts;
+  std::optional<NoiseModel> noise;
+  std::optional<std::string> dark, parallel, crossed;
+  Where dark_where, parallel_where, crossed_where;
+  Where where;
+};
+
+/// Of a scene whose sample is read. Mistakes go to the reader's problems.
+MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene, Quantity quantity);
+/// An automatic gain: a negative one would pass off dark fringes as bright ones, half an order away.
+void keep_positive(Parameter& gain);
+/// The two sizes of a pixel in words: "0.1 x 0.12 um".
+std::string not_square(double x_um, double y_um);
+
+}  // namespace birefit

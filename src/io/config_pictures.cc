@@ -1,0 +1,296 @@
+#include "io/config_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/images/mask.h"
+#include "io/images/mosaic.h"
+#include "medium/references.h"
+
+namespace birefit {
+namespace {
+
+/// A frame's pixel whose light is below this fraction of the typical one says nothing about transmission.
+constexpr double kLeastLightFraction = 0.05;
+
+PixelRect whole(const Image& image) { return {0, 0, image.width(), image.height()}; }
+
+bool check_roi(ConfigReader& reader, const MicrographSettings& settings, const Image& image, const std::string& name) {
+  if (!settings.roi) return true;
+  const PixelRect& roi = *settings.roi;
+  if (roi.x0 >= 0 && roi.y0 >= 0 && roi.x1 <= image.width() && roi.y1 <= image.height()) return true;
+  reader.problems.add(settings.roi_where, "roi_px = [" + std::to_string(roi.x0) + ", " + std::to_string(roi.y0) + ", " +
+                                              std::to_string(roi.x1) + ", " + std::to_string(roi.y1) +
+                                              "] reaches outside " + name + ", which is " +
+                                              std::to_string(image.width()) + " x " + std::to_string(image.height()) +
+                                              " pixels");
+  return false;
+}
+
+void mark_saturated(const Image& counts, double from, Mask& saturated) {
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    if (counts.values()[i] >= from) saturated.values()[i] = 1;
+}
+
+/// The smallest difference that can be told from none: half a code, or single precision.
+double smallest_step(const LoadedImage& image) {
+  if (image.top_code > 0) return 0.5;
+  double largest = 0;
+  for (double value : image.values.values())
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  return std::max(1e-6 * largest, 1e-300);
+}
+
+/// Values, mask and the reasons for exclusion; false when a problem left nothing to work with. Of a mosaic only the
+/// pixels of a `part`.
+bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const Calibration* calibration,
+                 const Mask* user_mask, const MosaicPart* part, LoadedImage image, const Where& where,
+                 Picture& micrograph) {
+  const int width = image.values.width(), height = image.values.height();
+  const std::string& name = micrograph.name;
+  const std::size_t problems_before = reader.problems.all().size();
+  check_roi(reader, settings, image.values, name);
+  const auto other_size = [&](int other_width, int other_height, const std::string& what, const Where& place) {
+    if (other_width == width && other_height == height) return;
+    reader.problems.add(place, what + " is " + std::to_string(other_width) + " x " + std::to_string(other_height) +
+                                   " pixels, " + name + " is " + std::to_string(width) + " x " +
+                                   std::to_string(height));
+  };
+  if (user_mask) other_size(user_mask->width(), user_mask->height(), *settings.mask, settings.mask_where);
+  if (calibration)
+    other_size(calibration->dark.width(), calibration->dark.height(), *settings.dark, settings.dark_where);
+  if (reader.problems.all().size() > problems_before) return false;
+
+  const PixelRect area = settings.roi.value_or(whole(image.values));
+  const Saturation saturation = find_saturation(image, area, settings.saturation_counts);
+  if (saturation.pile_up)
+    reader.warnings.push_back(name + ": " + std::to_string(saturation.pile_up_pixels) + " pixels pile up at " +
+                              show(saturation.from) + " counts, below the file's top code of " + show(image.top_code) +
+                              "; they are taken as saturated (saturation_counts sets the limit).");
+  Mask saturated(width, height, 0);
+  mark_saturated(image.values, saturation.from, saturated);
+  const double step = smallest_step(image);
+  linearise(image.values, settings.transfer, image.top_code);
+
+  micrograph.mask = Mask(width, height, 0);
+  int frame_dead = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (part && ((x - part->x0) % 2 != 0 || (y - part->y0) % 2 != 0)) continue;
+      if (!area.contains(x, y))
+        ++micrograph.outside_roi;
+      else if (user_mask && !(*user_mask)(x, y))
+        ++micrograph.masked_by_user;
+      else if (!std::isfinite(image.values(x, y)))
+        ++micrograph.non_finite;
+      else if (saturated(x, y) || (calibration && calibration->saturated(x, y)))
+        ++micrograph.saturated;
+      else if (calibration && !calibration->usable(x, y))
+        ++frame_dead;
+      else
+        micrograph.mask(x, y) = 1;
+    }
+  }
+  micrograph.dead = frame_dead + exclude_outliers(image.values, area, step, Smoothness::image, micrograph.mask);
+
+  if (calibration) {
+    micrograph.variance_scale = Image(width, height, 0);
+    for (std::size_t i = 0; i < image.values.size(); ++i) {
+      const double light = calibration->light.values()[i];
+      if (!micrograph.mask.values()[i]) {
+        image.values.values()[i] = std::numeric_limits<double>::quiet_NaN();
+        continue;
+      }
+      image.values.values()[i] = (image.values.values()[i] - calibration->dark.values()[i]) / light;
+      micrograph.variance_scale.values()[i] = 1 / (light * light);
+    }
+  }
+  micrograph.values = std::move(image.values);
+  if (std::none_of(micrograph.mask.values().begin(), micrograph.mask.values().end(), [](auto used) { return used; })) {
+    std::vector<std::string> reasons;
+    const auto count = [&](int pixels, const std::string& why) {
+      if (pixels > 0) reasons.push_back(std::to_string(pixels) + " " + why);
+    };
+    count(micrograph.non_finite, "not finite");
+    count(micrograph.saturated, "saturated");
+    count(micrograph.dead, "dead");
+    count(micrograph.masked_by_user, "masked");
+    count(micrograph.outside_roi, "outside roi_px");
+    reader.problems.add(where, name + " has no usable pixel: " + list_words(reasons));
+    return false;
+  }
+  return true;
+}
+
+/// A mosaic that the config does not know of: reported.
+bool is_unstated_mosaic(ConfigReader& reader, const MicrographSettings& settings, const LoadedImage& image,
+                        const Where& where, const std::string& name) {
+  if (settings.mosaic.not_looked_for || image.colour) return false;
+  // Frames with and without light take off what a camera's pixels have of their own, and a camera that was calibrated
+  // so is none with a mosaic: its columns and rows may differ by as much.
+  if (settings.dark || settings.parallel) return false;
+  PixelRect area = settings.roi.value_or(whole(image.values));
+  area.x1 = std::min(area.x1, image.values.width()), area.y1 = std::min(area.y1, image.values.height());
+  if (area.x0 < 0 || area.y0 < 0) return false;  // reported
+  const auto kind = find_mosaic(image.values, area, smallest_step(image));
+  if (!kind) return false;
+  reader.problems.add(where, name + ": pixels alternate in cells of 2 x 2: a " + *kind + " mosaic",
+                      "add `bayer: rggb` (or bggr, grbg, gbrg) and `channel: g`, or `mosaic: polarization`; `mosaic: "
+                      "none` takes the pixels as they are");
+  return true;
+}
+
+}  // namespace
+
+void say(ConfigReader& reader, const std::filesystem::path& file, const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) reader.warnings.push_back(file.filename().string() + ": " + note);
+}
+
+std::optional<LoadedImage> try_load(ConfigReader& reader, const ImageRequest& request) {
+  try {
+    LoadedImage image = load_image(request);
+    say(reader, request.path, image.notes);
+    return image;
+  } catch (const UserError& error) {
+    reader.problems.add(error);
+    return std::nullopt;
+  }
+}
+
+ImageRequest image_request(const MicrographSettings& settings, const std::filesystem::path& file,
+                           std::optional<int> page, const Where& where) {
+  ImageRequest request{file, page, settings.channel, where};
+  request.cells = !settings.mosaic.parts.empty();
+  return request;
+}
+
+std::optional<Calibration> load_calibration(ConfigReader& reader, const MicrographSettings& settings) {
+  if (!settings.dark || !settings.parallel) return std::nullopt;
+  const auto load = [&](const std::string& name, const Where& where) {
+    return try_load(reader, image_request(settings, reader.resolve(name), std::nullopt, where));
+  };
+  std::optional<LoadedImage> dark = load(*settings.dark, settings.dark_where);
+  std::optional<LoadedImage> parallel = load(*settings.parallel, settings.parallel_where);
+  std::optional<LoadedImage> crossed;
+  if (settings.crossed) {
+    crossed = load(*settings.crossed, settings.crossed_where);
+    if (!crossed) return std::nullopt;
+  }
+  if (!dark || !parallel) return std::nullopt;
+
+  const auto same_size = [&](const LoadedImage& frame, const std::string& name, const Where& where) {
+    if (frame.values.width() == dark->values.width() && frame.values.height() == dark->values.height()) return true;
+    reader.problems.add(where, name + " is " + std::to_string(frame.values.width()) + " x " +
+                                   std::to_string(frame.values.height()) + " pixels, " + *settings.dark + " is " +
+                                   std::to_string(dark->values.width()) + " x " +
+                                   std::to_string(dark->values.height()));
+    return false;
+  };
+  if (!same_size(*parallel, *settings.parallel, settings.parallel_where)) return std::nullopt;
+  if (crossed && !same_size(*crossed, *settings.crossed, settings.crossed_where)) return std::nullopt;
+  if (!check_roi(reader, settings, dark->values, *settings.dark)) return std::nullopt;
+
+  const PixelRect area = settings.roi.value_or(whole(dark->values));
+  Calibration calibration;
+  calibration.usable = Mask(dark->values.width(), dark->values.height(), 1);
+  calibration.saturated = Mask(dark->values.width(), dark->values.height(), 0);
+  for (LoadedImage* frame : {&*dark, &*parallel, crossed ? &*crossed : nullptr}) {
+    if (!frame) continue;
+    // The frames come from one camera: the code at which one saturates is the code for all.
+    mark_saturated(frame->values, find_saturation(*frame, area, settings.saturation_counts).from,
+                   calibration.saturated);
+    const double step = smallest_step(*frame);
+    linearise(frame->values, settings.transfer, frame->top_code);
+    for (std::size_t i = 0; i < frame->values.size(); ++i)
+      if (!std::isfinite(frame->values.values()[i]) || calibration.saturated.values()[i])
+        calibration.usable.values()[i] = 0;
+    if (settings.mosaic.parts.empty())
+      exclude_outliers(frame->values, area, step, Smoothness::frame, calibration.usable);
+    else
+      exclude_outliers_in_cells(frame->values, area, step, Smoothness::frame, calibration.usable);
+  }
+
+  calibration.dark = dark->values;
+  calibration.light = parallel->values;
+  for (std::size_t i = 0; i < calibration.light.size(); ++i)
+    calibration.light.values()[i] -= calibration.dark.values()[i];
+  Mask positive = calibration.usable;
+  for (std::size_t i = 0; i < positive.size(); ++i)
+    if (!(calibration.light.values()[i] > 0)) positive.values()[i] = 0;
+  const RobustSpread typical = robust_spread(calibration.light, positive, area);
+  if (typical.count == 0) {
+    reader.problems.add(settings.parallel_where, *settings.parallel + " is nowhere brighter than " + *settings.dark,
+                        "were the two exchanged?");
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < calibration.light.size(); ++i)
+    if (!(calibration.light.values()[i] > kLeastLightFraction * typical.median)) calibration.usable.values()[i] = 0;
+
+  if (crossed) {
+    Image transmission = crossed->values;
+    for (std::size_t i = 0; i < transmission.size(); ++i)
+      transmission.values()[i] =
+          (transmission.values()[i] - calibration.dark.values()[i]) / calibration.light.values()[i];
+    const RobustSpread spread = robust_spread(transmission, calibration.usable, area);
+    if (spread.count > 0) {
+      calibration.has_crossed = true;
+      calibration.crossed_median = spread.median;
+      // The spread over the frame, not the error of its median: residual birefringence differs from place to place, so
+      // the stray light of another frame is known no better.
+      calibration.crossed_sd = std::max(spread.sd, 1e-6);
+    }
+  }
+  return calibration;
+}
+
+void replace_ref(Scene& scene, ParameterRef from, ParameterRef to) {
+  for_each_ref(scene, [&](ParameterRef& ref) {
+    if (ref == from) ref = to;
+  });
+}
+
+void replace_ref(Picture& micrograph, ParameterRef from, ParameterRef to) {
+  const auto swap = [&](ParameterRef& ref) {
+    if (ref == from) ref = to;
+  };
+  replace_ref(micrograph.scene, from, to);
+  swap(micrograph.gain);
+  swap(micrograph.offset);
+  for (UnevenLight& uneven : micrograph.uneven) swap(uneven.coefficient);
+}
+
+std::vector<Picture> pictures_of(ConfigReader& reader, const MicrographSettings& settings,
+                                 const Calibration* calibration, const Mask* user_mask, LoadedImage image,
+                                 const Where& where, const Picture& micrograph) {
+  std::vector<Picture> pictures;
+  if (settings.mosaic.parts.empty()) {
+    pictures.push_back(micrograph);
+    if (is_unstated_mosaic(reader, settings, image, where, micrograph.name) ||
+        !fill_pixels(reader, settings, calibration, user_mask, nullptr, std::move(image), where, pictures[0]))
+      pictures.clear();
+    return pictures;
+  }
+  if (image.colour) {
+    reader.problems.add(settings.mosaic.where, micrograph.name + " has colour channels: it is no mosaic any more",
+                        "leave bayer and mosaic out, or save what the sensor saw");
+    return pictures;
+  }
+  if (!image.filter_pattern.empty() && image.filter_pattern != settings.mosaic.bayer)
+    reader.problems.add(settings.mosaic.where, micrograph.name + " states the filters " + image.filter_pattern,
+                        "bayer: " + image.filter_pattern);
+  NumberSpec angle;
+  angle.unit = "deg";
+  for (const MosaicPart& part : settings.mosaic.parts) {
+    Picture picture = micrograph;
+    picture.name += " (" + part.name + ")";
+    if (part.analyzer_deg) {
+      const ParameterRef own = reader.constant(picture.name + ".microscope.analyzer_deg", angle, *part.analyzer_deg);
+      replace_ref(picture.scene, picture.scene.microscope.analyzer_deg, own);
+    }
+    if (!fill_pixels(reader, settings, calibration, user_mask, &part, image, where, picture)) return {};
+    pictures.push_back(std::move(picture));
+  }
+  return pictures;
+}
+
+}  // namespace birefit

@@ -1,0 +1,39 @@
+#pragma once
+// From image files to the pictures of a fit: what calibration frames, masks, regions and mosaics make of their pixels.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/config_micrograph.h"
+
+namespace birefit {
+
+/// The calibration frames as what a micrograph needs of them.
+struct Calibration {
+  Image dark;   ///< counts in linear light
+  Image light;  ///< parallel - dark
+  Mask usable;
+  Mask saturated;
+  double crossed_median = 0, crossed_sd = 0;
+  bool has_crossed = false;
+};
+
+/// An image with the reader's remarks among the warnings; none with a problem.
+std::optional<LoadedImage> try_load(ConfigReader& reader, const ImageRequest& request);
+/// What the settings ask of an image file.
+ImageRequest image_request(const MicrographSettings& settings, const std::filesystem::path& file,
+                           std::optional<int> page, const Where& where);
+/// The frames that the settings name; none with a problem.
+std::optional<Calibration> load_calibration(ConfigReader& reader, const MicrographSettings& settings);
+/// The reader's remarks on a file, to the warnings.
+void say(ConfigReader& reader, const std::filesystem::path& file, const std::vector<std::string>& notes);
+/// The picture with its pixels, or those that a mosaic holds; none when a problem left nothing to work with.
+std::vector<Picture> pictures_of(ConfigReader& reader, const MicrographSettings& settings,
+                                 const Calibration* calibration, const Mask* user_mask, LoadedImage image,
+                                 const Where& where, const Picture& micrograph);
+/// Replaces a reference everywhere in a scene, or in a picture with its light.
+void replace_ref(Scene& scene, ParameterRef from, ParameterRef to);
+void replace_ref(Picture& micrograph, ParameterRef from, ParameterRef to);
+
+}  // namespace birefit

@@ -1,0 +1,136 @@
+#include "io/config_starts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace birefit {
+namespace {
+
+/// Below this find_disc saw no disc (DiscGuess::contrast).
+constexpr double kLeastDiscContrast = 3;
+/// Half-width of the bounds of an automatic centre, as a fraction of the image size.
+constexpr double kCenterBoundFraction = 0.15;
+
+}  // namespace
+
+void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, const Mask* mask,
+                       const std::string& name) {
+  View& view = scene.view;
+  auto* droplet = std::get_if<Droplet>(&scene.sample);
+  const double middle_x = 0.5 * (view.width - 1), middle_y = 0.5 * (view.height - 1);
+  const auto open = [&](ParameterRef ref) {
+    return ref && reader.table[ref].automatic && !std::isfinite(reader.table[ref].value);
+  };
+  DiscGuess disc{middle_x, middle_y, 0.25 * std::min(view.width, view.height), 0};
+  const bool wanted = open(view.center_x_px) || open(view.center_y_px) || (droplet && open(droplet->diameter_um));
+  if (wanted && droplet && values) {
+    const DiscGuess found = find_disc(*values, *mask);
+    if (found.contrast >= kLeastDiscContrast)
+      disc = found;
+    else
+      reader.warnings.push_back(name + ": no disc is visible; the centre starts in the middle of the image. Give " +
+                                "center_px and diameter_um to start elsewhere.");
+  }
+  const auto center = [&](ParameterRef ref, double found, double middle, int size) {
+    Parameter& parameter = reader.table[ref];
+    const bool unset = !std::isfinite(parameter.value);
+    if (unset) parameter.value = parameter.automatic && reader.use != ConfigUse::render ? found : middle;
+    if (parameter.automatic && !std::isfinite(parameter.lower)) {
+      parameter.lower = parameter.value - kCenterBoundFraction * size;
+      parameter.upper = parameter.value + kCenterBoundFraction * size;
+    }
+  };
+  center(view.center_x_px, disc.center_x_px, middle_x, view.width);
+  center(view.center_y_px, disc.center_y_px, middle_y, view.height);
+  if (!droplet || !droplet->diameter_um) return;  // no kind was readable: reported
+  Parameter& diameter = reader.table[droplet->diameter_um];
+  if (!diameter.automatic) return;
+  if (!std::isfinite(diameter.value)) {
+    if (!values && reader.use != ConfigUse::fit)
+      reader.problems.add(diameter.where, "diameter_um has no value to render", "write {value: .., fit: auto}");
+    diameter.value = 2 * disc.radius_px * view.pixel_size_um;
+  }
+  if (!std::isfinite(diameter.lower)) {
+    diameter.lower = 0.8 * diameter.value;
+    diameter.upper = 1.25 * diameter.value;
+  }
+}
+
+void add_branches(FitJob& job) {
+  SampleBranch hedgehog{"hedgehog", {}, {}}, ring{"ring", {}, {}};
+  for_each_scene(job.measurements, [&](const Scene& scene) {
+    ring.samples.push_back(scene.sample);
+    Droplet droplet = std::get<Droplet>(scene.sample);
+    AxialDirector axial = std::get<AxialDirector>(droplet.director);
+    hedgehog.idle.push_back(axial.ring_radius.index);
+    axial.ring_radius = {};
+    droplet.director = axial;
+    hedgehog.samples.push_back(droplet);
+  });
+  job.branches = {hedgehog, ring};
+}
+
+void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& name) {
+  const auto* droplet = std::get_if<Droplet>(&scene.sample);
+  const View& view = scene.view;
+  if (!droplet || !droplet->diameter_um || !(view.pixel_size_um > 0) || view.width <= 0) return;
+  const Parameter& diameter = reader.table[droplet->diameter_um];
+  const double diameter_px = diameter.value / view.pixel_size_um;
+  const double field_px = std::max(view.width, view.height);
+  const std::string field =
+      show(view.width * view.pixel_size_um) + " x " + show(view.height * view.pixel_size_um) + " um";
+  const auto plausible = [&](double value_um) {
+    const double pixels = value_um / view.pixel_size_um;
+    return pixels >= 3 && pixels <= 2 * field_px;
+  };
+  if (!(diameter_px >= 3)) {
+    std::string hint = "check pixel_size_um = " + show(view.pixel_size_um);
+    for (double factor : {1e3, 1e6})
+      if (plausible(diameter.value * factor))
+        hint = "did you mean " + show(diameter.value * factor) + "? the key is in um";
+    reader.problems.add(
+        diameter.where,
+        "diameter_um = " + show(diameter.value) + " is only " + show(diameter_px) + " pixels in " + name, hint);
+  } else if (diameter_px > 10 * field_px) {
+    const double smaller = diameter.value / 1e3;
+    reader.problems.add(diameter.where,
+                        "diameter_um = " + show(diameter.value) + " is " + show(std::round(diameter_px / field_px)) +
+                            " times the field of view (" + field + ") of " + name,
+                        plausible(smaller) ? "did you mean " + show(smaller) + "? the key is in um"
+                                           : "check pixel_size_um = " + show(view.pixel_size_um));
+  } else {
+    const Parameter& x = reader.table[view.center_x_px];
+    const Parameter& y = reader.table[view.center_y_px];
+    const double dx = std::max({-0.5 - x.value, x.value - (view.width - 0.5), 0.0});
+    const double dy = std::max({-0.5 - y.value, y.value - (view.height - 0.5), 0.0});
+    if (std::hypot(dx, dy) >= 0.5 * diameter_px)
+      reader.problems.add(x.where.line > 0 ? x.where : diameter.where,
+                          "center_px = [" + show(x.value) + ", " + show(y.value) + "] puts the droplet outside " +
+                              name + ", which is " + std::to_string(view.width) + " x " + std::to_string(view.height) +
+                              " pixels");
+  }
+}
+
+void set_view(ConfigReader& reader, const MicrographSettings& settings, int width, int height, double file_pixel_um,
+              const std::string& name, Scene& scene) {
+  scene.view.width = width;
+  scene.view.height = height;
+  scene.view.pixel_size_um = settings.pixel_size_um.value_or(file_pixel_um);
+  if (settings.pixel_size_um && file_pixel_um > 0 && std::abs(*settings.pixel_size_um / file_pixel_um - 1) > 0.01)
+    reader.warnings.push_back(name + " states a pixel size of " + show(file_pixel_um) + " um; the config's " +
+                              show(*settings.pixel_size_um) + " um is used.");
+}
+
+void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene) {
+  auto* crystal = std::get_if<Crystal>(&scene.sample);
+  if (!crystal || crystal->electrode_low_px || !settings.roi) return;
+  NumberSpec spec;
+  spec.unit = "px";
+  const bool y = crystal->field_along_y;
+  crystal->electrode_low_px =
+      reader.constant("sample.crystal.electrodes_px.low", spec, (y ? settings.roi->y0 : settings.roi->x0) - 0.5);
+  crystal->electrode_high_px =
+      reader.constant("sample.crystal.electrodes_px.high", spec, (y ? settings.roi->y1 : settings.roi->x1) - 0.5);
+}
+
+}  // namespace birefit

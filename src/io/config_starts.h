@@ -1,0 +1,24 @@
+#pragma once
+// What an image tells of a scene before a fit: its view, starts, and whether the sample can be on it.
+
+#include <string>
+
+#include "birefit/fit.h"
+#include "io/config_micrograph.h"
+
+namespace birefit {
+
+/// Starts and bounds of `fit: auto` from the image; the image's middle where there is none to look at.
+void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, const Mask* mask,
+                       const std::string& name);
+/// A droplet in a field is a hedgehog or has a ring: both are fitted.
+void add_branches(FitJob& job);
+/// A droplet that the image cannot show is a mistake in a unit or a centre.
+void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& name);
+/// The view of a scene of this size (px); file_pixel_um: what the image states, 0 = nothing.
+void set_view(ConfigReader& reader, const MicrographSettings& settings, int width, int height, double file_pixel_um,
+              const std::string& name, Scene& scene);
+/// Electrodes that the config does not give are the region's edges.
+void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene);
+
+}  // namespace birefit
