@@ -169,7 +169,7 @@ struct BipolarDirector {
 /// are.
 struct ShellDirector {
   ParameterRef wall_um;
-  std::array<ParameterRef, 3> offset_um = {};
+  std::array<ParameterRef, 3> offset_um = {};  ///< all or none
   ParameterRef core_index;
 
   template <class Self, class Visit>

@@ -105,9 +105,9 @@ struct Crystal {
     visit.number("bias_v", self.bias_v, numbers::within(0, 1e7, "V").physical(), "the sign is not observable");
     visit.number("built_in_bias_v", self.built_in_bias_v, numbers::within(-1e7, 1e7, "V").left_out(),
                  "what the field has without a bias");
-    visit.number("slow_axis_deg", self.slow_axis_deg, numbers::angle(),
+    visit.number("slow_axis_deg", self.slow_axis_deg, numbers::angle().left_out(),
                  "of the induced axis; not given: 45 degrees from the field");
-    visit.list("field_legendre", self.field_legendre, numbers::within(-100, 100),
+    visit.list("field_legendre", self.field_legendre, numbers::within(-100, 100).left_out(),
                "c_1, c_2, .. of the field across the bar");
     visit.number("electrodes_px.low", self.electrode_low_px, numbers::within(-1e6, 1e6, "px").left_out(),
                  "edge of one electrode");
@@ -164,9 +164,11 @@ struct StressedDisc {
                  "1e-12/Pa");
     visit.number("load_azimuth_deg", self.load_azimuth_deg, numbers::angle().or_else(90),
                  "of the line of the two forces");
-    visit.list("residual.normal_mpa", self.residual_normal_mpa, numbers::within(-1e6, 1e6, "MPa"), "of sxx - syy");
-    visit.list("residual.shear_mpa", self.residual_shear_mpa, numbers::within(-1e6, 1e6, "MPa"), "of 2 sxy");
-    visit.list("illumination", self.illumination, numbers::within(-100, 100), "uneven light by X, Y, X^2, ..");
+    visit.list("residual.normal_mpa", self.residual_normal_mpa, numbers::within(-1e6, 1e6, "MPa").left_out(),
+               "of sxx - syy");
+    visit.list("residual.shear_mpa", self.residual_shear_mpa, numbers::within(-1e6, 1e6, "MPa").left_out(), "of 2 sxy");
+    visit.list("illumination", self.illumination, numbers::within(-100, 100).left_out(),
+               "uneven light by X, Y, X^2, ..");
   }
 };
 

@@ -18,14 +18,6 @@ constexpr double kTemperatureMargin_k = 1.01;
 /// Absorption of less than this per um goes without saying.
 constexpr double kFaintAbsorption_per_um = 1e-3;
 
-NumberSpec within(double lower, double upper, std::string unit = {}) {
-  NumberSpec spec;
-  spec.lower = lower;
-  spec.upper = upper;
-  spec.unit = std::move(unit);
-  return spec;
-}
-
 const std::vector<std::string> kRayKeys = {"file", "cauchy", "sellmeier", "range_nm"};
 
 bool is_ray_block(const YamlNode* node) {
@@ -81,7 +73,7 @@ RayIndices read_ray(ConfigReader& reader, const Block& parent, const std::string
     return read_file(reader, block);
   }
   RayIndices ray;
-  const NumberSpec limit = within(100, 100000, "nm");
+  const NumberSpec limit = numbers::within(100, 100000, "nm");
   if (!range) {
     reader.missing(block, "range_nm",
                    "[low, high], the wavelengths the coefficients hold for: nothing is extrapolated");
@@ -95,7 +87,7 @@ RayIndices read_ray(ConfigReader& reader, const Block& parent, const std::string
     ray.law.upper_um = high.value_or(100000) / 1000;
   }
   const auto coefficient = [&](const YamlNode& node, const std::string& path) {
-    ray.law.refs.push_back(reader.number_at(node, path, within(-1e4, 1e4)));
+    ray.law.refs.push_back(reader.number_at(node, path, numbers::within(-1e4, 1e4)));
     ray.law.coefficients.push_back(reader.table[ray.law.refs.back()].value);
   };
   const auto constant = [&](double value) {

@@ -23,15 +23,12 @@ std::vector<std::string> part_words() {
 /// A plate of so many wavelengths: of the light's own where it is not said which, or of one that it is made for.
 Retarder read_wave_plate(ConfigReader& reader, const Block& block, double waves) {
   Retarder plate;
-  plate.azimuth_deg = reader.number(block, "azimuth_deg", numbers::angle());
-  NumberSpec made_for = numbers::within(100, 20000);
-  made_for.unit = "nm";
-  if (const auto wavelength = reader.plain(block, "made_for_nm", made_for)) {
-    NumberSpec retardance = numbers::within(0, 1e5);
-    retardance.unit = "nm";
-    plate.retardance_nm = reader.constant(block.path_of("retardance_nm"), retardance, waves * *wavelength);
+  plate.azimuth_deg = read_described<Retarder>(reader, block, "azimuth_deg");
+  if (const auto wavelength = reader.plain(block, "made_for_nm", numbers::within(100, 20000, "nm"))) {
+    plate.retardance_nm =
+        reader.constant(block.path_of("retardance_nm"), described<Retarder>("retardance_nm"), waves * *wavelength);
   } else {
-    plate.phase_deg = reader.constant(block.path_of("phase_deg"), numbers::angle(), 360 * waves);
+    plate.phase_deg = reader.constant(block.path_of("phase_deg"), described<Retarder>("phase_deg"), 360 * waves);
   }
   return plate;
 }

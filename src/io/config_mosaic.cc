@@ -18,10 +18,7 @@ std::string with_degrees(double angle) { return show(angle) + " deg"; }
 /// [[90, 45], [135, 0]]: two rows of two angles.
 void read_layout(ConfigReader& reader, const YamlNode& node, std::array<std::array<double, 2>, 2>& layout) {
   const std::string shape = "mosaic.polarization must be two rows of two angles, [[90, 45], [135, 0]]";
-  NumberSpec angle;
-  angle.unit = "deg";
-  angle.lower = -360;
-  angle.upper = 360;
+  const NumberSpec angle = numbers::angle(-360, 360);
   if (!node.is_sequence() || node.items.size() != 2) {
     reader.problems.add(node.where, shape + ", found " + (node.is_sequence() ? "a list" : node.describe()));
     return;

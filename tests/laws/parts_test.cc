@@ -217,8 +217,9 @@ TEST_F(Parts, EllipticLightIsBilinearInStokesVectors) {
     const double p = draw(0, 180), a = draw(0, 180), f = draw(0, 180), phase = draw(-170, 170), g = draw(0, 180),
                  psi = draw(-170, 170);
     constexpr double kRadian = 3.14159265358979323846 / 180;
-    // E = (cos p', sin p' ..) through the plate: along its axis exp(i phase / 2), across exp(-i phase / 2); S3 = 2
-    // Im(conj Ex Ey). The analyser's side is the adjoint, its state before the plate.
+    // Light of a polarizer through a plate: exp(i phase / 2) along its axis, exp(-i phase / 2) across, S3 = 2
+    // Im(conj(Ex) Ey). What an analyser behind a plate lets through is the analyser's state through the plate's
+    // adjoint.
     const auto stokes = [&](double polarizer, double axis, double delay) {
       const double c2 = std::cos(2 * (polarizer - axis) * kRadian), s2 = std::sin(2 * (polarizer - axis) * kRadian);
       const double along = c2, diagonal = s2 * std::cos(delay * kRadian), circular = -s2 * std::sin(delay * kRadian);
@@ -293,7 +294,11 @@ TEST_F(Parts, ACompensatorThatUndoesACellLeavesDarkness) {
       return render(kind.scene, plan(kind.scene, theta), theta, {}, 1).intensity(0, 0);
     };
     EXPECT_GT(light(), 1e-4) << draw;
-    kind.scene.microscope.behind.emplace_back(retarder(kind, -360 * thickness * birefringence / 0.55, axis));
+    const Retarder undoing = retarder(kind, -360 * thickness * birefringence / 0.55, axis);
+    kind.scene.microscope.before = {undoing};
+    EXPECT_LT(light(), 1e-12) << draw;
+    kind.scene.microscope.before.clear();
+    kind.scene.microscope.behind = {undoing};
     EXPECT_LT(light(), 1e-12) << draw;
     // The same plate in nm, whose phase follows the wavelength as the cell's does.
     Retarder plate;

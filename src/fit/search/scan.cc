@@ -215,6 +215,7 @@ class Survey {
       if (lowest) minima.emplace_back(chi[i], point_at(i));
     }
     std::stable_sort(minima.begin(), minima.end(), lower);
+    if (others == 0) return minima;
     std::vector<std::size_t> order(product);
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return chi[a] < chi[b]; });

@@ -192,7 +192,7 @@ constexpr double kVarianceSd = 6.2;
 /// The level of samples of like signal, or two where the variance of the darker and of the brighter half differ by more
 /// than chance: beside bright fringes the dark field and the feet of the fringes come into one bin, and the steepest
 /// change of the variance is there. Signal and variance are both medians: means of a bin's signal would lie far above
-/// the pixels that its median variance stands for. From `samples` on, to `cut` or near it: into `near_cut`.
+/// the pixels that its median variance stands for. Levels that noise takes below the cut go into `near_cut`.
 void add_levels(std::vector<Sample> samples, const Codes& codes, double mask_order, std::vector<Bin>& bins,
                 std::vector<Bin>& near_cut) {
   const auto darker = [](const Sample& a, const Sample& b) { return a.signal < b.signal; };

@@ -8,8 +8,8 @@
 
 namespace birefit {
 
-/// What the cells look like, for a message: "colour (Bayer)", "polarization", "colour or polarization"; nothing where
-/// pixels do not alternate along both sides. `smallest_step`: a difference that is none.
+/// What the cells look like, for a message: "colour (Bayer)", "polarization", "colour (Bayer) or polarization"; nothing
+/// where pixels do not alternate along both sides. `smallest_step`: a difference that is none.
 std::optional<std::string> find_mosaic(const Image& values, const PixelRect& area, double smallest_step);
 
 }  // namespace birefit

@@ -179,13 +179,15 @@ class PlanarModel final : public PixelModel<S> {
     const ParameterRef half_angle = scene_.view.camera ? ParameterRef{} : *cone_half_angle(scene_);
     std::vector<std::size_t> places;
     std::vector<int> changing;
+    std::vector<int> read;  // by whatever there is in the scene
+    for_each_ref(scene_, [&](const ParameterRef& ref) { read.push_back(ref.index); });
     if constexpr (ScalarTraits<S>::derivatives > 0)
       for (std::size_t j = 0; j < value_.active().size(); ++j) {
         const int index = value_.active()[j];
-        int carries = 0, uses = 0;
+        int carries = 0;
+        const auto uses = std::count(read.begin(), read.end(), index);
         for (const ParameterRef& ref : {scene_.view.center_x_px, scene_.view.center_y_px, half_angle})
           carries += ref && ref.index == index;
-        for_each_ref(scene_, [&](const ParameterRef& ref) { uses += ref.index == index; });
         if (carries > 0 && carries == uses) {
           const double growth =
               scene_.view.camera ? 0.0 : lane(cone_->tan_per_px.d[j], 0) / lane(plain(cone_->tan_per_px), 0);
