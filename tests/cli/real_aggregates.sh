@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Micrographs from which no birefringence follows: crystal aggregates of unknown material, thickness, wavelength and camera, clipped in
 # parts. Whatever a user takes them for, there must be no answer (exit code 1), or the data are refused (2).
-# usage: real_aggregates.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with crystal_aggregates/, default ../shared/data/real
+# usage: real_aggregates.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder of tools/fetch_real, default out/real
 set -u
 birefit=$(realpath "$1")
 source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/../shared/data/real}")
+data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/out/real}")
 if [ ! -f "$data/crystal_aggregates/sample_1.tif" ]; then
-  echo "skipped: no crystal aggregates at $data (docs/gallery.md says where to get them; set BIREFIT_REAL_DATA)"
+  echo "skipped: no crystal aggregates at $data: tools/fetch_real fetches them"
   exit 77
 fi
 work=$(mktemp -d)

@@ -1,19 +1,15 @@
 #!/usr/bin/env bash
 # A real photoelastic disc: one stress-optic coefficient from three loads, does it find the other two, inside its own intervals?
-# usage: real_disc.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with photoelastic_disk/, default ../shared/data/real
+# usage: real_disc.sh BIREFIT SOURCE_DIR
 set -u
 birefit=$(realpath "$1")
 source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/../shared/data/real}")
-if [ ! -f "$data/photoelastic_disk/single_disk/DSC_0008.jpg" ]; then
-  echo "skipped: no real images at $data (docs/gallery.md says where to get them; set BIREFIT_REAL_DATA)"
-  exit 77
-fi
+data=$source/data/real
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/configs"
 for name in disc_calibrate disc_load; do
-  sed "s#\.\./\.\./shared/data/real#$data#g" "$source/fit_configs/$name.yaml" > "$work/configs/$name.yaml" || exit 1
+  sed "s#\.\./data/real#$data#g" "$source/fit_configs/$name.yaml" > "$work/configs/$name.yaml" || exit 1
 done
 cd "$work" || exit 1
 failures=0
@@ -50,7 +46,7 @@ check() {
     END { if (!found) { print "FAIL " name ": no load_n in the summary"; exit 1 } }' "$1.txt" || failures=$((failures + 1))
 }
 while read -r image newtons; do
-  run "$image" disc_load --image "$data/photoelastic_disk/single_disk/$image.jpg"
+  run "$image" disc_load --image "$data/photoelastic_disk/single_disk/$image.png"
   check "$image" "$newtons"
 done <<'CASES'
 DSC_0010 807

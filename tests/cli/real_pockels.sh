@@ -1,19 +1,16 @@
 #!/usr/bin/env bash
 # Real images of a biased crystal: calibrated on known voltages, does the fit find the others, inside its own intervals?
-# usage: real_pockels.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with pockels_czt/, default ../shared/data/real
+# usage: real_pockels.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder of tools/fetch_real, default out/real
 set -u
 birefit=$(realpath "$1")
 source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/../shared/data/real}")
-if [ ! -f "$data/pockels_czt/led_data/Bias_-0700V.png" ]; then
-  echo "skipped: no real images at $data (docs/tutorial_pockels.md says where to get them; set BIREFIT_REAL_DATA)"
-  exit 77
-fi
+data=$source/data/real
+whole=$(realpath -m "${BIREFIT_REAL_DATA:-$source/out/real}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/configs"
 for name in calibrate calibrate_low bias field; do
-  sed "s#\.\./\.\./shared/data/real#$data#g" "$source/fit_configs/pockels_$name.yaml" > "$work/configs/pockels_$name.yaml" || exit 1
+  sed "s#\.\./data/real#$data#g" "$source/fit_configs/pockels_$name.yaml" > "$work/configs/pockels_$name.yaml" || exit 1
 done
 sed 's#out/pockels_calibrate/#out/pockels_calibrate_low/#' "$work/configs/pockels_bias.yaml" > "$work/configs/pockels_bias_low.yaml"
 cd "$work" || exit 1
@@ -108,7 +105,7 @@ awk '
   }' leave_one_out.txt || failures=$((failures + 1))
 # Another crystal, whose field is far from even: the rows in which frames agree and the model describes them are proposed, and there the
 # voltages come out, as this data's origin has them.
-run_b=$data/pockels_czt/run_2025-01-16_b
+run_b=$whole/pockels_czt/run_2025-01-16_b
 if [ -f "$run_b/bias_200V_xray_0mA.png" ]; then
   bar_b() { # NAME ROI: fitted voltages with the rest of the series known
     {
@@ -137,6 +134,8 @@ if [ -f "$run_b/bias_200V_xray_0mA.png" ]; then
     run "b_$volts" "b_$volts"
     check "b_$volts" "$volts" 2 10
   done
+else
+  echo "left out: the series at $run_b, which tools/fetch_real fetches"
 fi
 # A field that varies across the bar: the images hold more than the model, and the fit has to say so.
 run field pockels_field

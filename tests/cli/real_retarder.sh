@@ -1,19 +1,15 @@
 #!/usr/bin/env bash
 # A real liquid-crystal retarder: does one curve of retardance against voltage, with one dispersion, serve all wavelengths, foretell a
 # wavelength it has not seen, and refuse the two series whose label or detector range is in doubt?
-# usage: real_retarder.sh BIREFIT SOURCE_DIR    BIREFIT_REAL_DATA = the folder with lc_retarder_voltage/, default ../shared/data/real
+# usage: real_retarder.sh BIREFIT SOURCE_DIR
 set -u
 birefit=$(realpath "$1")
 source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/../shared/data/real}")/lc_retarder_voltage
-if [ ! -f "$data/530nm_sweep.csv" ]; then
-  echo "skipped: no real sweeps at $data (docs/gallery.md says where to get them; set BIREFIT_REAL_DATA)"
-  exit 77
-fi
+data=$source/data/real/lc_retarder_voltage
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-sed "s#\.\./\.\./shared/data/real/lc_retarder_voltage#$data#" "$source/fit_configs/lc_retarder.yaml" > all.yaml || exit 1
+sed "s#\.\./data/real/lc_retarder_voltage#$data#" "$source/fit_configs/lc_retarder.yaml" > all.yaml || exit 1
 failures=0
 fail() { echo "FAIL $*"; failures=$((failures + 1)); }
 voltage=sample.cell.director.freedericksz.voltage_v

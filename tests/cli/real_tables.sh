@@ -1,15 +1,11 @@
 #!/usr/bin/env bash
 # Real tables of birefringence whose flaws a tool must name: a tape whose stated thickness contradicts its spectrum, the same tape heated and
 # cooled, and a liquid crystal whose birefringence is not that of the literature.
-# usage: real_tables.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with tape_thermal/, default ../shared/data/real
+# usage: real_tables.sh BIREFIT SOURCE_DIR
 set -u
 birefit=$(realpath "$1")
 source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/../shared/data/real}")
-if [ ! -f "$data/tape_thermal/tape_dn_vs_temperature.csv" ]; then
-  echo "skipped: no real tables at $data (docs/gallery.md says where to get them; set BIREFIT_REAL_DATA)"
-  exit 77
-fi
+data=$source/data/real
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -17,7 +13,7 @@ failures=0
 fail() { echo "FAIL $*"; failures=$((failures + 1)); }
 # run CONFIG EXIT_CODE
 run() {
-  sed "s#\.\./\.\./shared/data/real#$data#" "$source/fit_configs/$1.yaml" > "$1.yaml"
+  sed "s#\.\./data/real#$data#" "$source/fit_configs/$1.yaml" > "$1.yaml"
   "$birefit" fit "$1.yaml" --out "$1" > "$1.txt" 2>&1
   local code=$?
   [ "$code" = "$2" ] || { fail "$1: exit code $code, expected $2"; cat "$1.txt"; }

@@ -22,22 +22,23 @@ inline std::filesystem::path data_path(const std::string& relative) {
   return std::filesystem::path(BIREFIT_SOURCE_DIR) / "tests" / "data" / relative;
 }
 
-/// A file of the public real images: below $BIREFIT_REAL_DATA when that is set, else below ../shared/data/real beside
-/// the source folder. Empty when it is not there:
-///   const auto image = real_data_path("pockels_czt/led_data/Bias_-0500V.png");
+/// A file of the public measurements: in data/real, where their smallest parts are shipped, else where tools/fetch_real
+/// puts the rest, $BIREFIT_REAL_DATA or out/real. Empty when it is not there:
+///   const auto image = real_data_path("crystal_aggregates/sample_1.tif");
 ///   if (!image) GTEST_SKIP() << kRealDataMissing;
 inline std::optional<std::filesystem::path> real_data_path(const std::string& relative) {
+  const std::filesystem::path source(BIREFIT_SOURCE_DIR);
   const char* given = std::getenv("BIREFIT_REAL_DATA");
-  const std::filesystem::path root = given != nullptr && *given != '\0' ? std::filesystem::path(given)
-                                                                        : std::filesystem::path(BIREFIT_SOURCE_DIR) /
-                                                                              ".." / "shared" / "data" / "real";
-  const std::filesystem::path path = (root / relative).lexically_normal();
-  std::error_code ignored;
-  if (std::filesystem::exists(path, ignored)) return path;
+  const std::filesystem::path fetched =
+      given != nullptr && *given != '\0' ? std::filesystem::path(given) : source / "out" / "real";
+  for (const std::filesystem::path& root : {source / "data" / "real", fetched}) {
+    std::error_code ignored;
+    if (std::filesystem::exists(root / relative, ignored)) return root / relative;
+  }
   return std::nullopt;
 }
 inline constexpr const char* kRealDataMissing =
-    "the public images are not here (they are not part of the repository): set BIREFIT_REAL_DATA to their folder";
+    "these public measurements are not part of the repository: tools/fetch_real fetches them";
 
 /// A comma-separated table with one header line. Cells are kept as text; numbers are converted when asked for, `nan`
 /// included. Everything that does not fit throws: a test must not pass on a table it did not read.
