@@ -24,6 +24,13 @@ struct SeriesFrame {
   std::string file;         ///< as found, from the config's folder on
   Where where;              ///< of the table's row, else of `files`
   std::vector<Cell> cells;  ///< one for each of ImageSeries::columns
+  std::string unreadable;   ///< why its image cannot be fitted; empty: it can
+};
+
+/// What is wrong with a frame's own image, in a config that is sound: other frames can be fitted.
+class FrameError : public UserError {
+ public:
+  using UserError::UserError;
 };
 
 struct ImageSeries {
@@ -39,11 +46,16 @@ struct ImageSeries {
   std::vector<std::pair<std::string, Where>> shared;
 };
 
-/// Reads and checks a series completely, every image of it; throws UserError with every mistake found.
+/// Reads and checks a series completely, every image of it; throws UserError with every mistake found. Frames whose own
+/// image is missing, damaged or of no use are marked `unreadable`; at least one is not.
 ImageSeries load_series(const std::filesystem::path& path);
 
-/// The config of one frame, as if it were alone: it can be fitted.
+/// The config of one frame, as if it were alone: it can be fitted. Throws FrameError where its image is of no use.
 Config load_frame(const ImageSeries& series, std::size_t frame);
+/// The same of a series that was checked; nothing, and the frame marked `unreadable`, where it cannot be fitted.
+std::optional<Config> open_frame(ImageSeries& series, std::size_t frame);
+/// The first frame that can be read: what all have in common shows in it.
+std::size_t first_readable(const ImageSeries& series);
 
 /// Starts a frame where its neighbour ended. What has a start of its own keeps it: the centre of a prior, what is found
 /// in the image, and what the neighbour left at a bound, where derivatives may vanish.
@@ -77,7 +89,8 @@ struct SeriesResult {
 };
 SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<FitResult>> fits);
 
-/// One row a frame: file, the table's columns, every parameter with its errors, reduced chi-square and verdict.
+/// One row a frame: file, the table's columns, every parameter with its errors, reduced chi-square, verdict, and the
+/// reason where that is no answer.
 std::string series_csv(const ImageSeries& series, const SeriesResult& result);
 /// One row for each shared parameter; empty without any.
 std::string shared_csv(const SeriesResult& result);

@@ -152,8 +152,9 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result) {
 /// Counts of verdicts and warnings, and what is shared.
 std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
   std::map<std::string, std::size_t> verdicts, warnings;
-  for (const auto& fit : result.frames) {
-    ++verdicts[fit ? verdict_word(*fit) : "not done"];
+  for (std::size_t i = 0; i < series.frames.size(); ++i) {
+    const auto& fit = result.frames[i];
+    ++verdicts[fit ? verdict_word(*fit) : series.frames[i].unreadable.empty() ? "not done" : "unreadable"];
     if (fit)
       for (const std::string& warning : fit->warnings) ++warnings[warning];
   }
@@ -179,6 +180,11 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
   constexpr std::size_t kListed = 8;
   std::size_t listed = 0;
+  for (const SeriesFrame& frame : series.frames)
+    if (!frame.unreadable.empty() && listed++ < kListed)
+      text += fmt::format("unreadable: {}: {}\n", frame.name, frame.unreadable);
+  if (listed > kListed) text += fmt::format("and {} more that are unreadable, in the table\n", listed - kListed);
+  listed = 0;
   for (const auto& [warning, count] : warnings) {
     if (listed++ == kListed)
       return text + fmt::format("and {} more warnings, in the frames' reports\n", warnings.size() - kListed);
@@ -188,7 +194,7 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
 }
 
 int run_series(const Arguments& arguments) {
-  const ImageSeries series = load_series(arguments.config);
+  ImageSeries series = load_series(arguments.config);
   const fs::path out = arguments.out.empty() ? fs::path(arguments.config).stem().string() + "-series" : arguments.out;
   std::error_code code;
   if (!arguments.resume && (fs::exists(out / "frames", code) || fs::exists(out / "series.csv", code)))
@@ -204,7 +210,9 @@ int run_series(const Arguments& arguments) {
   const FitResult* neighbour = nullptr;
   std::atomic<std::size_t> kept{0};
   const auto do_frame = [&](std::size_t i, int threads) {
-    Config config = load_frame(series, i);
+    std::optional<Config> opened = open_frame(series, i);
+    if (!opened) return;
+    Config& config = *opened;
     if (neighbour) start_from(config, *neighbour);
     config.fingerprint = fingerprint_of(config);
     const fs::path place = out / "frames" / series.frames[i].name;
@@ -231,8 +239,8 @@ int run_series(const Arguments& arguments) {
   };
   // The first alone, then a few at a time that all start where the frames before them ended: how many does not depend
   // on the number of cores, so that neither do the results.
-  const int cores =
-      thread_count(arguments.threads >= 0 ? arguments.threads : load_frame(series, 0).job.options.threads);
+  const int cores = thread_count(
+      arguments.threads >= 0 ? arguments.threads : load_frame(series, first_readable(series)).job.options.threads);
   for (std::size_t first = 0, count; first < series.frames.size() && !interrupt.flag(); first += count) {
     count = std::min<std::size_t>(first == 0 ? 1 : kFramesTogether, series.frames.size() - first);
     const int side_by_side = std::min(cores, static_cast<int>(count)), each = cores / side_by_side;

@@ -329,6 +329,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
                           "the size of a pixel on the sample, for example 0.05");
   };
 
+  const bool sound = reader.problems.empty();
   if (use == ConfigUse::render && !signals.empty()) {
     if (!tables.empty()) config.scene = tables[0].rows[0];
   } else if (view_only && !micrographs.empty()) {  // none: their list's mistake was reported
@@ -359,6 +360,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
           resolve_automatic(reader, scene, &loaded->values, &all, name);
           check_overlap(reader, scene, name);
         }
+      } else if (series && sound) {
+        throw FrameError(reader.problems.all());
       }
     } else if (root.find("image_size_px")) {
       // Its mistake was reported.
@@ -377,7 +380,6 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       if (!micrograph.node || !micrograph.node->find("image")) reader.missing(micrograph, "image");
     }
     // Images are loaded although something else is wrong: their mistakes are reported in the same run.
-    const bool sound = reader.problems.empty();
     std::optional<Calibration> calibration;
     if (settings.dark || settings.parallel) calibration = load_calibration(reader, settings);
     std::optional<Mask> user_mask;
@@ -421,13 +423,17 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
         of_colours = of_colours.empty() ? micrograph.name : of_colours;
       filled[i] = pictures_of(reader, settings, calibration ? &*calibration : nullptr,
                               user_mask ? &*user_mask : nullptr, std::move(*loaded), where, micrograph);
-      for (Picture& picture : filled[i]) {
+    }
+    // A frame's own mistake, with which the others of its series have nothing to do.
+    if (series && sound && !frames_missing && !mask_missing && !reader.problems.empty())
+      throw FrameError(reader.problems.all());
+    for (std::vector<Picture>& pictures : filled)
+      for (Picture& picture : pictures) {
         if (!sound || !reader.problems.empty() || !starts) continue;
         resolve_automatic(reader, picture.scene, &picture.values, &picture.mask, picture.name);
         check_overlap(reader, picture.scene, picture.name);
         check_stressed_disc(reader, picture);
       }
-    }
     if (!of_colours.empty() && !shared.scene.microscope.bandwidth_nm)
       reader.warnings.push_back(
           of_colours +
@@ -499,9 +505,15 @@ Config load_config(const std::filesystem::path& path, ConfigUse use,
                    const std::optional<std::filesystem::path>& image) {
   std::string text = read_text(path);
   if (use != ConfigUse::fit && holds_series(text)) {
-    // What the frames have in common shows in the first.
+    // What the frames have in common shows in the first that can be read.
     const ImageSeries series = read_series(path, std::move(text));
-    return load(path, series.text, use, image, &series, 0);
+    for (std::size_t frame = 0;; ++frame) {
+      try {
+        return load(path, series.text, use, image, &series, frame);
+      } catch (const FrameError&) {
+        if (frame + 1 == series.frames.size()) throw;
+      }
+    }
   }
   return load(path, std::move(text), use, image);
 }

@@ -104,28 +104,36 @@ void join_table(ConfigReader& reader, const std::string& table_name, const Where
   std::vector<std::string> known;
   if (files)
     for (const std::string& file : *files) known.push_back(fs::path(file).filename().string());
+  std::vector<Problem> absent;  // rows of files that there are not: slips, where a file of the series has no row
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
     const TableCell& cell = table.rows[r][file_at];
     const Where here{place, table.lines[r], cell.column};
     SeriesFrame frame;
     frame.file = cell.text;
     frame.where = here;
+    if (cell.text.empty()) {
+      reader.problems.add(here, "names no file");
+      continue;
+    }
     if (files) {
       // By its path or by its name alone; names do not repeat.
       const auto match = std::find_if(files->begin(), files->end(), [&](const std::string& file) {
         return file == cell.text || fs::path(file).filename() == cell.text;
       });
-      if (match == files->end()) {
+      if (match != files->end()) {
+        frame.file = *match;
+      } else {
         const std::string near = nearest_word(cell.text, known);
-        reader.problems.add(here,
-                            (cell.text.empty() ? "an empty file" : cell.text) + " is not among the files of the series",
-                            near.empty() ? "" : "did you mean " + near + "?");
-        continue;
+        const Problem problem{here, cell.text + " is not among the files of the series",
+                              near.empty() ? "" : "did you mean " + near + "?"};
+        if (std::error_code code; fs::exists(reader.resolve(cell.text), code)) {
+          reader.problems.add(problem.where, problem.what, problem.hint);
+          continue;
+        }
+        absent.push_back(problem);
+        if (!fs::path(cell.text).has_parent_path())
+          frame.file = (fs::path(files->front()).parent_path() / cell.text).string();
       }
-      frame.file = *match;
-    } else if (std::error_code code; !fs::is_regular_file(reader.resolve(cell.text), code)) {
-      reader.problems.add(here, cell.text + " does not exist", "paths start at the config's folder");
-      continue;
     }
     if (const auto [earlier, fresh] = line_of.emplace(frame.file, table.lines[r]); !fresh) {
       reader.problems.add(here, cell.text + " has a row already, in line " + std::to_string(earlier->second));
@@ -140,10 +148,10 @@ void join_table(ConfigReader& reader, const std::string& table_name, const Where
   std::vector<std::string> without;
   for (const std::string& file : *files)
     if (!line_of.count(file)) without.push_back(file);
-  if (!without.empty())
-    reader.problems.add(files_where,
-                        some_of(without) + (without.size() == 1 ? " has" : " have") + " no row in " + place,
-                        "add rows, or narrow files");
+  if (without.empty()) return;
+  for (const Problem& problem : absent) reader.problems.add(problem.where, problem.what, problem.hint);
+  reader.problems.add(files_where, some_of(without) + (without.size() == 1 ? " has" : " have") + " no row in " + place,
+                      "add rows, or narrow files");
 }
 
 void read_names(ConfigReader& reader, const Block& block, ImageSeries& series) {
@@ -210,7 +218,7 @@ ImageSeries read_series(const fs::path& path, std::string text) {
   if (table)
     join_table(reader, *table, place("set_from"), files, place("files"), series);
   else
-    for (const std::string& file : *files) series.frames.push_back({{}, file, place("files"), {}});
+    for (const std::string& file : *files) series.frames.push_back({{}, file, place("files"), {}, {}});
 
   std::map<std::string, std::string> file_of;
   for (SeriesFrame& frame : series.frames) {

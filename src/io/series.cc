@@ -127,6 +127,13 @@ void check_shared(const ImageSeries& series, const Config& frame) {
   problems.throw_if_any();
 }
 
+/// What was found, in a line.
+std::string reason_of(const UserError& error) {
+  std::string words;
+  for (const Problem& problem : error.problems()) words += (words.empty() ? "" : "; ") + problem.what;
+  return words;
+}
+
 std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.10g}", value) : std::string(); }
 
 /// Text as a field of CSV (RFC 4180).
@@ -154,19 +161,49 @@ std::string cells(const ParameterEstimate& p) {
 
 ImageSeries load_series(const std::filesystem::path& path) {
   ImageSeries series = read_series(path, read_text(path));
-  // What is wrong with the config shows in the first frame; once that is sound, the others' mistakes are their own.
-  check_shared(series, load_frame(series, 0));
   constexpr std::size_t kMostProblems = 50;
-  Problems problems;
-  for (std::size_t i = 1; i < series.frames.size() && problems.all().size() < kMostProblems; ++i) {
+  Problems problems, of_first;
+  // What is wrong with the config shows in the first frame that can be read; the others' mistakes are their own.
+  bool sound = false;
+  for (std::size_t i = 0; i < series.frames.size() && problems.all().size() < kMostProblems; ++i) {
     try {
-      check_frame(series, i);
+      if (sound) {
+        check_frame(series, i);
+      } else {
+        check_shared(series, load_frame(series, i));
+        sound = true;
+      }
+    } catch (const FrameError& error) {
+      series.frames[i].unreadable = reason_of(error);
+      if (i == 0) of_first.add(error);
     } catch (const UserError& error) {
+      if (!sound) throw;
       problems.add(error);
     }
   }
   problems.throw_if_any();
+  if (!sound && series.frames.size() > 1)
+    of_first.add({series.path.string()},
+                 fmt::format("none of the {} frames can be read: what is said is of the first", series.frames.size()));
+  if (!sound) of_first.throw_if_any();
   return series;
+}
+
+std::optional<Config> open_frame(ImageSeries& series, std::size_t frame) {
+  std::string& unreadable = series.frames[frame].unreadable;
+  if (!unreadable.empty()) return std::nullopt;
+  try {
+    return load_frame(series, frame);
+  } catch (const UserError& error) {  // the config is sound: it is this image in which nothing is found
+    unreadable = reason_of(error);
+    return std::nullopt;
+  }
+}
+
+std::size_t first_readable(const ImageSeries& series) {
+  const auto found = std::find_if(series.frames.begin(), series.frames.end(),
+                                  [](const SeriesFrame& frame) { return frame.unreadable.empty(); });
+  return found == series.frames.end() ? 0 : static_cast<std::size_t>(found - series.frames.begin());
 }
 
 void start_from(Config& frame, const FitResult& neighbour) {
@@ -292,7 +329,7 @@ SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<
         fmt::format("{} of {} frames say nothing of the shared parameters: they have no answer, or only a limit.",
                     done - posteriors.size(), done));
   if (posteriors.empty()) return result;
-  const SharedEstimate shared = combine(posteriors, shared_prior(load_frame(series, 0), names));
+  const SharedEstimate shared = combine(posteriors, shared_prior(load_frame(series, first_readable(series)), names));
   if (!shared.consistent)
     result.warnings.push_back(fmt::format(
         "The frames disagree on what they share: chi-square {:.4g} for {} degrees of freedom. Its error is enlarged by "
@@ -328,11 +365,12 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
   std::string text = "file";
   for (const ImageSeries::Column& column : series.columns) text += "," + field(column.name);
   for (const std::string& name : names) text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", name);
-  text += ",reduced_chi_square,verdict\n";
+  text += ",reduced_chi_square,verdict,reason\n";
   for (std::size_t i = 0; i < series.frames.size(); ++i) {
     const auto& fit = result.frames[i];
-    text += field(series.frames[i].file);
-    for (const SeriesFrame::Cell& given : series.frames[i].cells) text += "," + field(given.text);
+    const SeriesFrame& frame = series.frames[i];
+    text += field(frame.file);
+    for (const SeriesFrame::Cell& given : frame.cells) text += "," + field(given.text);
     for (const std::string& name : names) {
       const ParameterEstimate* estimate = nullptr;
       if (fit)
@@ -340,7 +378,11 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
           if (p.name == name) estimate = &p;
       text += "," + (estimate ? cells(*estimate) : ",,,");
     }
-    text += fit ? fmt::format(",{},{}\n", cell(fit->reduced_chi_square), verdict_word(*fit)) : ",,not done\n";
+    if (fit)
+      text += fmt::format(",{},{},{}\n", cell(fit->reduced_chi_square), verdict_word(*fit),
+                          fit->has_answer() ? "" : field(fit->verdict));
+    else
+      text += frame.unreadable.empty() ? ",,not done,\n" : ",,unreadable," + field(frame.unreadable) + "\n";
   }
   return text;
 }

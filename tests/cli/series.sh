@@ -65,7 +65,7 @@ run --out whole || { fail "exit code $?"; cat stdout.txt stderr.txt; }
 awk -F, '
   NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; next }
   function off(name, truth, d) { d = ($(at[name]) - truth) / $(at[name "_stderr"]); return !($(at[name "_stderr"]) > 0) || d > 5 || d < -5 }
-  $1 != "frames/f" NR - 1 ".tif" || $(at["time_s"]) != 10 * (NR - 1) || $NF != "answer" { print; bad = 1 }
+  $1 != "frames/f" NR - 1 ".tif" || $(at["time_s"]) != 10 * (NR - 1) || $(at["verdict"]) != "answer" { print; bad = 1 }
   off("sample.crystal.half_wave_voltage_v", 1500) || off("sample.crystal.field_legendre[1]", 0.4) { print; bad = 1 }
   !($(at["sample.crystal.half_wave_voltage_v_low95"]) < $(at["sample.crystal.half_wave_voltage_v"])) { print; bad = 1 }
   NR > 2 && $(at["sample.crystal.field_legendre[1]"]) != before { print "not shared: " $0; bad = 1 }
@@ -133,7 +133,7 @@ kill -INT $pid
 wait $pid
 [ $? -eq 1 ] || fail 'exit code after Ctrl-C'
 finished=$(done_in stopped)
-[ "$(wc -l < stopped/series.csv)" -eq 11 ] && [ "$(grep -c ',not done$' stopped/series.csv)" -eq $((10 - finished)) ] || fail 'series.csv after Ctrl-C'
+[ "$(wc -l < stopped/series.csv)" -eq 11 ] && [ "$(grep -c ',not done,$' stopped/series.csv)" -eq $((10 - finished)) ] || fail 'series.csv after Ctrl-C'
 run --out stopped --resume && same stopped || fail 'resume after Ctrl-C'
 
 # ---- what changed is fitted again -------------------------------------------------------------------------------------
@@ -152,7 +152,32 @@ grep -q '^10 frames were up to date' stdout.txt && [ "$(wc -l < changed/series.c
 
 sed 's/fit: \[1000, 2500\]/fit: [1000, 1450]/' series.yaml > pinned.yaml
 "$birefit" series pinned.yaml --threads 1 --quiet --out pinned > stdout.txt 2> stderr.txt
-[ $? -eq 1 ] && [ "$(grep -c ',at a bound$' pinned/series.csv)" -eq 11 ] || fail 'frames at a bound'
+[ $? -eq 1 ] && [ "$(grep -c ',at a bound,' pinned/series.csv)" -eq 11 ] || fail 'frames at a bound'
+
+# ---- frames that cannot be read are rows, the others are fitted -----------------------------------------------------------
+
+# Cut off, empty, absent, of another size than the mask; f1 and f6 are fitted, f6 from where f1 ended.
+mkdir torn && cp frames/f1.tif frames/f6.tif torn/
+head -c 1000 frames/f2.tif > torn/f2.tif
+: > torn/f3.tif
+{ head -c 30 frames/f1.tif; printf '\40'; tail -c +32 frames/f1.tif; } > torn/f5.tif
+cp frames/f1.tif all.tif
+{ head -1 frames.csv; for i in 1 2 3 4 5 6; do echo "f$i.tif,$((10 * i)),$((600 + 30 * i))"; done; } > torn.csv
+sed 's/files: "frames/files: "torn/; s/frames.csv/torn.csv/; s/^micrograph:/micrograph:\n  mask: all.tif/' series.yaml > torn.yaml
+"$birefit" series torn.yaml --threads 2 --out torn_out > stdout.txt 2> stderr.txt
+[ $? -eq 1 ] || fail "frames that cannot be read: $(cat stderr.txt)"
+cut -d, -f1 torn_out/series.csv | tail -n +2 | tr '\n' ' ' | grep -qx 'torn/f1.tif torn/f2.tif torn/f3.tif torn/f4.tif torn/f5.tif torn/f6.tif ' ||
+  fail 'a frame without its row'
+for row in 'f1.*,answer,$' 'f2.*,unreadable,.*truncated or damaged' 'f3.*,unreadable,.*is empty' 'f4.*,unreadable,.*does not exist' \
+  'f5.*,unreadable,.*all.tif is 48 x 48 pixels, f5.tif is 48 x 32' 'f6.*,answer,$'; do
+  grep -q "^torn/$row" torn_out/series.csv || fail "no row /$row/ in $(cat torn_out/series.csv)"
+done
+grep -q '2 answer, 4 unreadable' stdout.txt && grep -q '^unreadable: f2: .*truncated' stdout.txt || fail 'unreadable frames are not said'
+ls torn_out/frames | tr '\n' ' ' | grep -qx 'f1 f6 ' || fail 'results of a frame that cannot be read'
+cp frames/f2.tif frames/f3.tif frames/f4.tif frames/f5.tif torn/
+"$birefit" series torn.yaml --threads 2 --resume --out torn_out > stdout.txt 2> stderr.txt || fail "frames that came back: $(cat stderr.txt)"
+grep -q '^1 frames were up to date' stdout.txt || fail "frames that came back: $(head -1 stdout.txt)"
+"$birefit" series torn.yaml --threads 2 --quiet --out torn_whole && cmp -s torn_out/series.csv torn_whole/series.csv || fail 'frames that came back: not what they are'
 
 # ---- text of others is drawn, never run --------------------------------------------------------------------------------
 
