@@ -13,15 +13,16 @@
 
 namespace birefit {
 
-/// One image, and what its row of the table sets.
+/// One image, or page of a stack, and what its row of the table sets.
 struct SeriesFrame {
   struct Cell {
     std::string text;
     Where where;
   };
-  /// the file's name without extension, of which there is no second: the folder of its results
+  /// the file's name without extension, and of a stack the page, of which there is no second: the folder of its results
   std::string name;
   std::string file;         ///< as found, from the config's folder on
+  std::optional<int> page;  ///< of a file with several, from 0
   Where where;              ///< of the table's row, else of `files`
   std::vector<Cell> cells;  ///< one for each of ImageSeries::columns
   std::string unreadable;   ///< why its image cannot be fitted; empty: it can
@@ -44,6 +45,8 @@ struct ImageSeries {
   std::vector<Column> columns;       ///< of the table, `file` left out
   std::optional<std::size_t> along;  ///< column to draw the estimates against, which then may be no parameter
   std::vector<std::pair<std::string, Where>> shared;
+  std::vector<std::pair<std::string, Where>> own;  ///< of one fit of all: what each image has for itself
+  std::vector<std::string> notes;                  ///< of what was done to read the table
 };
 
 /// Reads and checks a series completely, every image of it; throws UserError with every mistake found. Frames whose own

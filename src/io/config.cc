@@ -13,6 +13,7 @@
 #include "birefit/io.h"
 #include "io/config_disc.h"
 #include "io/config_fit.h"
+#include "io/config_items.h"
 #include "io/config_micrograph.h"
 #include "io/config_mosaic.h"
 #include "io/config_pictures.h"
@@ -21,8 +22,8 @@
 #include "io/config_scene.h"
 #include "io/config_series.h"
 #include "io/config_signal.h"
+#include "io/config_signal_frames.h"
 #include "io/config_starts.h"
-#include "io/images/mask.h"
 #include "medium/references.h"
 
 namespace birefit {
@@ -32,97 +33,6 @@ namespace {
 constexpr std::size_t kMaxProblemsShown = 50;
 constexpr int kMaxImageSide = 16384;
 
-/// One item of `micrographs:`.
-struct Item {
-  std::optional<std::string> image;
-  Where image_where;
-  std::optional<int> page;
-  std::vector<std::pair<std::string, const YamlNode*>> set;
-  std::vector<Where> set_where;
-  std::string axis;  ///< of `set`, may be no parameter: a column that a series is only drawn along
-};
-
-/// The image of a frame with its row of the table; `cells` holds the row's nodes, in the order of the columns.
-Item item_of(const ImageSeries& series, const SeriesFrame& frame, const std::vector<YamlNode>& cells) {
-  Item item;
-  item.image = frame.file;
-  item.image_where = frame.where;
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    item.set.emplace_back(series.columns[c].name, &cells[c]);
-    item.set_where.push_back(series.columns[c].where);
-  }
-  if (series.along) item.axis = series.columns[*series.along].name;
-  return item;
-}
-
-std::vector<Item> read_items(ConfigReader& reader, const Block& root) {
-  std::vector<Item> items;
-  const YamlNode* list = root.find("micrographs");
-  if (!list) return items;
-  if (is_series(*list)) {
-    reader.problems.add(list->where, "micrographs with files are a series of fits",
-                        "run birefit series " + reader.file);
-    return items;
-  }
-  if (!list->is_sequence() || list->items.empty()) {
-    reader.problems.add(list->where, "micrographs must be a list of {image, set}, found " +
-                                         (list->is_sequence() ? "an empty one" : list->describe()));
-    return items;
-  }
-  for (std::size_t i = 0; i < list->items.size(); ++i) {
-    const std::string path = "micrographs[" + std::to_string(i) + "]";
-    const Block block = reader.block_of(list->items[i], path, {"image", "set", "page"});
-    Item item;
-    item.image = reader.text(block, "image");
-    item.image_where = block.find("image") ? block.find("image")->where : block.where;
-    if (!block.find("image") && reader.use == ConfigUse::fit) reader.missing(block, "image");
-    item.page = reader.integer(block, "page", 0, 100000);
-    if (const YamlNode* set = block.find("set")) {
-      if (!set->is_map()) {
-        reader.problems.add(set->where, path + ".set must be a map of parameter paths, found " + set->describe());
-      } else {
-        for (const YamlEntry& entry : set->entries) {
-          item.set.emplace_back(entry.key, &entry.value);
-          item.set_where.push_back(entry.where);
-        }
-      }
-    }
-    items.push_back(std::move(item));
-  }
-  return items;
-}
-
-/// A micrograph of the shared scene with its own values of what its `set:` names.
-Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item, std::size_t index,
-                  const std::string& list = "micrographs") {
-  Picture micrograph = shared;
-  const std::map<std::string, NumberSpec> shared_specs = reader.specs;
-  const std::map<std::string, ParameterRef> shared_refs = reader.refs;
-  for (std::size_t k = 0; k < item.set.size(); ++k) {
-    const auto& [path, node] = item.set[k];
-    const auto spec = shared_specs.find(path);
-    if (spec == shared_specs.end()) {
-      if (path == item.axis) continue;
-      std::vector<std::string> known;
-      for (const auto& [name, unused] : shared_specs) known.push_back(name);
-      const std::string near = nearest_word(path, known);
-      reader.problems.add(item.set_where[k], path + " is no parameter of this config",
-                          !near.empty() ? "did you mean " + near + "?" : "known here: " + list_words(known));
-      continue;
-    }
-    const ParameterRef own = reader.number_at(*node, list + "[" + std::to_string(index) + "]." + path, spec->second);
-    if (spec->second.linear && !std::isfinite(reader.table[own].value))
-      reader.table[own].value = reader.table[shared_refs.at(path)].value;
-    if (path == "micrograph.gain") keep_positive(reader.table[own]);
-    reader.replaced.insert(shared_refs.at(path).index);
-    replace_ref(micrograph, shared_refs.at(path), own);
-  }
-  // The names of this image's parameters are no paths for the next image's `set:`.
-  reader.specs = shared_specs;
-  reader.refs = shared_refs;
-  return micrograph;
-}
-
 /// All problems, those of the config first and from top to bottom.
 [[noreturn]] void throw_sorted(const ConfigReader& reader) {
   std::vector<Problem> problems = reader.problems.all();
@@ -130,6 +40,12 @@ Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item,
     const bool a_other = a.where.file != reader.file, b_other = b.where.file != reader.file;
     return std::tie(a_other, a.where.line, a.where.column) < std::tie(b_other, b.where.line, b.where.column);
   });
+  // What the frames of a config are read by reads parts of it again.
+  problems.erase(std::unique(problems.begin(), problems.end(),
+                             [](const Problem& a, const Problem& b) {
+                               return a.where.line == b.where.line && a.where.file == b.where.file && a.what == b.what;
+                             }),
+                 problems.end());
   if (problems.size() > kMaxProblemsShown) {
     const std::size_t more = problems.size() - kMaxProblemsShown;
     problems.resize(kMaxProblemsShown);
@@ -154,9 +70,9 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
                      "physics", "transport", "prior", "fit", "signal"});
 
   const YamlNode* list = root.find("micrographs");
-  const std::vector<YamlNode> cells = series ? cell_nodes(series->frames[frame]) : std::vector<YamlNode>{};
+  TableNodes nodes;
   std::vector<Item> items =
-      series ? std::vector<Item>{item_of(*series, series->frames[frame], cells)} : read_items(reader, root);
+      series ? items_of(reader, *series, frame, frame + 1, nodes) : read_items(reader, root, config, nodes);
   if (!items.empty()) {
     for (const auto& [name, node] : items[0].set) {
       const bool everywhere = std::all_of(items.begin(), items.end(), [&](const Item& item) {
@@ -229,9 +145,9 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     only.image_where = settings.image_where;
     only.page = settings.page;
     items = {only};
-  } else if (settings.page) {
+  } else if (settings.page.given()) {
     for (Item& item : items)
-      if (!item.page) item.page = settings.page;
+      if (!item.page.given()) item.page = settings.page;
   }
 
   std::vector<Picture> micrographs;
@@ -257,8 +173,11 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       const Picture base = apply_set(reader, shared, own, i, "signal");
       std::size_t rows = 0;
       for (const Readings& table : tables) rows += table.rows.size();
+      const std::optional<TextTable> table =
+          signals[i].frames ? table_of_frames(reader, signals[i], settings) : load_signal(reader, signals[i]);
+      if (!table) continue;
       append_signal(
-          reader, signals[i], i, base, rows,
+          reader, signals[i], *table, i, base, rows,
           [&](Scene& scene, ParameterRef from, ParameterRef to) {
             reader.replaced.insert(from.index);
             replace_ref(scene, from, to);
@@ -347,11 +266,11 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       resolve_automatic(reader, scene, nullptr, nullptr, name);
       if (reader.problems.empty()) check_overlap(reader, scene, "the image");
     } else if (image || item.image) {
-      const ImageRequest request = image_request(settings, image ? *image : reader.resolve(*item.image), item.page,
-                                                 image ? Where{image->string()} : item.image_where);
-      if (const std::optional<LoadedImage> loaded =
-              has_ring_table(scene) ? load_ring_table(reader, request.path, request.where, scene, config.observable)
-                                    : try_load(reader, request)) {
+      const std::filesystem::path file = image ? *image : reader.resolve(*item.image);
+      const Where where = image ? Where{image->string()} : item.image_where;
+      if (const std::optional<LoadedImage> loaded = has_ring_table(scene)
+                                                        ? load_ring_table(reader, file, where, scene, config.observable)
+                                                        : try_load(reader, settings, file, item.page, where)) {
         set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
         demand_pixel_size(scene, loaded->uneven_pixel_um);
         if (reader.problems.empty()) {
@@ -381,21 +300,13 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     }
     // Images are loaded although something else is wrong: their mistakes are reported in the same run.
     std::optional<Calibration> calibration;
-    if (settings.dark || settings.parallel) calibration = load_calibration(reader, settings);
-    std::optional<Mask> user_mask;
-    if (settings.mask) {
-      try {
-        LoadedMask mask = load_mask({reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where});
-        say(reader, *settings.mask, mask.notes);
-        user_mask = std::move(mask.selected);
-      } catch (const UserError& error) {
-        reader.problems.add(error);
-      }
-    }
+    if (settings.calibrated() && signals.empty()) calibration = load_calibration(reader, settings);
+    const std::optional<Mask> user_mask =
+        signals.empty() ? load_user_mask(reader, settings) : std::optional<Mask>();  // tables have read theirs
     std::vector<Observable> observables(micrographs.size());
     std::vector<std::vector<Picture>> filled(micrographs.size());
     std::string of_colours;  // the first picture that is one colour of several
-    const bool frames_missing = (settings.dark || settings.parallel) && !calibration;
+    const bool frames_missing = settings.calibrated() && !calibration;
     const bool mask_missing = settings.mask && !user_mask;
     for (std::size_t i = 0; i < items.size(); ++i) {
       const Item& item = items[i];
@@ -404,10 +315,10 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       const bool replaced = image && !list;
       const std::filesystem::path file = replaced ? *image : reader.resolve(*item.image);
       const Where where = replaced ? Where{file.string()} : item.image_where;
-      micrograph.name = file.filename().string();
+      micrograph.name = file.filename().string() + (item.page.given() && list ? " (" + item.page.words() + ")" : "");
       std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene)
                                               ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
-                                              : try_load(reader, image_request(settings, file, item.page, where));
+                                              : try_load(reader, settings, file, item.page, where);
       if (!loaded) continue;
       if (size && (loaded->values.width() != (*size)[0] || loaded->values.height() != (*size)[1]))
         reader.problems.add(root.find("image_size_px")->where,

@@ -84,16 +84,30 @@ void read_calibration(ConfigReader& reader, const Block& root, const Block& micr
     reader.problems.add(micrograph.find("calibration")->where, "calibration is also given at top level",
                         "give one of the two");
   if (!top && !inner) return;
-  const Block block = reader.block(top ? root : micrograph, "calibration", {"dark", "parallel", "crossed"}, true);
-  for (const auto& [key, name, where] :
-       {std::tuple(std::string("dark"), &settings.dark, &settings.dark_where),
-        std::tuple(std::string("parallel"), &settings.parallel, &settings.parallel_where),
-        std::tuple(std::string("crossed"), &settings.crossed, &settings.crossed_where)}) {
-    *name = reader.text(block, key);
-    *where = block.find(key) ? block.find(key)->where : block.where;
-    if (key != "crossed" && !block.find(key))
-      reader.missing(block, key, "transmission = (image - dark) / (parallel - dark)");
-  }
+  const Block block =
+      reader.block(top ? root : micrograph, "calibration", {"dark", "parallel", "flat", "crossed"}, true);
+  const auto read = [&](const char* key, std::optional<std::string>& name, Where& where) {
+    if (!block.find(key)) return;
+    name = reader.text(block, key);
+    where = block.find(key)->where;
+  };
+  read("dark", settings.dark, settings.dark_where);
+  read("flat", settings.light, settings.light_where);
+  read("parallel", settings.light, settings.light_where);
+  read("crossed", settings.crossed, settings.crossed_where);
+  const bool parallel = block.find("parallel"), flat = block.find("flat"), dark = block.find("dark");
+  if (block.node && block.node->entries.empty())
+    reader.missing(block, "dark, parallel or flat", "dark alone is subtracted, flat alone divides");
+  if (parallel && flat)
+    reader.problems.add(
+        block.find("flat")->where, "flat is given beside parallel",
+        "give one of the two: both divide, a parallel frame with the sample's polarizers and a dark one");
+  if ((parallel || block.find("crossed")) && !dark)
+    reader.missing(block, "dark", "transmission = (image - dark) / (parallel - dark); flat alone divides");
+  if (block.find("crossed") && !parallel)
+    reader.missing(block, "parallel", "transmission = (image - dark) / (parallel - dark)");
+  if (flat && !dark)
+    reader.warnings.push_back("calibration has a flat and no dark: what the camera shows without light is taken as 0.");
 }
 
 /// r, g, b, mean or a number.
@@ -129,6 +143,16 @@ std::optional<double> read_pixel_size(ConfigReader& reader, const Block& block, 
 
 }  // namespace
 
+std::optional<PixelRect> read_roi(ConfigReader& reader, const Block& block, Where& where) {
+  where = block.find("roi_px") ? block.find("roi_px")->where : block.where;
+  const auto given = reader.integers(block, "roi_px", 4, "[x0, y0, x1, y1] (end exclusive)");
+  if (!given) return std::nullopt;
+  const PixelRect roi{(*given)[0], (*given)[1], (*given)[2], (*given)[3]};
+  if (roi.width() > 0 && roi.height() > 0) return roi;
+  reader.problems.add(where, "roi_px is empty: x1 must be above x0 and y1 above y0 (end exclusive)");
+  return std::nullopt;
+}
+
 void keep_positive(Parameter& gain) {
   if (gain.automatic && !std::isfinite(gain.lower)) gain.lower = gain.physical_lower = 0;
 }
@@ -146,7 +170,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   const auto place = [&](const char* key) { return block.find(key) ? block.find(key)->where : block.where; };
   settings.image = reader.text(block, "image");
   settings.image_where = place("image");
-  settings.page = reader.integer(block, "page", 0, 100000);
+  settings.page = read_page(reader, block);
   settings.channel = read_channel(reader, block);
   settings.mosaic = read_mosaic(reader, block, settings.channel);
 
@@ -193,14 +217,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   angle.upper = 36000;
   settings.rotation = reader.number(block, "rotation_deg", angle, 0);
 
-  settings.roi_where = place("roi_px");
-  if (const auto roi = reader.integers(block, "roi_px", 4, "[x0, y0, x1, y1] (end exclusive)")) {
-    settings.roi = PixelRect{(*roi)[0], (*roi)[1], (*roi)[2], (*roi)[3]};
-    if (settings.roi->width() <= 0 || settings.roi->height() <= 0) {
-      reader.problems.add(settings.roi_where, "roi_px is empty: x1 must be above x0 and y1 above y0 (end exclusive)");
-      settings.roi.reset();
-    }
-  }
+  settings.roi = read_roi(reader, block, settings.roi_where);
   settings.mask = reader.text(block, "mask");
   settings.mask_where = place("mask");
   NumberSpec counts;

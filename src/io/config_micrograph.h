@@ -7,6 +7,7 @@
 
 #include "birefit/measurement.h"
 #include "io/config_mosaic.h"
+#include "io/config_pages.h"
 #include "io/config_pixels.h"
 #include "io/config_reader.h"
 
@@ -16,7 +17,7 @@ namespace birefit {
 struct MicrographSettings {
   std::optional<std::string> image;
   Where image_where;
-  std::optional<int> page;
+  PageChoice page;
   std::string channel;
   MosaicSettings mosaic;
   std::optional<double> pixel_size_um;
@@ -30,13 +31,17 @@ struct MicrographSettings {
   Where mask_where;
   std::optional<double> saturation_counts;
   std::optional<NoiseModel> noise;
-  std::optional<std::string> dark, parallel, crossed;
-  Where dark_where, parallel_where, crossed_where;
+  /// Calibration frames: without light; of all light that there is (`parallel` or `flat`); between crossed polarizers.
+  std::optional<std::string> dark, light, crossed;
+  Where dark_where, light_where, crossed_where;
+  bool calibrated() const { return dark || light; }
   Where where;
 };
 
 /// Of a scene whose sample is read. Mistakes go to the reader's problems.
 MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene, Quantity quantity);
+/// `roi_px` of a block; nothing without it, and with a problem.
+std::optional<PixelRect> read_roi(ConfigReader& reader, const Block& block, Where& where);
 /// An automatic gain: a negative one would pass off dark fringes as bright ones, half an order away.
 void keep_positive(Parameter& gain);
 /// The two sizes of a pixel in words: "0.1 x 0.12 um".

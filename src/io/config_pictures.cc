@@ -58,7 +58,7 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   };
   if (user_mask) other_size(user_mask->width(), user_mask->height(), *settings.mask, settings.mask_where);
   if (calibration)
-    other_size(calibration->dark.width(), calibration->dark.height(), *settings.dark, settings.dark_where);
+    other_size(calibration->usable.width(), calibration->usable.height(), calibration->name, calibration->where);
   if (reader.problems.all().size() > problems_before) return false;
 
   const PixelRect area = settings.roi.value_or(whole(image.values));
@@ -94,14 +94,18 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   micrograph.dead = frame_dead + exclude_outliers(image.values, area, step, Smoothness::image, micrograph.mask);
 
   if (calibration) {
-    micrograph.variance_scale = Image(width, height, 0);
+    const bool subtract = !calibration->dark.empty(), divide = !calibration->light.empty();
+    if (divide) micrograph.variance_scale = Image(width, height, 0);
     for (std::size_t i = 0; i < image.values.size(); ++i) {
-      const double light = calibration->light.values()[i];
+      double& value = image.values.values()[i];
       if (!micrograph.mask.values()[i]) {
-        image.values.values()[i] = std::numeric_limits<double>::quiet_NaN();
+        value = std::numeric_limits<double>::quiet_NaN();
         continue;
       }
-      image.values.values()[i] = (image.values.values()[i] - calibration->dark.values()[i]) / light;
+      if (subtract) value -= calibration->dark.values()[i];
+      if (!divide) continue;
+      const double light = calibration->light.values()[i];
+      value /= light;
       micrograph.variance_scale.values()[i] = 1 / (light * light);
     }
   }
@@ -128,7 +132,7 @@ bool is_unstated_mosaic(ConfigReader& reader, const MicrographSettings& settings
   if (settings.mosaic.not_looked_for || image.colour) return false;
   // Frames with and without light take off what a camera's pixels have of their own, and a camera that was calibrated
   // so is none with a mosaic: its columns and rows may differ by as much.
-  if (settings.dark || settings.parallel) return false;
+  if (settings.calibrated()) return false;
   PixelRect area = settings.roi.value_or(whole(image.values));
   area.x1 = std::min(area.x1, image.values.width()), area.y1 = std::min(area.y1, image.values.height());
   if (area.x0 < 0 || area.y0 < 0) return false;  // reported
@@ -146,7 +150,11 @@ void say(ConfigReader& reader, const std::filesystem::path& file, const std::vec
   for (const std::string& note : notes) reader.warnings.push_back(file.filename().string() + ": " + note);
 }
 
-std::optional<LoadedImage> try_load(ConfigReader& reader, const ImageRequest& request) {
+std::optional<LoadedImage> try_load(ConfigReader& reader, const MicrographSettings& settings,
+                                    const std::filesystem::path& file, PageChoice page, const Where& where) {
+  if (!settle_page(reader, file, page)) return std::nullopt;
+  ImageRequest request{file, page.number, settings.channel, where};
+  request.cells = !settings.mosaic.parts.empty();
   try {
     LoadedImage image = load_image(request);
     say(reader, request.path, image.notes);
@@ -157,45 +165,39 @@ std::optional<LoadedImage> try_load(ConfigReader& reader, const ImageRequest& re
   }
 }
 
-ImageRequest image_request(const MicrographSettings& settings, const std::filesystem::path& file,
-                           std::optional<int> page, const Where& where) {
-  ImageRequest request{file, page, settings.channel, where};
-  request.cells = !settings.mosaic.parts.empty();
-  return request;
-}
-
 std::optional<Calibration> load_calibration(ConfigReader& reader, const MicrographSettings& settings) {
-  if (!settings.dark || !settings.parallel) return std::nullopt;
-  const auto load = [&](const std::string& name, const Where& where) {
-    return try_load(reader, image_request(settings, reader.resolve(name), std::nullopt, where));
+  struct Frame {
+    const std::optional<std::string>& name;
+    const Where& where;
+    std::optional<LoadedImage> image;
   };
-  std::optional<LoadedImage> dark = load(*settings.dark, settings.dark_where);
-  std::optional<LoadedImage> parallel = load(*settings.parallel, settings.parallel_where);
-  std::optional<LoadedImage> crossed;
-  if (settings.crossed) {
-    crossed = load(*settings.crossed, settings.crossed_where);
-    if (!crossed) return std::nullopt;
+  Frame dark{settings.dark, settings.dark_where, {}}, bright{settings.light, settings.light_where, {}},
+      crossed{settings.crossed, settings.crossed_where, {}};
+  Frame* first = nullptr;
+  const std::size_t before = reader.problems.all().size();
+  for (Frame* frame : {&dark, &bright, &crossed}) {
+    if (!frame->name) continue;
+    frame->image = try_load(reader, settings, reader.resolve(*frame->name), {}, frame->where);
+    if (!frame->image) continue;
+    const Image &values = frame->image->values, &size = first ? first->image->values : values;
+    if (!first) first = frame;
+    if (values.width() != size.width() || values.height() != size.height())
+      reader.problems.add(frame->where, *frame->name + " is " + std::to_string(values.width()) + " x " +
+                                            std::to_string(values.height()) + " pixels, " + *first->name + " is " +
+                                            std::to_string(size.width()) + " x " + std::to_string(size.height()));
   }
-  if (!dark || !parallel) return std::nullopt;
+  if (!first || reader.problems.all().size() > before) return std::nullopt;
+  const Image& size = first->image->values;
+  if (!check_roi(reader, settings, size, *first->name)) return std::nullopt;
 
-  const auto same_size = [&](const LoadedImage& frame, const std::string& name, const Where& where) {
-    if (frame.values.width() == dark->values.width() && frame.values.height() == dark->values.height()) return true;
-    reader.problems.add(where, name + " is " + std::to_string(frame.values.width()) + " x " +
-                                   std::to_string(frame.values.height()) + " pixels, " + *settings.dark + " is " +
-                                   std::to_string(dark->values.width()) + " x " +
-                                   std::to_string(dark->values.height()));
-    return false;
-  };
-  if (!same_size(*parallel, *settings.parallel, settings.parallel_where)) return std::nullopt;
-  if (crossed && !same_size(*crossed, *settings.crossed, settings.crossed_where)) return std::nullopt;
-  if (!check_roi(reader, settings, dark->values, *settings.dark)) return std::nullopt;
-
-  const PixelRect area = settings.roi.value_or(whole(dark->values));
+  const PixelRect area = settings.roi.value_or(whole(size));
   Calibration calibration;
-  calibration.usable = Mask(dark->values.width(), dark->values.height(), 1);
-  calibration.saturated = Mask(dark->values.width(), dark->values.height(), 0);
-  for (LoadedImage* frame : {&*dark, &*parallel, crossed ? &*crossed : nullptr}) {
-    if (!frame) continue;
+  calibration.name = *first->name, calibration.where = first->where;
+  calibration.usable = Mask(size.width(), size.height(), 1);
+  calibration.saturated = Mask(size.width(), size.height(), 0);
+  for (std::optional<LoadedImage>* frame_image : {&dark.image, &bright.image, &crossed.image}) {
+    if (!*frame_image) continue;
+    LoadedImage* frame = &**frame_image;
     // The frames come from one camera: the code at which one saturates is the code for all.
     mark_saturated(frame->values, find_saturation(*frame, area, settings.saturation_counts).from,
                    calibration.saturated);
@@ -210,24 +212,26 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
       exclude_outliers_in_cells(frame->values, area, step, Smoothness::frame, calibration.usable);
   }
 
-  calibration.dark = dark->values;
-  calibration.light = parallel->values;
-  for (std::size_t i = 0; i < calibration.light.size(); ++i)
-    calibration.light.values()[i] -= calibration.dark.values()[i];
+  if (dark.image) calibration.dark = dark.image->values;
+  if (!bright.image) return calibration;
+  calibration.light = bright.image->values;
+  if (dark.image)
+    for (std::size_t i = 0; i < calibration.light.size(); ++i)
+      calibration.light.values()[i] -= calibration.dark.values()[i];
   Mask positive = calibration.usable;
   for (std::size_t i = 0; i < positive.size(); ++i)
     if (!(calibration.light.values()[i] > 0)) positive.values()[i] = 0;
   const RobustSpread typical = robust_spread(calibration.light, positive, area);
   if (typical.count == 0) {
-    reader.problems.add(settings.parallel_where, *settings.parallel + " is nowhere brighter than " + *settings.dark,
-                        "were the two exchanged?");
+    reader.problems.add(bright.where, *bright.name + " is nowhere brighter than " + (dark.name ? *dark.name : "0"),
+                        dark.name ? "were the two exchanged?" : "");
     return std::nullopt;
   }
   for (std::size_t i = 0; i < calibration.light.size(); ++i)
     if (!(calibration.light.values()[i] > kLeastLightFraction * typical.median)) calibration.usable.values()[i] = 0;
 
-  if (crossed) {
-    Image transmission = crossed->values;
+  if (crossed.image && dark.image) {  // without a dark one a mistake was reported
+    Image transmission = crossed.image->values;
     for (std::size_t i = 0; i < transmission.size(); ++i)
       transmission.values()[i] =
           (transmission.values()[i] - calibration.dark.values()[i]) / calibration.light.values()[i];
@@ -241,6 +245,18 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
     }
   }
   return calibration;
+}
+
+std::optional<Mask> load_user_mask(ConfigReader& reader, const MicrographSettings& settings) {
+  if (!settings.mask) return std::nullopt;
+  try {
+    LoadedMask mask = load_mask({reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where});
+    say(reader, *settings.mask, mask.notes);
+    return std::move(mask.selected);
+  } catch (const UserError& error) {
+    reader.problems.add(error);
+    return std::nullopt;
+  }
 }
 
 void replace_ref(Scene& scene, ParameterRef from, ParameterRef to) {

@@ -11,21 +11,23 @@ namespace birefit {
 
 /// The calibration frames as what a micrograph needs of them.
 struct Calibration {
-  Image dark;   ///< counts in linear light
-  Image light;  ///< parallel - dark
+  Image dark;   ///< counts in linear light; empty: nothing is subtracted
+  Image light;  ///< the frame of light less dark; empty: nothing divides
   Mask usable;
   Mask saturated;
   double crossed_median = 0, crossed_sd = 0;
   bool has_crossed = false;
+  std::string name;  ///< of its first frame, for messages about its size
+  Where where;
 };
 
-/// An image with the reader's remarks among the warnings; none with a problem.
-std::optional<LoadedImage> try_load(ConfigReader& reader, const ImageRequest& request);
-/// What the settings ask of an image file.
-ImageRequest image_request(const MicrographSettings& settings, const std::filesystem::path& file,
-                           std::optional<int> page, const Where& where);
+/// An image file as the settings ask for it, with the reader's remarks among the warnings; none with a problem.
+std::optional<LoadedImage> try_load(ConfigReader& reader, const MicrographSettings& settings,
+                                    const std::filesystem::path& file, PageChoice page, const Where& where);
 /// The frames that the settings name; none with a problem.
 std::optional<Calibration> load_calibration(ConfigReader& reader, const MicrographSettings& settings);
+/// The mask that the settings name; none without, and with a problem.
+std::optional<Mask> load_user_mask(ConfigReader& reader, const MicrographSettings& settings);
 /// The reader's remarks on a file, to the warnings.
 void say(ConfigReader& reader, const std::filesystem::path& file, const std::vector<std::string>& notes);
 /// The picture with its pixels, or those that a mosaic holds; none when a problem left nothing to work with.

@@ -10,7 +10,7 @@
 
 #include "core/robust.h"
 #include "fit/weights/rows.h"
-#include "io/table.h"
+#include "io/config_micrograph.h"
 
 namespace birefit {
 namespace {
@@ -36,16 +36,37 @@ double noise_of(std::vector<std::pair<double, double>> rows) {
   return std::isfinite(least) ? least : 0;
 }
 
+/// A table in a file, or frames that make one.
+void read_source(ConfigReader& reader, const Block& block, SignalItem& item) {
+  const YamlNode *file = block.find("file"), *frames = block.find("frames");
+  if (!file && !frames) reader.missing(block, "file", "or frames: images whose means over roi_px are the rows");
+  if (file && frames) reader.problems.add(frames->where, "frames is given beside file", "give one of the two");
+  const char* key = frames ? "frames" : "file";
+  if (const auto name = reader.text(block, key)) {
+    item.file = *name;
+    item.file_where = block.find(key)->where;
+  }
+  for (const char* other : {"set_from", "roi_px"})
+    if (const YamlNode* found = block.find(other); found && !frames)
+      reader.problems.add(found->where, std::string(other) + " is of frames", "frames: stack.tif");
+  if (!frames) return;
+  if (const YamlNode* value = block.find("value"))
+    reader.problems.add(value->where, "value is of a file: of frames it is the mean over roi_px", "leave it out");
+  FramesAsked asked;
+  asked.files = item.file, asked.files_where = item.file_where;
+  asked.set_from = reader.text(block, "set_from");
+  if (asked.set_from) asked.set_from_where = block.find("set_from")->where;
+  item.frames = asked;
+  item.roi = read_roi(reader, block, item.roi_where);
+}
+
 SignalItem read_item(ConfigReader& reader, const YamlNode& node, const std::string& path) {
   SignalItem item;
-  const Block block =
-      reader.block_of(node, path, {"file", "value", "quantity", "columns", "where", "set", "every", "noise"});
+  const Block block = reader.block_of(
+      node, path,
+      {"file", "frames", "set_from", "roi_px", "value", "quantity", "columns", "where", "set", "every", "noise"});
   item.where = item.file_where = block.where;
-  if (!block.find("file")) reader.missing(block, "file");
-  if (const auto file = reader.text(block, "file")) {
-    item.file = *file;
-    item.file_where = block.find("file")->where;
-  }
+  read_source(reader, block, item);
   item.value_column = reader.text(block, "value").value_or("signal");
   const std::vector<std::string> quantities{"intensity", "retardance_um", "retardance_waves", "birefringence"};
   if (const auto quantity = reader.choice(block, "quantity", quantities))
@@ -200,33 +221,42 @@ std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
     reader.problems.add(node->where,
                         "signal must be a table {file, value, columns} or a list of them, found " + node->describe());
   }
+  const bool images =
+      std::any_of(items.begin(), items.end(), [](const SignalItem& item) { return item.frames.has_value(); });
   for (const char* other : {"micrographs", "calibration", "image_size_px"})
-    if (const YamlNode* found = root.find(other))
+    if (const YamlNode* found = root.find(other); found && !(images && std::string(other) == "calibration"))
       reader.problems.add(found->where, std::string(other) + " is given beside signal", "give one of the two");
   // What belongs to images would be dropped without a word.
   if (const YamlNode* micrograph = root.find("micrograph"))
     for (const char* key :
          {"image", "page", "channel", "transfer", "roi_px", "mask", "saturation_counts", "noise", "calibration"})
-      if (const YamlNode* found = micrograph->find(key))
+      if (const YamlNode* found = micrograph->find(key);
+          found && !(images && std::string(key) != "image" && std::string(key) != "noise"))
         reader.problems.add(found->where, std::string("micrograph.") + key + " is of images, this config has signal",
                             std::string(key) == "noise" ? "signal has its own noise" : "leave it out");
   return items;
 }
 
-void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base,
-                   std::size_t first, const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace,
-                   Config& config, std::vector<Readings>& tables) {
-  if (item.file.empty()) return;
-  TextTable text;
+std::optional<TextTable> load_signal(ConfigReader& reader, const SignalItem& item) {
+  if (item.file.empty()) return std::nullopt;
   try {
     Problems problems;
-    text = load_text_table(reader.resolve(item.file), item.file_where, problems, true);
+    TextTable text = load_text_table(reader.resolve(item.file), item.file_where, problems, true);
     problems.throw_if_any();
+    return text;
   } catch (const UserError& error) {
     reader.problems.add(error);
-    return;
+    return std::nullopt;
   }
-  const std::string file = reader.resolve(item.file).string();
+}
+
+void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable& text, std::size_t number,
+                   const Picture& base, std::size_t first,
+                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
+                   std::vector<Readings>& tables) {
+  // Where the rows are; a pattern of frames is no file that is read.
+  const std::string file = item.frames ? (reader.folder / item.frames->set_from.value_or(item.file)).string()
+                                       : reader.resolve(item.file).string();
   std::vector<std::string> names;
   for (const TableCell& cell : text.header) names.push_back(cell.text);
   const auto column_of = [&](const std::string& name, const Where& where) {
@@ -288,7 +318,7 @@ void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t num
   for (const auto& point : curve) largest = std::max(largest, std::abs(point.second));
   NoiseModel noise;  // of the whole table; one pixel cannot tell its own
   noise.read_counts = item.noise ? *item.noise : std::max(noise_of(curve), 1e-6 * largest);
-  SignalTable table{std::filesystem::path(file).filename().string(), first, item.columns[0].path, {}, {}};
+  SignalTable table{std::filesystem::path(item.file).filename().string(), first, item.columns[0].path, {}, {}};
   switch (item.quantity) {
     case Quantity::intensity:
     case Quantity::ring_radius_cm:

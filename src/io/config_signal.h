@@ -6,13 +6,18 @@
 #include <utility>
 #include <vector>
 
+#include "io/config_frames.h"
 #include "io/config_reader.h"
+#include "io/table.h"
 
 namespace birefit {
 
 /// One table as the config describes it.
 struct SignalItem {
-  std::string file;
+  std::string file;                   ///< of the table, or the pattern of its frames
+  std::optional<FramesAsked> frames;  ///< whose means are the table
+  std::optional<PixelRect> roi;       ///< of the frames
+  Where roi_where;
   Where where, file_where;
   std::string value_column;
   Quantity quantity = Quantity::intensity;
@@ -39,10 +44,14 @@ struct SignalItem {
 /// `signal:` as one table or a list of them; empty without the key.
 std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root);
 
+/// The table that an item names; nothing with a problem.
+std::optional<TextTable> load_signal(ConfigReader& reader, const SignalItem& item);
+
 /// A table's rows, each in `base` (the shared scene with what the table sets) but for what its columns set; `first`:
 /// sights of the tables before it. `replace` gives a scene another reference for a parameter.
-void append_signal(ConfigReader& reader, const SignalItem& item, std::size_t number, const Picture& base,
-                   std::size_t first, const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace,
-                   Config& config, std::vector<Readings>& tables);
+void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable& text, std::size_t number,
+                   const Picture& base, std::size_t first,
+                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
+                   std::vector<Readings>& tables);
 
 }  // namespace birefit

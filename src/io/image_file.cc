@@ -18,6 +18,7 @@
 
 #include "birefit/io.h"
 #include "io/file.h"
+#include "io/images/pages.h"
 #include "io/images/raw_photograph.h"
 #include "io/images/signature.h"
 #include "io/images/stated_size.h"
@@ -79,10 +80,16 @@ int count_pages(OIIO::ImageInput& input) {
   return pages;
 }
 
-std::string list_pages(OIIO::ImageInput& input, int pages) {
+std::string list_pages(OIIO::ImageInput& input, int pages, const fs::path& file) {
+  const std::vector<StackPage> stack = stack_pages(file);
   std::string text;
-  for (int page = 0; page < std::min(pages, kListedPages); ++page)
-    text += fmt::format("{}{}: {}", page ? "; " : "", page, describe_page(input.spec(page)));
+  for (int page = 0; page < std::min(pages, kListedPages); ++page) {
+    const auto of_stack =
+        std::find_if(stack.begin(), stack.end(), [&](const StackPage& p) { return p.number == page; });
+    const bool placed = of_stack != stack.end() && (of_stack->t || of_stack->z || of_stack->c);
+    text += fmt::format("{}{}{}: {}", page ? "; " : "", page, placed ? " (" + of_stack->label() + ")" : "",
+                        describe_page(input.spec(page)));
+  }
   if (pages > kListedPages)
     text += fmt::format("; ... {}{}", pages - 1, pages == kCountedPages ? " and perhaps more" : "");
   return text;
@@ -287,8 +294,8 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     const int pages = count_pages(*input);
     refuse(request,
            fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
-                       list_pages(*input, pages)),
-           "add `page: 0` for the first");
+                       list_pages(*input, pages, request.path)),
+           "add `page: 0` for the first; micrographs: {files: ..} takes each as an image");
   }
   if (request.page) {
     page = *request.page;
@@ -297,7 +304,7 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
       const int pages = count_pages(*input);
       refuse(request,
              fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
-                         list_pages(*input, pages)),
+                         list_pages(*input, pages, request.path)),
              "pages count from 0");
     }
   }

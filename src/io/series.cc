@@ -161,11 +161,18 @@ std::string cells(const ParameterEstimate& p) {
 
 ImageSeries load_series(const std::filesystem::path& path) {
   ImageSeries series = read_series(path, read_text(path));
+  if (!series.own.empty())
+    throw UserError(series.own[0].second, "micrographs.own is of one fit of all images (birefit fit)",
+                    "every frame of a series has for itself what shared: [..] does not name: leave own out");
   constexpr std::size_t kMostProblems = 50;
   Problems problems, of_first;
   // What is wrong with the config shows in the first frame that can be read; the others' mistakes are their own.
   bool sound = false;
   for (std::size_t i = 0; i < series.frames.size() && problems.all().size() < kMostProblems; ++i) {
+    if (const SeriesFrame& frame = series.frames[i]; !frame.unreadable.empty()) {
+      if (i == 0) of_first.add(frame.where, frame.unreadable);
+      continue;
+    }
     try {
       if (sound) {
         check_frame(series, i);
@@ -362,7 +369,9 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
     if (fit)
       for (const ParameterEstimate& p : fit->parameters)
         if (std::find(names.begin(), names.end(), p.name) == names.end()) names.push_back(p.name);
-  std::string text = "file";
+  const bool pages = std::any_of(series.frames.begin(), series.frames.end(),
+                                 [](const SeriesFrame& frame) { return frame.page.has_value(); });
+  std::string text = pages ? "file,page" : "file";
   for (const ImageSeries::Column& column : series.columns) text += "," + field(column.name);
   for (const std::string& name : names) text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", name);
   text += ",reduced_chi_square,verdict,reason\n";
@@ -370,6 +379,7 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
     const auto& fit = result.frames[i];
     const SeriesFrame& frame = series.frames[i];
     text += field(frame.file);
+    if (pages) text += frame.page ? fmt::format(",{}", *frame.page) : ",";
     for (const SeriesFrame::Cell& given : frame.cells) text += "," + field(given.text);
     for (const std::string& name : names) {
       const ParameterEstimate* estimate = nullptr;

@@ -16,12 +16,13 @@ enum Tag {
   kHeight = 257,
   kBits = 258,
   kPhotometric = 262,
+  kDescription = 270,
   kSamples = 277,
   kSubIfds = 330,
   kCfaPattern = 33422,
   kDngVersion = 50706
 };
-constexpr std::uint64_t kMostEntries = 4096, kMostChildren = 16;
+constexpr std::uint64_t kMostEntries = 4096, kMostChildren = 16, kMostText = 1 << 26;
 
 /// Integers of either byte order at any place of a file; nothing behind its end.
 class TiffFile {
@@ -44,9 +45,7 @@ class TiffFile {
     return value;
   }
 
-  bool good = false, big_endian = false, big_tiff = false, canon_raw = false;
-
- private:
+  /// Fewer where the file ends before.
   std::string bytes(std::uint64_t at, std::size_t count) {
     std::string text(count, '\0');
     stream_.clear();
@@ -56,12 +55,15 @@ class TiffFile {
     return text;
   }
 
+  bool good = false, big_endian = false, big_tiff = false, canon_raw = false;
+
+ private:
   std::ifstream stream_;
 };
 
 /// The directory at `offset`, and in `next` where the chain goes on; nothing where the file ends before it does.
 std::optional<TiffDirectory> read_directory(TiffFile& file, std::uint64_t offset, std::uint64_t link,
-                                            std::uint64_t& next_link) {
+                                            std::uint64_t& next_link, bool first) {
   const int word = file.big_tiff ? 8 : 4, count_size = file.big_tiff ? 8 : 2, entry_size = file.big_tiff ? 20 : 12;
   TiffDirectory directory;
   directory.offset = offset, directory.link = link;
@@ -101,6 +103,13 @@ std::optional<TiffDirectory> read_directory(TiffFile& file, std::uint64_t offset
         break;
       case kPhotometric:
         directory.photometric = static_cast<int>(value(0));
+        break;
+      case kDescription:
+        if (constexpr std::uint64_t kAscii = 2; first && *type == kAscii && *values <= kMostText) {
+          const bool inside = *values <= static_cast<std::uint64_t>(word);
+          directory.description = file.bytes(inside ? field : file.number(field, word).value_or(0), *values);
+          directory.description.resize(std::min(directory.description.find('\0'), directory.description.size()));
+        }
         break;
       case kSamples:
         directory.samples = static_cast<int>(value(0));
@@ -149,9 +158,11 @@ TiffTags read_tiff_tags(const std::filesystem::path& path, std::size_t most_page
   std::set<std::uint64_t> visited;  // a damaged chain may turn back
   while (tags.pages.size() < most_pages) {
     const auto offset = file.number(link, word);
-    if (!offset || *offset == 0 || !visited.insert(*offset).second) break;
+    if (offset && (*offset == 0 || !visited.insert(*offset).second)) break;
     std::uint64_t next = 0;
-    auto directory = read_directory(file, *offset, link, next);
+    auto directory =
+        offset ? read_directory(file, *offset, link, next, tags.pages.empty()) : std::optional<TiffDirectory>();
+    tags.cut_off = !directory;
     if (!directory) break;
     tags.pages.push_back(std::move(*directory));
     link = next;
@@ -159,7 +170,7 @@ TiffTags read_tiff_tags(const std::filesystem::path& path, std::size_t most_page
   if (!tags.pages.empty())
     for (const std::uint64_t offset : tags.pages[0].children) {
       std::uint64_t next = 0;
-      if (auto directory = read_directory(file, offset, 0, next)) tags.children.push_back(std::move(*directory));
+      if (auto directory = read_directory(file, offset, 0, next, false)) tags.children.push_back(std::move(*directory));
     }
   return tags;
 }

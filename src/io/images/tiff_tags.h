@@ -17,6 +17,7 @@ struct TiffDirectory {
   bool states_bits = false;
   bool dng = false;  ///< has a DNGVersion
   bool reduced() const { return (subfile & 1) != 0; }
+  std::string description;              ///< ImageDescription, of the chain's first page alone
   std::string pattern;                  ///< of colour filters in cells of 2 x 2: "rggb", ..
   std::vector<std::uint64_t> children;  ///< offsets of its SubIFDs
 };
@@ -25,6 +26,7 @@ struct TiffTags {
   bool big_endian = false, big_tiff = false;
   bool canon_raw = false;               ///< "CR" behind the header
   std::vector<TiffDirectory> pages;     ///< the chain, as far as it was asked for
+  bool cut_off = false;                 ///< the chain goes on behind the end of the file
   std::vector<TiffDirectory> children;  ///< SubIFDs of the first page
 };
 

@@ -90,3 +90,22 @@ tiff("white_is_zero_big_endian_16.tif",
      [grey((65535 - np.arange(32).reshape(4, 8) * 2000).astype(np.uint16), 0, order=">")], ">")
 tiff("white_is_zero_float.tif", [grey((1 - np.linspace(0, 1, 32).reshape(4, 8)).astype(np.float32), 0, None, 3)])
 tiff("white_is_zero_signed.tif", [grey((-1 - np.arange(32).reshape(4, 8)).astype(np.int16), 0, None, 2)])
+
+# ---- stacks: page k of 8 x 6 pixels holds 100 + k --------------------------------------------------------------------------
+
+
+def stack(name, count, description):
+    tiff(name, [grey(np.full((6, 8), 100 + k, np.uint16), more={270: (2, description)} if k == 0 else None)
+                for k in range(count)])
+
+
+stack("stack_plain.tif", 3, "three pictures")
+stack("stack_imagej.tif", 6, "ImageJ=1.54f\nimages=6\nchannels=2\nframes=3\nhyperstack=true\nmode=grayscale\n")
+ome = ('<?xml version="1.0" encoding="UTF-8"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Image ID="Image:0">'
+       '<Pixels ID="Pixels:0" DimensionOrder="XYZTC" Type="uint16" SizeX="8" SizeY="6" SizeZ="2" SizeC="1" SizeT="3">'
+       '<Channel ID="Channel:0:0" SamplesPerPixel="1"/>%s</Pixels></Image></OME>')
+stack("stack_ome.tif", 6, ome % "<TiffData/>")
+stack("stack_ome_by_page.tif", 6, ome % "".join(  # the last first
+    f'<TiffData IFD="{5 - k}" FirstC="0" FirstT="{k // 2}" FirstZ="{k % 2}" PlaneCount="1"/>' for k in range(6)))
+cut = (folder / "stack_imagej.tif").read_bytes()
+(folder / "stack_imagej_cut.tif").write_bytes(cut[:len(cut) // 2])
