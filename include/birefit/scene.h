@@ -32,16 +32,20 @@ struct SideCamera {
 /// How pixels lie on the sample.
 struct View {
   int width = 0, height = 0;
-  double pixel_size_um = 0;  ///< 0 for conoscopic plates, cells and crystals that need none
-  ParameterRef center_x_px;  ///< sample centre; pixel centres are integers, (0, 0) the top left pixel's
+  ParameterRef pixel_size_um;  ///< on the sample; none for conoscopic plates, cells and crystals, which need none
+  ParameterRef center_x_px;    ///< sample centre; pixel centres are integers, (0, 0) the top left pixel's
   ParameterRef center_y_px;
   ParameterRef rotation_deg;         ///< of the sample, counter-clockwise as seen in the image
   std::optional<SideCamera> camera;  ///< of plates and slabs in a cone; none: it looks along the cone's axis
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("center_px.x", self.center_x_px, numbers::within(-1e6, 1e6, "px"), "of the sample");
-    visit.number("center_px.y", self.center_y_px, numbers::within(-1e6, 1e6, "px"), "of the sample");
+    visit.number("pixel_size_um", self.pixel_size_um, numbers::length_um(1000).left_out(),
+                 "on the sample; the file's own where it states one");
+    visit.number("center_px.x", self.center_x_px, numbers::within(-1e6, 1e6, "px").left_out(),
+                 "of the sample; not given: the image's middle");
+    visit.number("center_px.y", self.center_y_px, numbers::within(-1e6, 1e6, "px").left_out(),
+                 "of the sample; not given: the image's middle");
     visit.number("rotation_deg", self.rotation_deg, numbers::angle().or_else(0), "of the sample, counter-clockwise");
     visit.inside("camera", self.camera);
   }

@@ -129,7 +129,8 @@ int run_explain(const Arguments& arguments) {
     return kExitDone;
   }
   std::cout << fmt::format("Image      {} x {} pixels", config.scene.view.width, config.scene.view.height);
-  if (config.scene.view.pixel_size_um > 0) std::cout << fmt::format(" of {:g} um", config.scene.view.pixel_size_um);
+  if (const ParameterRef size = config.scene.view.pixel_size_um)
+    std::cout << fmt::format(" of {:g} um", table[size].value);
   std::cout << fmt::format("\nPhysics    {}\nMethod     {}\n", chosen.physics, chosen.method);
   for (const std::string& reason : chosen.reasons) std::cout << "           " << reason << "\n";
   std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error,

@@ -43,14 +43,14 @@ long count(const Mask& mask) {
   return std::count_if(mask.values().begin(), mask.values().end(), [](auto used) { return used != 0; });
 }
 
-/// Without whatever the zone covers for some parameters within their bounds: the corners of centre and diameter, the
-/// forces at steps of half of what is left out around them.
+/// Without whatever the zone covers for some parameters within their bounds: the corners of centre, diameter and pixel
+/// size, the forces at steps of half of what is left out around them.
 Mask possible_pixels(const FitJob& job, const Picture& micrograph, const Theta& theta) {
   const StressedDisc& disc = *disc_of(micrograph);
   const View& view = micrograph.scene.view;
   std::vector<Theta> places{theta};
-  for (const ParameterRef ref :
-       {disc.diameter_um, view.center_x_px, view.center_y_px, disc.load_azimuth_deg, view.rotation_deg}) {
+  for (const ParameterRef ref : {disc.diameter_um, view.pixel_size_um, view.center_x_px, view.center_y_px,
+                                 disc.load_azimuth_deg, view.rotation_deg}) {
     if (!ref || !job.parameters[ref].free) continue;
     const double lower = job.parameters[ref].lower, upper = job.parameters[ref].upper;
     if (!std::isfinite(upper - lower)) continue;

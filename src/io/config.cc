@@ -120,6 +120,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
   if (list && image)
     reader.problems.add({reader.file},
                         "--image replaces the image of `micrograph:`, but this config has `micrographs:`");
+  shared.scene.view.pixel_size_um = settings.pixel_size_um;
   shared.scene.view.center_x_px = settings.center_x;
   shared.scene.view.center_y_px = settings.center_y;
   shared.scene.view.rotation_deg = settings.rotation;
@@ -164,7 +165,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
                             "the axis of this cell turns about the light: its retardance is not one number",
                             "quantity: intensity");
     }
-    set_view(reader, settings, 1, 1, 0, "the signal", shared.scene);
+    set_view(reader, 1, 1, 0, "the signal", shared.scene);
     if (reader.problems.empty()) resolve_automatic(reader, shared.scene, nullptr, nullptr, "the signal");
     for (std::size_t i = 0; i < signals.size(); ++i) {
       Item own;
@@ -235,7 +236,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
                                 std::holds_alternative<StressedDisc>(shared.scene.sample) ||
                                 std::holds_alternative<SampledVolume>(shared.scene.sample);
   const auto demand_pixel_size = [&](const Scene& scene, const std::array<double, 2>& uneven_um = {}) {
-    if (!needs_pixel_size || scene.view.pixel_size_um > 0 || !reader.problems.empty()) return;
+    if (!needs_pixel_size || scene.view.pixel_size_um || !reader.problems.empty()) return;
     const Where where = settings.where.line > 0 ? settings.where : Where{reader.file};
     if (uneven_um[0] > 0)
       reader.problems.add(where,
@@ -261,7 +262,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     const Item& item = items[0];
     const std::string name = item.image.value_or("the image");
     if (size) {
-      set_view(reader, settings, (*size)[0], (*size)[1], 0, name, scene);
+      set_view(reader, (*size)[0], (*size)[1], 0, name, scene);
       demand_pixel_size(scene);
       resolve_automatic(reader, scene, nullptr, nullptr, name);
       if (reader.problems.empty()) check_overlap(reader, scene, "the image");
@@ -271,7 +272,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       if (const std::optional<LoadedImage> loaded = has_ring_table(scene)
                                                         ? load_ring_table(reader, file, where, scene, config.observable)
                                                         : try_load(reader, settings, file, item.page, where)) {
-        set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
+        set_view(reader, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
         demand_pixel_size(scene, loaded->uneven_pixel_um);
         if (reader.problems.empty()) {
           Mask all(loaded->values.width(), loaded->values.height(), 1);
@@ -285,7 +286,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     } else if (root.find("image_size_px")) {
       // Its mistake was reported.
     } else if (!scene.microscope.directions.empty()) {
-      set_view(reader, settings, 1, 1, 0, name, scene);
+      set_view(reader, 1, 1, 0, name, scene);
       resolve_automatic(reader, scene, nullptr, nullptr, name);
     } else {
       reader.problems.add({reader.file}, "needs image_size_px: [width, height] or micrograph.image");
@@ -326,8 +327,8 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
                                 std::to_string(loaded->values.width()) + " x " +
                                 std::to_string(loaded->values.height()),
                             "leave it out");
-      set_view(reader, settings, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um,
-               micrograph.name, micrograph.scene);
+      set_view(reader, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, micrograph.name,
+               micrograph.scene);
       if (sound) demand_pixel_size(micrograph.scene, loaded->uneven_pixel_um);
       if (frames_missing || mask_missing) continue;
       if (loaded->colour || !settings.mosaic.bayer.empty())

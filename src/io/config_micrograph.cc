@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "io/config_rings.h"
+#include "io/described.h"
 
 namespace birefit {
 namespace {
@@ -120,17 +121,21 @@ std::string read_channel(ConfigReader& reader, const Block& block) {
 }
 
 /// A number, or [x, y] of pixels that are square after all.
-std::optional<double> read_pixel_size(ConfigReader& reader, const Block& block, const NumberSpec& spec) {
-  const YamlNode* node = block.find("pixel_size_um");
-  if (!node || !node->is_sequence()) return reader.plain(block, "pixel_size_um", spec);
+ParameterRef read_pixel_size(ConfigReader& reader, const Block& block, const Scene& scene) {
+  const std::string key = "pixel_size_um";
+  NumberSpec spec = described<View>(key);
+  if (!std::holds_alternative<StressedDisc>(scene.sample)) spec.upper = 20;  // what a microscope has
+  if (!reader.given(block, key)) return {};
+  const YamlNode* node = block.find(key);
+  if (!node || !node->is_sequence()) return reader.number(block, key, spec);
   if (node->items.size() != 2) {
     reader.problems.add(node->where, "pixel_size_um must be a number or [x, y], found " +
                                          std::to_string(node->items.size()) + " items");
-    return std::nullopt;
+    return {};
   }
-  const auto x = reader.value_of(node->items[0], "pixel_size_um", spec);
-  const auto y = reader.value_of(node->items[1], "pixel_size_um", spec);
-  if (!x || !y) return std::nullopt;
+  const auto x = reader.value_of(node->items[0], key, spec);
+  const auto y = reader.value_of(node->items[1], key, spec);
+  if (!x || !y) return {};
   // As close as sizes are known from a stage micrometer.
   constexpr double kSquare = 1e-3;
   if (std::abs(*x / *y - 1) > kSquare)
@@ -138,7 +143,7 @@ std::optional<double> read_pixel_size(ConfigReader& reader, const Block& block, 
                         "pixel_size_um = [" + show(*x) + ", " + show(*y) + "]: pixels of " + not_square(*x, *y) +
                             " are not square, which is not modelled",
                         "resample the image to square pixels (ImageJ: Image > Scale) and state their size");
-  return 0.5 * (*x + *y);
+  return reader.constant(block.path_of(key), spec, 0.5 * (*x + *y));
 }
 
 }  // namespace
@@ -174,13 +179,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   settings.channel = read_channel(reader, block);
   settings.mosaic = read_mosaic(reader, block, settings.channel);
 
-  NumberSpec pixel_size;
-  pixel_size.unit = "um";
-  pixel_size.lower = 0;
-  pixel_size.lower_open = true;
-  pixel_size.upper = std::holds_alternative<StressedDisc>(scene.sample) ? 1000 : 20;
-  settings.pixel_size_um = read_pixel_size(reader, block, pixel_size);
-
+  settings.pixel_size_um = read_pixel_size(reader, block, scene);
   if (const YamlNode* transfer = block.find("transfer")) {
     if (transfer->is_map()) {
       const Block gamma = reader.block(block, "transfer", {"gamma"}, true);
@@ -211,11 +210,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
     }
   }
   read_center(reader, block, scene, settings);
-  NumberSpec angle;
-  angle.unit = "deg";
-  angle.lower = -36000;
-  angle.upper = 36000;
-  settings.rotation = reader.number(block, "rotation_deg", angle, 0);
+  settings.rotation = read_described<View>(reader, block, "rotation_deg");
 
   settings.roi = read_roi(reader, block, settings.roi_where);
   settings.mask = reader.text(block, "mask");

@@ -20,8 +20,8 @@ struct MicrographSettings {
   PageChoice page;
   std::string channel;
   MosaicSettings mosaic;
-  std::optional<double> pixel_size_um;
   Transfer transfer;
+  ParameterRef pixel_size_um;  ///< none: the file's
   ParameterRef gain, offset, center_x, center_y, rotation;
   std::vector<UnevenLight> uneven;
   bool offset_automatic = false;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/described.h"
+
 namespace birefit {
 namespace {
 
@@ -10,6 +12,19 @@ namespace {
 constexpr double kLeastDiscContrast = 3;
 /// Half-width of the bounds of an automatic centre, as a fraction of the image size.
 constexpr double kCenterBoundFraction = 0.15;
+
+/// 0: not known.
+double pixel_um(const ConfigReader& reader, const View& view) {
+  return view.pixel_size_um ? reader.table[view.pixel_size_um].value : 0;
+}
+
+/// The pixel size that a file states; one number for all files that state the same.
+ParameterRef stated_in_file(ConfigReader& reader, double file_pixel_um) {
+  const std::string path = "micrograph.pixel_size_um";
+  for (int i = 0; i < reader.table.size(); ++i)
+    if (reader.table[i].name == path && reader.table[i].value == file_pixel_um) return {i};
+  return reader.constant(path, described<View>("pixel_size_um"), file_pixel_um);
+}
 
 }  // namespace
 
@@ -48,7 +63,7 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
   if (!std::isfinite(diameter.value)) {
     if (!values && reader.use != ConfigUse::fit)
       reader.problems.add(diameter.where, "diameter_um has no value to render", "write {value: .., fit: auto}");
-    diameter.value = 2 * disc.radius_px * view.pixel_size_um;
+    diameter.value = 2 * disc.radius_px * pixel_um(reader, view);
   }
   if (!std::isfinite(diameter.lower)) {
     diameter.lower = 0.8 * diameter.value;
@@ -73,18 +88,17 @@ void add_branches(FitJob& job) {
 void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& name) {
   const auto* droplet = std::get_if<Droplet>(&scene.sample);
   const View& view = scene.view;
-  if (!droplet || !droplet->diameter_um || !(view.pixel_size_um > 0) || view.width <= 0) return;
+  if (!droplet || !droplet->diameter_um || !view.pixel_size_um || view.width <= 0) return;
   const Parameter& diameter = reader.table[droplet->diameter_um];
-  const double diameter_px = diameter.value / view.pixel_size_um;
+  const double pixel = pixel_um(reader, view), diameter_px = diameter.value / pixel;
   const double field_px = std::max(view.width, view.height);
-  const std::string field =
-      show(view.width * view.pixel_size_um) + " x " + show(view.height * view.pixel_size_um) + " um";
+  const std::string field = show(view.width * pixel) + " x " + show(view.height * pixel) + " um";
   const auto plausible = [&](double value_um) {
-    const double pixels = value_um / view.pixel_size_um;
+    const double pixels = value_um / pixel;
     return pixels >= 3 && pixels <= 2 * field_px;
   };
   if (!(diameter_px >= 3)) {
-    std::string hint = "check pixel_size_um = " + show(view.pixel_size_um);
+    std::string hint = "check pixel_size_um = " + show(pixel);
     for (double factor : {1e3, 1e6})
       if (plausible(diameter.value * factor))
         hint = "did you mean " + show(diameter.value * factor) + "? the key is in um";
@@ -97,7 +111,7 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
                         "diameter_um = " + show(diameter.value) + " is " + show(std::round(diameter_px / field_px)) +
                             " times the field of view (" + field + ") of " + name,
                         plausible(smaller) ? "did you mean " + show(smaller) + "? the key is in um"
-                                           : "check pixel_size_um = " + show(view.pixel_size_um));
+                                           : "check pixel_size_um = " + show(pixel));
   } else {
     const Parameter& x = reader.table[view.center_x_px];
     const Parameter& y = reader.table[view.center_y_px];
@@ -111,14 +125,19 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
   }
 }
 
-void set_view(ConfigReader& reader, const MicrographSettings& settings, int width, int height, double file_pixel_um,
-              const std::string& name, Scene& scene) {
+void set_view(ConfigReader& reader, int width, int height, double file_pixel_um, const std::string& name,
+              Scene& scene) {
   scene.view.width = width;
   scene.view.height = height;
-  scene.view.pixel_size_um = settings.pixel_size_um.value_or(file_pixel_um);
-  if (settings.pixel_size_um && file_pixel_um > 0 && std::abs(*settings.pixel_size_um / file_pixel_um - 1) > 0.01)
-    reader.warnings.push_back(name + " states a pixel size of " + show(file_pixel_um) + " um; the config's " +
-                              show(*settings.pixel_size_um) + " um is used.");
+  ParameterRef& size = scene.view.pixel_size_um;
+  if (!size && file_pixel_um > 0) {
+    size = stated_in_file(reader, file_pixel_um);
+  } else if (size && file_pixel_um > 0 && !reader.table[size].free) {
+    const double stated = reader.table[size].value;
+    if (std::abs(stated / file_pixel_um - 1) > 0.01)
+      reader.warnings.push_back(name + " states a pixel size of " + show(file_pixel_um) + " um; the config's " +
+                                show(stated) + " um is used.");
+  }
 }
 
 void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene) {

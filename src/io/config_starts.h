@@ -16,8 +16,7 @@ void add_branches(FitJob& job);
 /// A droplet that the image cannot show is a mistake in a unit or a centre.
 void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& name);
 /// The view of a scene of this size (px); file_pixel_um: what the image states, 0 = nothing.
-void set_view(ConfigReader& reader, const MicrographSettings& settings, int width, int height, double file_pixel_um,
-              const std::string& name, Scene& scene);
+void set_view(ConfigReader& reader, int width, int height, double file_pixel_um, const std::string& name, Scene& scene);
 /// Electrodes that the config does not give are the region's edges.
 void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene);
 

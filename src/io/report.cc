@@ -232,6 +232,11 @@ Profile mean_profile(const Frame& frame, bool along_y) {
   return profile;
 }
 
+/// 0: not known.
+double pixel_um(const Frame& frame, const FitResult& result) {
+  return frame.scene != nullptr ? theta_of(result, frame.scene->view.pixel_size_um).value_or(0) : 0;
+}
+
 /// Through the sample's centre: horizontal, unless that is where the dark cross lies and a diagonal shows more.
 Profile line_profile(const Frame& frame, const FitResult& result) {
   const int width = frame.measured.width(), height = frame.measured.height();
@@ -275,7 +280,7 @@ Profile line_profile(const Frame& frame, const FitResult& result) {
     if (variance > best_variance * (1 + 1e-9)) best_variance = variance, best = &way;
   }
   Profile profile;
-  const double pixel = frame.scene != nullptr ? frame.scene->view.pixel_size_um : 0;
+  const double pixel = pixel_um(frame, result);
   const double step = std::hypot(best->dx, best->dy) * (pixel > 0 ? pixel : 1);
   profile.x_label = pixel > 0 ? "distance from the centre (\u00b5m)" : "distance from the centre (px)";
   profile.words = std::string(best->words) + " through the centre (dashed in the measured image)";
@@ -330,7 +335,7 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
   panel.mask = mask;
   panel.largest_side_px = largest_side;
   panel.wide = stack;
-  panel.pixel_size_um = frame.scene != nullptr ? frame.scene->view.pixel_size_um : 0;
+  panel.pixel_size_um = pixel_um(frame, result);
   panel.low = low, panel.high = high;
   panel.unit = frame.unit;
 

@@ -43,7 +43,7 @@ struct BallScene {
     scene.microscope.objective_na = fixed("objective_na", ball.objective_na);
     if (ball.focus_um != 0) scene.microscope.focus_um = fixed("focus_um", ball.focus_um);
     scene.view.width = scene.view.height = ball.pixels;
-    scene.view.pixel_size_um = (2 * ball.radius_um + 4) / ball.pixels;
+    scene.view.pixel_size_um = fixed("pixel_size_um", (2 * ball.radius_um + 4) / ball.pixels);
     scene.view.center_x_px = fixed("center_x", 0.5 * (ball.pixels - 1));
     scene.view.center_y_px = fixed("center_y", 0.5 * (ball.pixels - 1));
   }

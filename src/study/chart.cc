@@ -214,7 +214,8 @@ PixelTruth pixel_truth(Scene scene, const Theta& theta) {
 Image by_finer_pixels(Scene scene, Theta theta) {
   constexpr int kFiner = 9;
   const int w = scene.view.width, h = scene.view.height;
-  scene.view.width *= kFiner, scene.view.height *= kFiner, scene.view.pixel_size_um /= kFiner;
+  scene.view.width *= kFiner, scene.view.height *= kFiner;
+  if (scene.view.pixel_size_um) theta[static_cast<std::size_t>(scene.view.pixel_size_um.index)] /= kFiner;
   for (const ParameterRef& centre : {scene.view.center_x_px, scene.view.center_y_px}) {
     double& at = theta[static_cast<std::size_t>(centre.index)];
     at = (at + 0.5) * kFiner - 0.5;  // pixel centres are whole numbers

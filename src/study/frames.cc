@@ -84,7 +84,7 @@ std::vector<FrameScene> frame_scenes() {
     f.scene.material = material;
     f.scene.surround_index = f.table.add_constant("index", 1.43);
     f.scene.microscope.wavelength_nm = f.table.add_constant("wavelength_nm", 590);
-    f.scene.view.pixel_size_um = 0.025;
+    f.scene.view.pixel_size_um = f.table.add_constant("pixel_size_um", 0.025);
     f.scene.view.center_x_px = f.table.add_constant("center_x", 249.8);
     f.scene.view.center_y_px = f.table.add_constant("center_y", 250.3);
     f.parameters = indices({droplet.diameter_um, material.birefringence, f.scene.view.center_x_px,

@@ -205,7 +205,7 @@ PictureTrap picture_trap(const std::string& sample, double polarizer_deg, double
     droplet.diameter_um = fixed("diameter_um", 9);
     if (sample == "twisted_droplet") droplet.director = RadialDirector{fixed("twist_deg", 60)};
     s.sample = droplet;
-    s.view.pixel_size_um = 0.8;
+    s.view.pixel_size_um = fixed("pixel_size_um", 0.8);
     s.surround_index = fixed("surround", 1.43);
   } else if (sample == "cell") {
     Cell cell;

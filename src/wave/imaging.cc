@@ -46,11 +46,12 @@ T kernel(const T& x) {
   return cos_sinc_sq(T(square(kPi * x))).sinc_sq * exp(T(kBeta * (root(inside) - 1.0)));
 }
 
-/// Means over pixels along one axis as sums over points: `slope` by the pixel's place (px).
+/// Means over pixels along one axis as sums over points: `slope` by the pixel's place (px), `growth` by the logarithm
+/// of its size, with which its place grows.
 struct PixelWeights {
   struct Row {
     int first = 0;
-    std::vector<double> weight, slope;
+    std::vector<double> weight, slope, growth;
   };
   std::vector<Row> rows;
   /// Pixel p covers the points (offset + sign p +- 1/2) pixel from the object's centre.
@@ -69,7 +70,7 @@ struct PixelWeights {
       if (high < low) continue;
       row.first = low + half;
       row.weight.assign(static_cast<std::size_t>(high - low + 1), 0.0);
-      row.slope = row.weight;
+      row.slope = row.growth = row.weight;
       for (int i = 0; i < n; ++i) {
         const double at = middle + 0.5 * node[static_cast<std::size_t>(i)] * per_pixel,
                      share = 0.5 * weight[static_cast<std::size_t>(i)];
@@ -80,6 +81,7 @@ struct PixelWeights {
           const Dual<double, 1> v = kernel(x);
           row.weight[static_cast<std::size_t>(j - low)] += share * v.value;
           row.slope[static_cast<std::size_t>(j - low)] += share * v.d[0];
+          row.growth[static_cast<std::size_t>(j - low)] += share * v.d[0] * at / per_pixel;
         }
       }
     }
@@ -237,22 +239,24 @@ std::vector<Matrix> pupil_field(const ImagingAxes& axes, const Objective<S>& obj
 template <class S>
 void add_pixels(const WaveImaging& plan, const WaveMicroscope<S>& m, const std::vector<Eigen::MatrixXd>& intensity,
                 const S& background, int threads, const std::vector<Image*>& images) {
-  const PixelWeights across(m.width, -part(m.center_x_px, 0), 1, m.pixel_um, plan.spacing_um, plan.half_x);
-  const PixelWeights down(m.height, part(m.center_y_px, 0), -1, m.pixel_um, plan.spacing_um, plan.half_y);
-  const auto along_x = [&](const Eigen::MatrixXd& from, bool slope) {
+  const PixelWeights across(m.width, -part(m.center_x_px, 0), 1, part(m.pixel_um, 0), plan.spacing_um, plan.half_x);
+  const PixelWeights down(m.height, part(m.center_y_px, 0), -1, part(m.pixel_um, 0), plan.spacing_um, plan.half_y);
+  using Row = PixelWeights::Row;
+  using Of = std::vector<double> Row::*;
+  const auto along_x = [&](const Eigen::MatrixXd& from, Of of) {
     Eigen::MatrixXd to = Eigen::MatrixXd::Zero(from.rows(), m.width);
     parallel_for(m.width, threads, [&](int c) {
       const PixelWeights::Row& row = across.rows[static_cast<std::size_t>(c)];
-      const std::vector<double>& w = slope ? row.slope : row.weight;
+      const std::vector<double>& w = row.*of;
       for (std::size_t k = 0; k < w.size(); ++k) to.col(c) += w[k] * from.col(row.first + static_cast<long>(k));
     });
     return Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>(to);
   };
-  using Rows = decltype(along_x(intensity[0], false));
-  const auto along_y = [&](const Rows& from, bool slope, double scale, Image& to) {
+  using Rows = decltype(along_x(intensity[0], &Row::weight));
+  const auto along_y = [&](const Rows& from, Of of, double scale, Image& to) {
     parallel_for(m.height, threads, [&](int r) {
       const PixelWeights::Row& row = down.rows[static_cast<std::size_t>(r)];
-      const std::vector<double>& w = slope ? row.slope : row.weight;
+      const std::vector<double>& w = row.*of;
       Eigen::Map<Eigen::RowVectorXd> out(to.row(r), m.width);
       for (std::size_t k = 0; k < w.size(); ++k) out += scale * w[k] * from.row(row.first + static_cast<long>(k));
     });
@@ -262,12 +266,18 @@ void add_pixels(const WaveImaging& plan, const WaveMicroscope<S>& m, const std::
     if (image.width() != m.width || image.height() != m.height) image = Image(m.width, m.height);
     std::fill(image.row(0), image.row(0) + static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height),
               part(background, static_cast<int>(p)));
-    along_y(along_x(intensity[p], false), false, 1.0, image);
+    along_y(along_x(intensity[p], &Row::weight), &Row::weight, 1.0, image);
     if (p == 0) continue;
     const int f = static_cast<int>(p);
     // The centre moves the weights: place = column - centre_x, and centre_y - row.
-    if (const double by = part(m.center_x_px, f); by != 0) along_y(along_x(intensity[0], true), false, -by, image);
-    if (const double by = part(m.center_y_px, f); by != 0) along_y(along_x(intensity[0], false), true, by, image);
+    if (const double by = part(m.center_x_px, f); by != 0)
+      along_y(along_x(intensity[0], &Row::slope), &Row::weight, -by, image);
+    if (const double by = part(m.center_y_px, f); by != 0)
+      along_y(along_x(intensity[0], &Row::weight), &Row::slope, by, image);
+    if (const double by = part(m.pixel_um, f) / part(m.pixel_um, 0); by != 0) {
+      along_y(along_x(intensity[0], &Row::growth), &Row::weight, by, image);
+      along_y(along_x(intensity[0], &Row::weight), &Row::growth, by, image);
+    }
   }
 }
 

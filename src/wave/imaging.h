@@ -25,7 +25,7 @@ struct WaveMicroscope {
   S focus_um = S(0.0);         ///< z of the focal plane
   Complex<S> ax, ay;           ///< the field that is let through, of unit length
   S center_x_px, center_y_px;  ///< where the object's centre is seen
-  double pixel_um = 0;
+  S pixel_um = S(0.0);
   int width = 0, height = 0;  ///< of the picture, pixels
 };
 

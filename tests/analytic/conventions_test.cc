@@ -105,7 +105,7 @@ TEST(Conventions, PolarizerAnglesAreCounterClockwiseInTheImage) {
     s.microscope.polarizer_deg = t.fixed("P", 0);
     s.microscope.analyzer_deg = t.fixed("A", analyzer);
     s.view.width = s.view.height = 21;
-    s.view.pixel_size_um = 0.25;
+    s.view.pixel_size_um = t.fixed("pixel_size_um", 0.25);
     s.view.center_x_px = t.fixed("x", 10);
     s.view.center_y_px = t.fixed("y", 10);
     const Theta theta = t.table.values();
@@ -220,7 +220,7 @@ TEST(RadialDroplet, AgreesWithAnIndependentProgram) {
   s.microscope.polarizer_deg = t.fixed("P", 0);
   s.microscope.analyzer_deg = t.fixed("A", 90);
   s.view.width = s.view.height = 40;
-  s.view.pixel_size_um = 0.3;
+  s.view.pixel_size_um = t.fixed("pixel_size_um", 0.3);
   s.view.center_x_px = t.fixed("x", 20.3);
   s.view.center_y_px = t.fixed("y", 18.8);
   const Theta theta = t.table.values();

@@ -3,7 +3,10 @@
 # (tests/data/cases). usage: cases.sh BIREFIT SOURCE_DIR
 set -u
 birefit=$(realpath "$1")
-cases=$2/tests/data/cases
+cases=$(realpath "$2")/tests/data/cases
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
 failures=0
 fail() { echo "FAIL $1"; failures=$((failures + 1)); }
 

@@ -32,7 +32,7 @@ struct Ball {
     m.birefringence = b.fixed("birefringence", 0.22);
     scene.material = m;
     scene.view.width = scene.view.height = 64;
-    scene.view.pixel_size_um = 0.19;
+    scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.19);
     scene.view.center_x_px = b.fixed("x", 31.5);
     scene.view.center_y_px = b.fixed("y", 31.5);
     scene.view.rotation_deg = b.fixed("rotation", 0);

@@ -353,7 +353,7 @@ struct Job {
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
     scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
     scene.view.width = scene.view.height = size;
-    scene.view.pixel_size_um = 1.1 * diameter_um / size;
+    scene.view.pixel_size_um = b.fixed("pixel_size_um", 1.1 * diameter_um / size);
     scene.view.center_x_px = b.fixed("center_x", 0.5 * size - 0.6);
     scene.view.center_y_px = b.fixed("center_y", 0.5 * size - 0.2);
   }
@@ -371,8 +371,8 @@ FitResult fit_of(double diameter_um, Rays rays, int size) {
                             job.b.linear("offset", 100), {4, 0.5});
   for (int r = 0; r < size; ++r)
     for (int c = 0; c < size; ++c) {
-      const double radius =
-          std::hypot(c - (0.5 * size - 0.6), r - (0.5 * size - 0.2)) * job.scene.view.pixel_size_um / (diameter_um / 2);
+      const double radius = std::hypot(c - (0.5 * size - 0.6), r - (0.5 * size - 0.2)) *
+                            job.b.table[job.scene.view.pixel_size_um].value / (diameter_um / 2);
       if (radius < 0.1 || radius > 0.7) m.mask(c, r) = 0;
     }
   FitJob fit_job;
@@ -435,7 +435,7 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
                               job.b.linear("offset", 100), {4, 0.5});
     for (int r = 0; r < 96; ++r)
       for (int c = 0; c < 96; ++c)
-        if (std::hypot(c - 47.4, r - 47.8) * job.scene.view.pixel_size_um > 4) m.mask(c, r) = 0;
+        if (std::hypot(c - 47.4, r - 47.8) * job.b.table[job.scene.view.pixel_size_um].value > 4) m.mask(c, r) = 0;
     FitJob fit_job;
     fit_job.parameters = job.b.table;
     fit_job.measurements = {m};
@@ -480,7 +480,7 @@ struct Seen {
     if (na > 0) scene.microscope.objective_na = b.fixed("objective_na", na);
     scene.microscope.aplanatic = true;
     scene.view.width = scene.view.height = 96;
-    scene.view.pixel_size_um = 0.125;
+    scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.125);
     scene.view.center_x_px = b.fixed("center_x", 47.2);
     scene.view.center_y_px = b.fixed("center_y", 48.1);
   }
@@ -513,7 +513,7 @@ TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
         model->tabulate(PixelModel<double>::Wanted::picture, 1);
         const DropletOptics<double> o = droplet_optics(s.scene, value);
         const EikonalFan<double> fan_p(o, true, na), fan_s(o, false, na);
-        const double between = std::cos(analyzer_deg * std::numbers::pi / 180), px = s.scene.view.pixel_size_um;
+        const double between = std::cos(analyzer_deg * std::numbers::pi / 180), px = value(s.scene.view.pixel_size_um);
         double worst = 0;
         for (int i = 0; i < 4000; ++i) {
           const double rho = 5.2 * (i + 0.5) / 4000, azimuth = 2.399963 * i;
@@ -697,7 +697,7 @@ void expect_picture_gradients(const Scene& scene, const ParameterTable& table, c
                        theta[static_cast<std::size_t>(scene.view.center_x_px.index)];
       const double y = static_cast<double>(i / static_cast<std::size_t>(scene.view.width)) -
                        theta[static_cast<std::size_t>(scene.view.center_y_px.index)];
-      if (std::hypot(x, y) * scene.view.pixel_size_um > reach_um) continue;
+      if (std::hypot(x, y) * theta[static_cast<std::size_t>(scene.view.pixel_size_um.index)] > reach_um) continue;
       worst += square(rendering.derivatives[j].values()[i] - (4 * fine[i] - coarse[i]) / 3);
       size += square(fine[i]);
     }

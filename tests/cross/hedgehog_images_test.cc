@@ -67,7 +67,7 @@ Scene scene_of_beam_propagation(TableBuilder& b, Rays rays, int size, double dia
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 135);
   scene.microscope.objective_na = b.fixed("objective_na", 0.8);
   scene.view.width = scene.view.height = size;
-  scene.view.pixel_size_um = 12.8 / size;
+  scene.view.pixel_size_um = b.fixed("pixel_size_um", 12.8 / size);
   scene.view.center_x_px = scene.view.center_y_px = b.fixed("center", 0.5 * (size - 1));
   return scene;
 }

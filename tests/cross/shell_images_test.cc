@@ -153,7 +153,7 @@ TEST(PeerShell, BendingRaysAtTheSphereGoesTowardsWaves) {
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 135);
   scene.microscope.objective_na = b.fixed("objective_na", 0.8);
   scene.view.width = scene.view.height = kSize;
-  scene.view.pixel_size_um = kBox / kSize;
+  scene.view.pixel_size_um = b.fixed("pixel_size_um", kBox / kSize);
   scene.view.center_x_px = scene.view.center_y_px = b.fixed("center", 0.5 * (kSize - 1));
   const Theta theta = b.table.values();
   Scene waves = scene;

@@ -36,7 +36,7 @@ Sampled sampled(std::shared_ptr<const VolumeGrid> grid, double birefringence, in
   s.scene.microscope.polarizer_deg = s.t.fixed("polarizer_deg", 0);
   s.scene.microscope.analyzer_deg = s.t.fixed("analyzer_deg", 90);
   s.scene.view.width = s.scene.view.height = size;
-  s.scene.view.pixel_size_um = pixel_um;
+  s.scene.view.pixel_size_um = s.t.fixed("pixel_size_um", pixel_um);
   s.scene.view.center_x_px = s.t.fixed("center_x", 0.5 * (size - 1));
   s.scene.view.center_y_px = s.t.fixed("center_y", 0.5 * (size - 1));
   s.scene.view.rotation_deg = s.t.fixed("rotation_deg", 0);

@@ -126,7 +126,7 @@ Case base(const std::string& name) {
   m.birefringence = c.t.fixed("birefringence", 0.2);
   c.scene.material = m;
   c.scene.view.width = c.scene.view.height = 16;
-  c.scene.view.pixel_size_um = 0.5;
+  c.scene.view.pixel_size_um = c.t.fixed("pixel_size_um", 0.5);
   c.scene.view.center_x_px = c.t.fixed("center_x", 7.7);
   c.scene.view.center_y_px = c.t.fixed("center_y", 7.4);
   c.scene.view.rotation_deg = c.t.fixed("rotation_deg", 3);

@@ -28,10 +28,11 @@ Kind small(Kind kind) {
   if (auto* crystal = std::get_if<Crystal>(&kind.scene.sample))
     place(crystal->electrode_low_px), place(crystal->electrode_high_px);
   view.width = view.height = kSide;
-  view.pixel_size_um *= share;
+  double pixel_um = share * kind.table.values()[static_cast<std::size_t>(view.pixel_size_um.index)];
   // Waves are sent through a box as large as the droplet: half of it costs an eighth.
   if (auto* droplet = std::get_if<Droplet>(&kind.scene.sample); droplet && kind.scene.ceiling == Ceiling::wave)
-    droplet->diameter_um = kind.number("diameter", 4), view.pixel_size_um *= 0.5;
+    droplet->diameter_um = kind.number("diameter", 4), pixel_um *= 0.5;
+  view.pixel_size_um = kind.number("pixel_size_um", pixel_um);
   return kind;
 }
 

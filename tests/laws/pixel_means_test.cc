@@ -134,7 +134,7 @@ SphereScene scene_of(const Sphere& sphere, const Director& director, double accu
   s.microscope.analyzer_deg = b.fixed("analyzer_deg", sphere.analyzer_deg);
   s.intensity_accuracy = accuracy;
   s.view.width = s.view.height = sphere.size() * finer;
-  s.view.pixel_size_um = sphere.pixel_um / finer;
+  s.view.pixel_size_um = b.fixed("pixel_size_um", sphere.pixel_um / finer);
   // The same place: pixel centres are whole numbers.
   const auto centre = [&](double off) { return (0.5 * sphere.size() + off + 0.5) * finer - 0.5; };
   s.view.center_x_px = b.fixed("center_x", centre(sphere.off_x_px));
@@ -430,7 +430,7 @@ TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
         if (na > 0) s.microscope.objective_na = b.fixed("objective_na", na);
         const int size = std::min(200, 2 * static_cast<int>(0.7 * diameter / pixel) + 8);
         s.view.width = s.view.height = size;
-        s.view.pixel_size_um = pixel;
+        s.view.pixel_size_um = b.fixed("pixel_size_um", pixel);
         s.view.center_x_px = b.fixed("center_x", 0.5 * size + 0.3);
         s.view.center_y_px = b.fixed("center_y", 0.5 * size - 0.2);
         const Theta theta = b.table.values();

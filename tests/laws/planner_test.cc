@@ -54,7 +54,7 @@ RandomScene random_scene(unsigned long seed) {
     if (kind == 1) droplet.director = RadialDirector{b.fixed("twist_deg", between(-120, 120))};
     s.sample = droplet;
     s.surround_index = b.fixed("surround", between(1.33, 1.6));
-    s.view.pixel_size_um = diameter / size * between(0.8, 1.4);
+    s.view.pixel_size_um = b.fixed("pixel_size_um", diameter / size * between(0.8, 1.4));
     r.kind = kind == 0 ? "radial droplet" : "twisted droplet";
   } else if (kind == 2) {
     Cell cell;
@@ -102,7 +102,7 @@ RandomScene random_unsymmetric_scene(unsigned long seed) {
   Droplet droplet;
   const double diameter = std::pow(10, between(0.3, 1.3));
   droplet.diameter_um = b.fixed("diameter_um", diameter);
-  s.view.pixel_size_um = diameter / size * between(1.0, 1.3);
+  s.view.pixel_size_um = b.fixed("pixel_size_um", diameter / size * between(1.0, 1.3));
   const int kind = static_cast<int>(between(0, 3));
   if (kind == 0) {
     droplet.director = BipolarDirector{b.fixed("azimuth_deg", between(0, 180)), b.fixed("tilt_deg", between(-60, 60)),
@@ -314,7 +314,7 @@ TEST(Planner, SaysWhereNoFreeRingWouldBe) {
     TableBuilder b;
     Scene scene;
     scene.view.width = scene.view.height = 16;
-    scene.view.pixel_size_um = 0.7;
+    scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.7);
     scene.view.center_x_px = scene.view.center_y_px = b.fixed("center", 7.5);
     scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);

@@ -63,7 +63,7 @@ Job job_of(const Case& c) {
   j.scene.microscope.polarizer_deg = j.b.fixed("polarizer_deg", 10);
   j.scene.microscope.analyzer_deg = j.b.fixed("analyzer_deg", 95);
   j.scene.view.width = j.scene.view.height = 160;
-  j.scene.view.pixel_size_um = 0.062;
+  j.scene.view.pixel_size_um = j.b.fixed("pixel_size_um", 0.062);
   j.scene.view.center_x_px = j.b.fixed("center_x", 80.3);
   j.scene.view.center_y_px = j.b.fixed("center_y", 78.9);
   j.by = {droplet.diameter_um.index,    material.birefringence.index,   material.ordinary.index,
@@ -183,7 +183,7 @@ TEST(PolarTable, ACoreThatIsSeenTwiceHasNoDisc) {
     theta[static_cast<std::size_t>(j.b.table.find(name).index)] = value;
   };
   set("ordinary", 1.6), set("birefringence", 0.1), set("surround", 1.33);
-  j.scene.view.pixel_size_um = 0.126;
+  set("pixel_size_um", 0.126);
   const auto of_core = [](const RenderPlan& p) {
     return std::count_if(p.disc.begin(), p.disc.end(), [](const DiscSquare& q) { return q.of_core; });
   };

@@ -61,7 +61,7 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
     s.microscope.analyzer_deg = b.fixed("analyzer_deg", 83);
     if (c.na > 0) s.microscope.objective_na = b.fixed("objective_na", c.na);
     s.view.width = s.view.height = 160;
-    s.view.pixel_size_um = 0.07;
+    s.view.pixel_size_um = b.fixed("pixel_size_um", 0.07);
     s.view.center_x_px = b.fixed("center_x", 80.3);
     s.view.center_y_px = b.fixed("center_y", 78.9);
     std::vector<int> by{droplet.diameter_um.index, material.birefringence.index, s.view.center_x_px.index,

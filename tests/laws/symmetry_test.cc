@@ -123,7 +123,7 @@ TEST(HalfTurn, HalfAPictureIsComputedWhereTheOtherIsTheSame) {
       Scene s;
       s.view.width = size + 3;
       s.view.height = size;
-      s.view.pixel_size_um = 0.3;
+      s.view.pixel_size_um = b.fixed("pixel_size_um", 0.3);
       s.view.center_x_px = b.fixed("center_x", 0.5 * (s.view.width - 1));
       s.view.center_y_px = b.fixed("center_y", 0.5 * (s.view.height - 1));
       s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
@@ -213,7 +213,7 @@ TEST(Mirror, HalfAPictureIsComputedWhereTheOtherIsItsMirrorImage) {
       Scene s;
       s.view.width = size + 3;
       s.view.height = size;
-      s.view.pixel_size_um = 0.3;
+      s.view.pixel_size_um = b.fixed("pixel_size_um", 0.3);
       s.view.center_x_px = b.fixed("center_x", 0.5 * size - 1.7);
       s.view.center_y_px = b.fixed("center_y", 0.5 * (s.view.height - 1));
       s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);

@@ -54,7 +54,7 @@ FitJob disc_job(double counts_per_photon, double read_counts, unsigned long seed
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
   make_circular_polariscope(scene.microscope, b.fixed("quarter_deg", 90));
   scene.view.width = scene.view.height = kSide;
-  scene.view.pixel_size_um = d.um_per_px;
+  scene.view.pixel_size_um = b.fixed("pixel_size_um", d.um_per_px);
   scene.view.center_x_px = b.fitted("center_x", 32, 29, 35);
   scene.view.center_y_px = b.fitted("center_y", 31, 28, 34);
   scene.view.rotation_deg = b.fixed("rotation", 0);
@@ -136,7 +136,7 @@ TEST(DiscRecovery, ZonesAroundTheForcesFollowTheDirection) {
     scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
     make_circular_polariscope(scene.microscope, b.fixed("quarter_deg", 90));
     scene.view.width = scene.view.height = kWide;
-    scene.view.pixel_size_um = d.um_per_px;
+    scene.view.pixel_size_um = b.fixed("pixel_size_um", d.um_per_px);
     scene.view.center_x_px = b.fitted("center_x", 63.5, 59, 68);
     scene.view.center_y_px = b.fitted("center_y", 63.5, 59, 68);
     scene.view.rotation_deg = b.fixed("rotation", 0);

@@ -40,7 +40,7 @@ struct Droplet96 {
     scene.microscope.polarizer_deg = polarizer = b.fixed("polarizer_deg", 0);
     scene.microscope.analyzer_deg = analyzer = b.fixed("analyzer_deg", 90);
     scene.view.width = scene.view.height = kSize;
-    scene.view.pixel_size_um = 0.13;
+    scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.13);
     scene.view.center_x_px = center_x = b.fitted("center_x", 47.7, 42, 53);
     scene.view.center_y_px = center_y = b.fitted("center_y", 47.2, 42, 53);
     scene.view.rotation_deg = b.fixed("rotation", 0);
@@ -369,7 +369,8 @@ TEST(WrongModel, AWrongInputDoesWhatTheResultSaysOfIt) {
        [](Droplet96& d, double factor) {
          d.b.table[std::get<ConstantIndices>(d.scene.material).ordinary].value *= factor;
        }},
-      {"micrograph.pixel_size_um", 0.01, [](Droplet96& d, double factor) { d.scene.view.pixel_size_um *= factor; }}};
+      {"pixel_size_um", 0.01,
+       [](Droplet96& d, double factor) { d.b.table[d.scene.view.pixel_size_um].value *= factor; }}};
   const FitResult right = fit_one({}, false, 1);
   for (const Case& c : cases) {
     Disturbance wrong;

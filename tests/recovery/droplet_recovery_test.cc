@@ -77,7 +77,7 @@ FitJob droplet_job(double counts_per_photon, double read_counts, unsigned long s
   scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
   scene.view.width = scene.view.height = kSize;
-  scene.view.pixel_size_um = 0.15;
+  scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.15);
   scene.view.center_x_px = b.fitted("center_x", 41, 38, 45);
   scene.view.center_y_px = b.fitted("center_y", 42, 38, 45);
   scene.view.rotation_deg = b.fixed("rotation", 0);
@@ -143,6 +143,35 @@ TEST(DropletRecovery, TruthIsTheRenderedImage) {
 }
 
 TEST(DropletRecovery, EveryEstimateIsWithinFiveStandardErrors) { recover(1, 3, 12); }
+
+// All lengths of a picture scale with the size of a pixel, and retardances do with lengths: a known diameter or a known
+// birefringence tells it, a picture alone does not.
+TEST(DropletRecovery, ThePixelSizeByWhatIsKnownOfTheDroplet) {
+  for (const char* known : {"diameter_um", "birefringence", ""}) {
+    FitJob job = droplet_job(1, 3, 7);
+    Parameter& size = job.parameters[job.parameters.find("pixel_size_um")];
+    size.free = true, size.value = 0.148, size.lower = 0.135, size.upper = 0.165;
+    if (*known) {
+      Parameter& given = job.parameters[job.parameters.find(known)];
+      given.free = false, given.value = true_values().at(known);
+    }
+    const FitResult r = fit(job);
+    if (!*known) {
+      EXPECT_FALSE(r.identifiable) << r.verdict;
+      continue;
+    }
+    ASSERT_TRUE(r.has_answer()) << known << ": " << r.verdict;
+    std::map<std::string, double> truths = true_values();
+    truths.erase(known);
+    truths["pixel_size_um"] = truth().pixel_um;
+    for (const auto& [name, value] : truths) {
+      const ParameterEstimate* p = find_estimate(r, name);
+      ASSERT_NE(p, nullptr) << name;
+      EXPECT_LT(std::abs(p->value - value), 5 * p->stderr_) << name << ", " << known << " known";
+    }
+    EXPECT_LT(find_estimate(r, "pixel_size_um")->stderr_, 1e-3 * truth().pixel_um);
+  }
+}
 
 // 200 repetitions know a standard deviation to 1/sqrt(400) = 5 %: 20 % is four of those.
 class LongDropletRecovery : public ::testing::TestWithParam<std::pair<double, double>> {};

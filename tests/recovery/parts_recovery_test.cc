@@ -36,7 +36,7 @@ TEST(PartsRecovery, ACompensatorBesideADroplet) {
   compensator.azimuth_deg = b.fitted("compensator_azimuth_deg", kAzimuth + 8, 0, 60);
   scene.microscope.behind.emplace_back(compensator);
   scene.view.width = scene.view.height = kSide;
-  scene.view.pixel_size_um = 0.15;
+  scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.15);
   scene.view.center_x_px = b.fixed("center_x", 31.2), scene.view.center_y_px = b.fixed("center_y", 31.9);
   const ParameterRef gain = b.linear("gain", 1000), offset = b.linear("offset", 0);
   Theta truth = b.table.values();
@@ -80,7 +80,7 @@ TEST(PartsRecovery, TheApertureOfADropletByWaves) {
     scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
     scene.microscope.objective_na = b.fitted("objective_na", 0.58, 0.5, 0.7);
     scene.view.width = scene.view.height = kSide;
-    scene.view.pixel_size_um = 0.15;
+    scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.15);
     scene.view.center_x_px = b.fixed("center_x", 23.2), scene.view.center_y_px = b.fixed("center_y", 23.9);
     const ParameterRef gain = b.linear("gain", 1000), offset = b.linear("offset", 0);
     Theta truth = b.table.values();

@@ -45,7 +45,7 @@ void microscope(Draw& d, int size, double pixel_um, double half_field_um) {
   s.microscope.polarizer_deg = d.b.fixed("polarizer_deg", 0);
   s.microscope.analyzer_deg = d.b.fixed("analyzer_deg", 90);
   s.view.width = s.view.height = size;
-  s.view.pixel_size_um = pixel_um;
+  s.view.pixel_size_um = d.b.fixed("pixel_size_um", pixel_um);
   const double middle = 0.5 * (size - 1);
   s.view.center_x_px =
       half_field_um > 0 ? d.drawn("center_x", middle - 1, middle + 1, 1) : d.b.fixed("center_x", middle);

@@ -66,8 +66,9 @@ WaveDraw draw(unsigned seed, double largest_um, int size, double focus_um = 0) {
   s.microscope.analyzer_deg = d.b.fixed("analyzer_deg", 120);
   s.microscope.objective_na = d.b.fixed("objective_na", na);
   s.view.width = s.view.height = size;
-  const double px = s.view.pixel_size_um = (d.diameter + 4) / size, middle = 0.5 * (size - 1),
-               cx = middle + between(-1, 1), cy = middle + between(-1, 1);
+  const double px = (d.diameter + 4) / size, middle = 0.5 * (size - 1), cx = middle + between(-1, 1),
+               cy = middle + between(-1, 1);
+  s.view.pixel_size_um = d.b.fixed("pixel_size_um", px);
   s.view.center_x_px = d.b.fitted("center_x", middle, middle - 3, middle + 3);
   s.view.center_y_px = d.b.fitted("center_y", middle, middle - 3, middle + 3);
   s.view.rotation_deg = d.b.fixed("rotation_deg", 0);
@@ -339,7 +340,7 @@ struct BipolarDraw {
     s.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
     s.microscope.objective_na = b.fixed("objective_na", aperture);
     s.view.width = s.view.height = kSize;
-    s.view.pixel_size_um = (2 * radius + 3) / kSize;
+    s.view.pixel_size_um = b.fixed("pixel_size_um", (2 * radius + 3) / kSize);
     s.view.center_x_px = b.fitted("center_x", middle, middle - 3, middle + 3);
     s.view.center_y_px = b.fitted("center_y", middle, middle - 3, middle + 3);
     sampled = droplet;

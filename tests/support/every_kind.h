@@ -34,7 +34,7 @@ inline Kind scene_of(std::string name, int size, double pixel_um, Sample (*sampl
   Kind k;
   k.name = std::move(name);
   k.scene.view.width = k.scene.view.height = size;
-  k.scene.view.pixel_size_um = pixel_um;
+  k.scene.view.pixel_size_um = k.number("pixel_size_um", pixel_um);
   k.scene.sample = sample(k);
   ConstantIndices material;
   material.birefringence = k.moving("birefringence", 0.22);

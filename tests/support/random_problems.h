@@ -80,7 +80,7 @@ inline Scene seen(RandomProblem& p, int size, double pixel_um) {
   s.microscope.polarizer_deg = p.b.fixed("polarizer_deg", 0);
   s.microscope.analyzer_deg = p.b.fixed("analyzer_deg", 90);
   s.view.width = s.view.height = size;
-  s.view.pixel_size_um = pixel_um;
+  s.view.pixel_size_um = p.b.fixed("pixel_size_um", pixel_um);
   s.view.rotation_deg = p.b.fixed("rotation_deg", 0);
   return s;
 }

@@ -610,7 +610,7 @@ TEST(Scan, NoStepIsLongerThanARadian) {
   m.scene.microscope.polarizer_deg = add("polarizer_deg", 0, 0, 0);
   m.scene.microscope.analyzer_deg = add("analyzer_deg", 90, 0, 0);
   m.scene.view.width = m.scene.view.height = 32;
-  m.scene.view.pixel_size_um = 0.6;
+  m.scene.view.pixel_size_um = add("pixel_size_um", 0.6, 0, 0);
   m.scene.view.center_x_px = m.scene.view.center_y_px = add("center", 15.5, 0, 0);
   m.scene.view.rotation_deg = add("rotation_deg", 0, 0, 0);
   m.noise = NoiseModel{0.01, 0, false};

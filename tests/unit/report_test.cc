@@ -86,12 +86,14 @@ Case make_case(int micrographs = 1, int width = 48, int height = 40) {
   r.scans.push_back({"sample.droplet.diameter_um", {8, 9, 10, 11}, {4000, 2500, 2600, 9000}});
   std::mt19937 generator(7);
   std::normal_distribution<double> normal;
+  const ParameterRef pixel_size = c.config.job.parameters.add_constant("micrograph.pixel_size_um", 0.2, "um");
+  r.theta.push_back(0.2);
   for (int k = 0; k < micrographs; ++k) {
     Picture input;
     MicrographResult m;
     m.name = input.name = "drop" + std::to_string(k) + ".tif";
     input.scene.sample = Droplet{};
-    input.scene.view.pixel_size_um = 0.2;
+    input.scene.view.pixel_size_um = pixel_size;
     input.values = m.fitted = m.sigma = Image(width, height);
     m.residual = Image(width, height, kNaN);
     input.mask = Mask(width, height, 1);

@@ -115,9 +115,10 @@ DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
 
 /// Points inside the droplet's image (refraction makes it larger than the droplet) of which a picture's rays are
 /// traced.
-double rays_in_picture(const Scene& scene, const RenderPlan& plan, double radius_um, double index_ratio,
-                       double host_index) {
-  const double radius_px = radius_um * RimTable(index_ratio, host_index, 0).rho_max() / scene.view.pixel_size_um;
+double rays_in_picture(const Scene& scene, const Theta& theta, const RenderPlan& plan, double radius_um,
+                       double index_ratio, double host_index) {
+  const double radius_px = radius_um * RimTable(index_ratio, host_index, 0).rho_max() /
+                           theta[static_cast<std::size_t>(scene.view.pixel_size_um.index)];
   double rays = 0;
   for (int r = 0; r < scene.view.height; ++r)
     for (int c = 0; c < scene.view.width; ++c) {
@@ -537,8 +538,8 @@ int main(int argc, char** argv) {
                 ratio(rays_scalar, rays_one));
     if (twisted && p.method == "magnus6") {
       // Three samples a step; points beside the droplet have no ray, some pixels several.
-      const double rays_traced = rays_in_picture(s.scene, every, 0.5 * theta[static_cast<std::size_t>(s.four[0])],
-                                                 1.43 / 1.52, 1.43),
+      const double rays_traced = rays_in_picture(s.scene, theta, every,
+                                                 0.5 * theta[static_cast<std::size_t>(s.four[0])], 1.43 / 1.52, 1.43),
                    operations = static_cast<double>(operations_of_a_ray(p.steps, 3)),
                    peak = peak_operations_per_second();
       const double achieved = rays_traced * operations / median(rays_one);

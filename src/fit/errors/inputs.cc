@@ -31,32 +31,14 @@ std::vector<int> shared_inputs(const Task& task) {
   return inputs;
 }
 
-/// d(intensity)/d(size of a pixel), which is no parameter: by differences.
-Eigen::VectorXd intensity_by_pixel_size(const Task& task, const Optimum& optimum, double pixel_um) {
-  constexpr double kStep = 1e-4;
-  Eigen::VectorXd by(optimum.problem->pixel_rows());
-  Eigen::Index row = 0;
-  for (int g = 0; g < task.frames(); ++g) {
-    const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
-    std::array<Image, 2> images;
-    for (const std::size_t side : {0, 1}) {
-      Scene scene = task.picture(g).scene;
-      scene.view.pixel_size_um *= 1 + (side ? kStep : -kStep);
-      images[side] = render(scene, frame.plan, optimum.theta, {}, task.job.options.threads).intensity;
-    }
-    for (const auto& [x, y] : frame.pixels) by[row++] = (images[1](x, y) - images[0](x, y)) / (2 * kStep * pixel_um);
-  }
-  return by;
-}
-
 /// The optimum's own picture as the measurement, and an input that is not what it was made with: what a fit makes of
 /// that, by a part of the pixels. The first order does not tell it where the picture turns by a good part of a fringe,
 /// or where light ends at an edge that lies between pixels: two of its derivatives at one place are as far from it as
 /// they like.
 class ChangedInput {
  public:
-  ChangedInput(const Task& task, const Optimum& optimum, const std::function<void(FitJob&)>& change)
-      : optimum_(optimum), job_(changed(task.job, change)), task_(job_) {
+  ChangedInput(const Task& task, const Optimum& optimum, int index, double value)
+      : optimum_(optimum), job_(changed(task.job, index, value)), task_(job_) {
     std::vector<RenderPlan> plans;
     std::vector<PixelSet> sets;
     std::size_t all = 0;
@@ -96,8 +78,8 @@ class ChangedInput {
   }
 
  private:
-  static FitJob changed(FitJob job, const std::function<void(FitJob&)>& change) {
-    change(job);
+  static FitJob changed(FitJob job, int index, double value) {
+    job.parameters[index].value = value;
     job.prior.reset();
     return job;
   }
@@ -114,38 +96,26 @@ class ChangedInput {
 void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {
   if (optimum.stopped || task.unknowns.searched.empty() || by_waves(optimum.frames)) return;
   std::vector<InputEffect> effects;
-  const auto add = [&](const std::string& name, const std::string& unit, double value, const Eigen::VectorXd& by,
-                       const std::function<void(FitJob&, double)>& change) {
-    InputEffect effect{name, unit, value, unit == "deg" || unit == "px" ? 1.0 : 0.01 * std::abs(value), {}};
-    Eigen::VectorXd shift = optimum.problem->shift_by(effect.step * by, of_noise.covariance);
-    const Eigen::ArrayXd sd = of_noise.covariance.diagonal().array().cwiseMax(0).sqrt();
-    constexpr double kOfNote = 0.5;  // standard errors: what is less is not named
-    const bool of_note = (shift.array().abs() > kOfNote * sd).head(optimum.searched.size()).any();
-    const bool determined =
-        std::none_of(of_noise.undetermined.begin(), of_noise.undetermined.end(), [](bool u) { return u; });
-    if (shift.allFinite() && of_note && determined && effect.step > 0)
-      shift = ChangedInput(task, optimum, [&](FitJob& job) { change(job, effect.step); }).shift(task, shift);
-    if (shift.allFinite()) effect.shift.assign(shift.begin(), shift.end());
-    if (effect.step > 0 && !effect.shift.empty()) effects.push_back(std::move(effect));
-  };
+  const Eigen::ArrayXd sd = of_noise.covariance.diagonal().array().cwiseMax(0).sqrt();
+  const bool determined =
+      std::none_of(of_noise.undetermined.begin(), of_noise.undetermined.end(), [](bool u) { return u; });
   const std::vector<int> inputs = shared_inputs(task);
   const Eigen::MatrixXd columns = optimum.problem->intensity_by(inputs);
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const Parameter& p = task.job.parameters[inputs[k]];
-    add(p.name, p.unit, optimum.theta[static_cast<std::size_t>(inputs[k])], columns.col(static_cast<Eigen::Index>(k)),
-        [&, index = inputs[k]](FitJob& job, double step) {
-          job.parameters[index].value = optimum.theta[static_cast<std::size_t>(index)] + step;
-        });
+    const double value = optimum.theta[static_cast<std::size_t>(inputs[k])];
+    InputEffect effect{p.name, p.unit, value, p.unit == "deg" || p.unit == "px" ? 1.0 : 0.01 * std::abs(value), {}};
+    if (!(effect.step > 0)) continue;
+    Eigen::VectorXd shift =
+        optimum.problem->shift_by(effect.step * columns.col(static_cast<Eigen::Index>(k)), of_noise.covariance);
+    constexpr double kOfNote = 0.5;  // standard errors: what is less is not named
+    const bool of_note = (shift.array().abs() > kOfNote * sd).head(optimum.searched.size()).any();
+    if (shift.allFinite() && of_note && determined)
+      shift = ChangedInput(task, optimum, inputs[k], value + effect.step).shift(task, shift);
+    if (!shift.allFinite()) continue;
+    effect.shift.assign(shift.begin(), shift.end());
+    effects.push_back(std::move(effect));
   }
-  const double pixel_um = task.picture(0).scene.view.pixel_size_um;
-  const bool shared = std::all_of(task.sights.begin(), task.sights.end(), [&](const Sight& sight) {
-    return sight.picture->scene.view.pixel_size_um == pixel_um;
-  });
-  if (pixel_um > 0 && shared)
-    add("micrograph.pixel_size_um", "um", pixel_um, intensity_by_pixel_size(task, optimum, pixel_um),
-        [](FitJob& job, double step) {
-          for_each_scene(job.measurements, [&](Scene& scene) { scene.view.pixel_size_um += step; });
-        });
   const auto weight = [&](const InputEffect& effect) {
     double most = 0;
     for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)

@@ -15,7 +15,7 @@ DiscOptics<S>::DiscOptics(const Scene& scene, const Values<S>& value) {
   const S k0 = wavenumber_per_um(scene, value), optic = value(disc.stress_optic_brewster);
   center_x_px = value(scene.view.center_x_px);
   center_y_px = value(scene.view.center_y_px);
-  px_per_radius_inverse = scene.view.pixel_size_um / radius_um;
+  px_per_radius_inverse = value(scene.view.pixel_size_um) / radius_um;
   sin_cos(value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg), load_sin, load_cos);
   // 1 brewster = 1e-12/Pa, 1 N/um^2 = 1e12 Pa: the powers of ten cancel, and so does the thickness.
   load_phase = k0 * optic * value(disc.load_n) / radius_um;
@@ -38,7 +38,7 @@ DiscZone::DiscZone(const Scene& scene, const Theta& theta) {
   };
   const double radius_um = 0.5 * value(disc.diameter_um);
   margins_ = disc_margins(disc, radius_um);
-  radius_px_ = radius_um / scene.view.pixel_size_um;
+  radius_px_ = radius_um / value(scene.view.pixel_size_um);
   center_x_px_ = value(scene.view.center_x_px), center_y_px_ = value(scene.view.center_y_px);
   const double load = (value(disc.load_azimuth_deg, 90) + value(scene.view.rotation_deg)) * std::numbers::pi / 180;
   load_cos_ = std::cos(load), load_sin_ = std::sin(load);

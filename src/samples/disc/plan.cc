@@ -38,7 +38,7 @@ RenderPlan plan_disc(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
   check_closed_form(scene, "a photoelastic disc");
-  if (!(scene.view.pixel_size_um > 0))
+  if (!scene.view.pixel_size_um)
     throw UserError(Where{}, "a disc needs micrograph.pixel_size_um", "the size of a pixel on the disc");
   RenderPlan plan;
   plan.method = "closed_form";

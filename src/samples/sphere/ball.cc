@@ -341,11 +341,12 @@ class BallImage final : public PixelModel<S> {
           static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
     for (const int n : steps) meshes_.push_back(ball_mesh(optics_, n));
     if (meshes_.empty()) meshes_.push_back(ball_mesh(optics_, plan.steps));
-    passing_ = PassingLight<S>(scene.view.pixel_size_um, optics_.sphere.radius_um, light_.open());
-    const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
+    passing_ = PassingLight<S>(value(scene.view.pixel_size_um), optics_.sphere.radius_um, light_.open());
+    const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px),
+            pixel_um = value(scene.view.pixel_size_um);
     bool moves = false;
     if constexpr (ScalarTraits<S>::derivatives > 0)
-      for (const S* x : std::initializer_list<const S*>{&center_x, &center_y, &optics_.sphere.radius_um})
+      for (const S* x : std::initializer_list<const S*>{&center_x, &center_y, &pixel_um, &optics_.sphere.radius_um})
         for (const P& d : x->d) moves = moves || lane(d, 0) != 0;
     rays_of_table_ = ball_rays(scene, plan, value, optics_, rim_, false);
     rays_ = ball_rays(scene, plan, value, optics_, rim_, moves);
@@ -718,7 +719,7 @@ class PointsOfSquares {
         optics_(ball_optics(scene, value)),
         rim_(rim),
         within_(points_within(plan.samples, plan.sampling_bin_px)) {
-    radius_px_ = optics_.sphere.radius_um / scene.view.pixel_size_um;
+    radius_px_ = optics_.sphere.radius_um / value(scene.view.pixel_size_um);
     edge_px_ = radius_px_ * rim.rho_max();
     share_ = std::min(
         1.0, static_cast<double>(scene.view.width) * scene.view.height / (std::numbers::pi * square(edge_px_)));

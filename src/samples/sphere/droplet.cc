@@ -76,7 +76,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
     if (!can_tabulate()) rest_panels_ = 0;
   }
   by_inverse_edge_ = Sensitivity<S>(inverse_edge_);
-  passing_ = PassingLight<S>(view_.pixel_um(), optics_.radius_um, light_.line().open());
+  passing_ = PassingLight<S>(value(scene.view.pixel_size_um), optics_.radius_um, light_.line().open());
 }
 
 template <class S>

@@ -26,8 +26,8 @@ void add_sphere_jones(const Scene& scene, const RenderPlan& plan, const Values<d
   if (!looks_round(std::get<Droplet>(scene.sample))) ball = ball_optics(scene, value);
   for (int r = 0; r < h; ++r)
     for (int c = 0; c < w; ++c) {
-      const double x = (c - value(scene.view.center_x_px)) * scene.view.pixel_size_um;
-      const double y = (value(scene.view.center_y_px) - r) * scene.view.pixel_size_um;
+      const double x = (c - value(scene.view.center_x_px)) * value(scene.view.pixel_size_um);
+      const double y = (value(scene.view.center_y_px) - r) * value(scene.view.pixel_size_um);
       const double rho = std::hypot(x, y), azimuth = std::atan2(y, x);
       const JonesRow row{.row = r, .column = c};
       if (rho >= optics.radius_um * rim.rho_max()) {

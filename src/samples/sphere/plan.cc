@@ -195,7 +195,7 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
                   "{}); no method needs fewer",
                   plan.method, plan.steps, effort.samples, sci(plan.numerical_error), pilots.size(),
                   sci(scene.intensity_accuracy)));
-  const double px = scene.view.pixel_size_um, edge = rim.rho_max() * o.sphere.radius_um;
+  const double px = value(scene.view.pixel_size_um), edge = rim.rho_max() * o.sphere.radius_um;
   const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
   if (bins > 100000)
     throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");
@@ -238,7 +238,7 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
 void sample_round(const Scene& scene, const Values<double>& value, const DropletOptics<double>& o, double edge,
                   const std::vector<double>& jumps, RenderPlan& plan) {
   const RimTable rim = rim_table(o);
-  const double px = scene.view.pixel_size_um;
+  const double px = value(scene.view.pixel_size_um);
   const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
   if (bins > 100000)
     throw UserError(Where{}, "the droplet is more than 100000 pixels across", "check diameter_um and pixel_size_um");

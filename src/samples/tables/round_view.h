@@ -45,11 +45,12 @@ class CentredView {
  public:
   using P = PlainOf<S>;
   CentredView(const Scene& scene, const Values<S>& value)
-      : pixel_um_(scene.view.pixel_size_um),
+      : pixel_um_(lane(plain(value(scene.view.pixel_size_um)), 0)),
         center_x_(plain(value(scene.view.center_x_px))),
         center_y_(plain(value(scene.view.center_y_px))),
         by_center_x_(value(scene.view.center_x_px)),
-        by_center_y_(value(scene.view.center_y_px)) {}
+        by_center_y_(value(scene.view.center_y_px)),
+        by_log_pixel_(log(value(scene.view.pixel_size_um))) {}
   struct Place {
     P x, y;         ///< right and up from the centre, um
     P inverse_rho;  ///< 1/um
@@ -65,6 +66,11 @@ class CentredView {
   /// Adds the derivatives that light has because its place moves, from its slopes by the radius (um) and by the
   /// azimuth.
   void add_moves(const Place& p, const P& by_rho, const P& by_azimuth, S& light) const {
+    add_moves_of_centre(p, by_rho, by_azimuth, light);
+    by_log_pixel_.add(by_rho * p.rho_um, light);
+  }
+  /// Those of them that are there whatever the size of a pixel.
+  void add_moves_of_centre(const Place& p, const P& by_rho, const P& by_azimuth, S& light) const {
     const P outwards = by_rho * p.inverse_rho * P(pixel_um_),
             around = by_azimuth * P(pixel_um_) * p.inverse_rho * p.inverse_rho;
     by_center_x_.add(around * p.y - outwards * p.x, light);
@@ -87,7 +93,7 @@ class CentredView {
  private:
   double pixel_um_;
   P center_x_, center_y_;
-  Sensitivity<S> by_center_x_, by_center_y_;
+  Sensitivity<S> by_center_x_, by_center_y_, by_log_pixel_;
 };
 
 /// What passes of rays that are alike all around the centre. With the Jones matrix [[j0 + j1, j2 + j3], [j2 - j3, j0 -
@@ -224,8 +230,8 @@ class PassingLight {
   using P = PlainOf<S>;
   PassingLight() = default;
   /// `open`: the light without a sample.
-  PassingLight(double pixel_um, const S& radius_um, const S& open)
-      : pixel_um_(pixel_um), radius_px_(radius_um * (1 / pixel_um)), open_(open) {
+  PassingLight(const S& pixel_um, const S& radius_um, const S& open)
+      : pixel_um_(lane(plain(pixel_um), 0)), radius_px_(radius_um * inverse(pixel_um)), open_(open) {
     dark_ = lane(plain(open_), 0) < 1e-30;  // crossed; its derivatives vanish with it
   }
   bool dark() const { return dark_; }
@@ -252,9 +258,9 @@ class PassingLight {
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       const P x = load(by_x), y = load(by_y);
       for (std::size_t j = 0; j < inside.d.size(); ++j) inside.d[j] = load(by_radius) * radius_px_.d[j];
-      // From x, y to the radius and the azimuth, by which add_moves() asks.
-      view.add_moves(place, (x * place.x + y * place.y) * place.inverse_rho * per_pixel,
-                     (y * place.x - x * place.y) * per_pixel, inside);
+      // From x, y to the radius and the azimuth, by which moves are asked for; all lengths are in pixels.
+      view.add_moves_of_centre(place, (x * place.x + y * place.y) * place.inverse_rho * per_pixel,
+                               (y * place.x - x * place.y) * per_pixel, inside);
     }
     return open_ * (S(P(1.0)) - inside);
   }

@@ -138,7 +138,7 @@ RenderPlan plan_volume(const Planning& planning) {
   const Values<double>& value = planning.value;
   if (scene.ceiling == Ceiling::reflections)
     throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
-  if (!(scene.view.pixel_size_um > 0))
+  if (!scene.view.pixel_size_um)
     throw UserError(Where{}, "a volume needs micrograph.pixel_size_um", "the size of a pixel on the sample");
   const VolumeOptics<double> o(scene, value);
   const VolumeGrid& grid = *o.grid;
@@ -175,7 +175,7 @@ RenderPlan plan_volume(const Planning& planning) {
   for (std::size_t i = 0; i < here.size(); ++i) {
     largest = std::max(largest, std::abs(here[i]));
     const double slope = square((right[i] - here[i]) * o.nodes_per_px_x) + square((up[i] - here[i]) * o.nodes_per_px_y);
-    if (slope > 0) squares.push_back(slope * square(100 / scene.view.pixel_size_um));  // rad^2/um^2
+    if (slope > 0) squares.push_back(slope * square(100 / value(scene.view.pixel_size_um)));  // rad^2/um^2
   }
   std::sort(squares.begin(), squares.end());
   const double typical = squares.empty() ? 0 : squares[squares.size() / 2], turn = std::sqrt(typical) / (o.k0 * o.n_o);

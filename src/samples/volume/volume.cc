@@ -18,7 +18,7 @@ VolumeOptics<S>::VolumeOptics(const Scene& scene, const Values<S>& value)
   k0 = wavenumber_per_um(scene, value);
   center_x_px = value(scene.view.center_x_px);
   center_y_px = value(scene.view.center_y_px);
-  const S px = scene.view.pixel_size_um * inverse(scale);
+  const S px = value(scene.view.pixel_size_um) * inverse(scale);
   nodes_per_px_x = px * (1 / grid->spacing_um[0]);
   nodes_per_px_y = px * (1 / grid->spacing_um[1]);
   depth_um = scale * (grid->spacing_um[2] * (grid->nz - 1));

@@ -157,7 +157,7 @@ bool has_series(const Scene& scene) {
 RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
   const DropletOptics<double> o = droplet_optics(scene, value);
   check_objective(scene, value, o.n_host);
-  const double na = value(scene.microscope.objective_na), px = scene.view.pixel_size_um;
+  const double na = value(scene.microscope.objective_na), px = value(scene.view.pixel_size_um);
   RenderPlan plan;
   plan.method = "series";
   plan.physics = "wave";

@@ -114,7 +114,8 @@ WaveObject wave_object(const Scene& scene, const Values<double>& value) {
 }
 
 WaveImaging imaging_of(const Scene& scene, const Values<double>& value, const WaveGrid& grid) {
-  const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px), px = scene.view.pixel_size_um;
+  const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px),
+               px = value(scene.view.pixel_size_um);
   const auto reach = [&](double centre, int pixels) {
     return px * (std::max(std::abs(centre), std::abs(pixels - 1 - centre)) + 1);
   };
@@ -225,14 +226,16 @@ double error_on_twin(RadialTwin twin, double scale, const RenderPicture& picture
     }
     if (scene.microscope.focus_um) resize(scene.microscope.focus_um, value(scene.microscope.focus_um));
   }
-  const double diameter = Values<double>(twin.theta, {})(std::get<Droplet>(twin.scenes.front().sample).diameter_um);
+  const Theta before = twin.theta;
+  const Values<double> value(before, {});
+  const double diameter = value(std::get<Droplet>(twin.scenes.front().sample).diameter_um);
   for (Scene& scene : twin.scenes) {
     // Pixels as large as the scene's, where 64 of them suffice: what is left out need not have the sign of what is
     // seen, and large pixels average.
     View& view = scene.view;
-    const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * view.pixel_size_um)), 2, 64);
+    const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * value(view.pixel_size_um))), 2, 64);
     view.width = view.height = pixels;
-    view.pixel_size_um = (diameter + 4) / pixels;
+    view.pixel_size_um.index = add_constant(twin.theta, (diameter + 4) / pixels);
     view.center_x_px.index = view.center_y_px.index = add_constant(twin.theta, 0.5 * (pixels - 1));
     scene.intensity_accuracy = 1e-8;  // nearly dark pictures, too
   }
@@ -344,7 +347,7 @@ void picture(const Scene& scene, const WaveGrid& grid, const WaveImaging& imagin
   m.aplanatic = scene.microscope.aplanatic;
   m.focus_um = value.get(scene.microscope.focus_um, 0.0);
   m.center_x_px = value(scene.view.center_x_px), m.center_y_px = value(scene.view.center_y_px);
-  m.pixel_um = scene.view.pixel_size_um;
+  m.pixel_um = value(scene.view.pixel_size_um);
   m.width = scene.view.width, m.height = scene.view.height;
   const Line<S> line(scene.microscope, value);
   std::vector<Image> part(images.size());
@@ -377,7 +380,7 @@ void picture(const Scene& scene, const WaveGrid& grid, const WaveImaging& imagin
 std::vector<bool> move_only_pictures(const Scene& scene, const std::vector<int>& active) {
   Scene without = scene;
   const ParameterRef none;
-  without.view.center_x_px = without.view.center_y_px = none;
+  without.view.center_x_px = without.view.center_y_px = without.view.pixel_size_um = none;
   Microscope& m = without.microscope;
   m.focus_um = m.objective_na = m.analyzer_deg = m.polarizer_extinction_ratio = m.analyzer_extinction_ratio = none;
   m.behind.clear();
