@@ -43,6 +43,7 @@ struct SampleBranch {
 struct FitJob {
   ParameterTable parameters;
   std::vector<Measurement> measurements;
+  Demand demand;  ///< how their scenes are computed; `options` may leave ceiling and rays to the fit
   std::vector<SampleBranch> branches;  ///< more than one: each is fitted, the best is reported
   std::optional<JointPrior> prior;
   FitOptions options;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "birefit/demand.h"
 #include "birefit/image.h"
 #include "birefit/observable.h"
 
@@ -29,6 +30,7 @@ struct DiscSquare {
 /// What the planner decided, why, and what it expects; fixed for the duration of a fit so that the objective is smooth
 /// (but for which pixels lie at a core's edge: their points follow it, which changes a mean by some 1e-4).
 struct RenderPlan {
+  Demand demand;                     ///< what it holds, where no warning says otherwise
   Observable observable;             ///< what is rendered
   std::string method;                ///< transport method by name
   std::string physics;               ///< the ceiling's name

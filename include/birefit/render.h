@@ -15,11 +15,15 @@ namespace birefit {
 /// Rays that the kernels carry side by side: doubles in a SIMD register of the machine they were compiled for.
 int rays_side_by_side();
 
-/// Chooses the cheapest method that holds scene.intensity_accuracy within scene.ceiling, at the values of theta.
-/// Throws UserError when a forced method cannot do the scene.
+/// Chooses the cheapest method that holds the demanded accuracy within the demanded physics, at the values of theta.
+/// Throws UserError when a method asked for by name cannot do the scene.
 /// `observable`: what the values of the picture are, where they are not intensities; its one pixel, or one for every
 /// ring.
-RenderPlan plan(const Scene& scene, const Theta& theta, const Observable& observable = {});
+RenderPlan plan(const Scene& scene, const Demand& demand, const Theta& theta, const Observable& observable = {});
+/// As exactly and by the physics that a Demand has by itself.
+inline RenderPlan plan(const Scene& scene, const Theta& theta, const Observable& observable = {}) {
+  return plan(scene, {}, theta, observable);
+}
 
 /// The picture of a droplet, shell or sampled field by Maxwell's equations, marched through (src/wave/march.h):
 /// independent of the propagation of Ceiling::wave, and much slower. Throws UserError like plan().
@@ -35,13 +39,13 @@ bool outgrown(const RenderPlan& now, const RenderPlan& before);
 /// field along the view.
 bool has_curved_rays(const Scene& scene);
 
-/// What Ceiling::wave would cost where it is not yet chosen.
+/// What Ceiling::wave would cost where it is not yet chosen, all else as demanded.
 struct WaveChoice {
   double seconds_an_image = 0;  ///< without derivatives, one thread; infinite where wave optics cannot do the scene
   bool series = false;          ///< by the exact series
   std::string words;            ///< a sentence: how long, or why not
 };
-WaveChoice wave_choice(const Scene& scene, const Theta& theta);
+WaveChoice wave_choice(const Scene& scene, Demand demand, const Theta& theta);
 
 /// Renders scene.view; every pixel is the mean over its area. `active` lists theta indices to differentiate by (angles
 /// in degrees, lengths in the unit of the parameter). Same bits whatever the number of threads (0 = all cores).
@@ -69,7 +73,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
 /// Light caught within a sphere ripples its image: how far theta[index], its diameter (um), goes from one ripple to the
 /// next where the scene is computed by the exact series; 0 for other parameters and scenes. A fit has a shallow minimum
 /// in each, and between them.
-double ripple_period(const Scene& scene, const Theta& theta, int index);
+double ripple_period(const Scene& scene, const Demand& demand, const Theta& theta, int index);
 
 /// Largest change of retardance phase (rad) anywhere in the image per unit of theta[index]; 0 when the parameter forms
 /// no fringes. The coarse scan steps by less than a radian of it.

@@ -1,7 +1,7 @@
 #pragma once
-// What is in front of the camera: a sample, its material and surround, the microscope. A scene is immutable and holds
-// no numbers of its own: every number that may vary is a ParameterRef into the job's table (parameters.h).
-// Frames, signs and units: docs/conventions.md. Sources: docs/methods.md.
+// What is in front of the camera: a sample, its material and surround, the microscope; how it is computed is a Demand
+// (demand.h). A scene is immutable and holds no numbers of its own: every number that may vary is a ParameterRef into
+// the job's table (parameters.h). Frames, signs and units: docs/conventions.md. Sources: docs/methods.md.
 
 #include <optional>
 #include <string>
@@ -51,20 +51,6 @@ struct View {
   }
 };
 
-/// The physics ceiling: what a render may leave out (docs/methods.md).
-enum class Ceiling {
-  one_way,      ///< E and H continuous, backward waves dropped (default)
-  e_only,       ///< only tangential E continuous: the source paper's
-  reflections,  ///< all of Maxwell's equations in the layers, both faces included; cells and slabs
-  /// wave optics: radial droplets and concentric shells exactly, other spheres and sampled fields without reflections.
-  /// Needs Microscope::objective_na
-  wave,
-};
-
-/// How light runs through a droplet: both modes on the refracted straight chord, or each on its own ray (geometrical
-/// optics; has_curved_rays in render.h). What follows from the choice: docs/methods.md.
-enum class Rays { straight, eikonal };
-
 struct Scene {
   Sample sample;
   Material material;
@@ -72,10 +58,6 @@ struct Scene {
   std::optional<Dispersion> surround_dispersion;  ///< instead of surround_index
   Microscope microscope;
   View view;
-  Ceiling ceiling = Ceiling::one_way;
-  Rays rays = Rays::straight;
-  double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold
-  std::string method = "auto";       ///< or a transport method's name
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {

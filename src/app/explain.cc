@@ -85,7 +85,7 @@ int run_explain(const Arguments& arguments) {
   const Config config = load_config(arguments.config, ConfigUse::plan);
   const ParameterTable& table = config.job.parameters;
   const Theta theta = table.values();
-  const RenderPlan chosen = plan(config.scene, theta, config.observable);
+  const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
   std::vector<std::string> warnings = config.job.warnings;
   for (const auto& more : {config.job.taken_as_exact, chosen.warnings, chosen.left_out})
     warnings.insert(warnings.end(), more.begin(), more.end());

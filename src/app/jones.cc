@@ -36,7 +36,7 @@ int run_jones(const Arguments& arguments) {
   problems.throw_if_any();
 
   const Theta theta = config.job.parameters.values();
-  const RenderPlan chosen = plan(config.scene, theta);
+  const RenderPlan chosen = plan(config.scene, config.job.demand, theta);
   const std::vector<JonesRow> rows = jones(config.scene, chosen, theta);
   const bool slab = !config.scene.microscope.directions.empty();  // one row a direction
   std::string text = slab ? "theta_deg,azimuth_deg" : "row,col";

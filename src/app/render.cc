@@ -35,7 +35,7 @@ int run_render(const Arguments& arguments) {
   problems.throw_if_any();
 
   const Theta theta = config.job.parameters.values();
-  const RenderPlan chosen = plan(config.scene, theta, config.observable);
+  const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
   const Rendering rendering = render(config.scene, chosen, theta, {}, arguments.threads);
   save_image(rendering.intensity, arguments.out);
   if (!arguments.quiet) {

@@ -50,7 +50,7 @@ Planned planned(const FitJob& job) {
   for (const Sight& sight : sights_of(job)) {
     Picture m = *sight.picture;
     const Theta theta = p.job.parameters.values();
-    p.plans.push_back(plan(m.scene, theta, sight.observable));
+    p.plans.push_back(plan(m.scene, job.demand, theta, sight.observable));
     const Image light = render(m.scene, p.plans.back(), theta, {}, job.options.threads).intensity;
     const auto [low, high] = std::minmax_element(light.values().begin(), light.values().end());
     const double range = *high - *low;
@@ -233,7 +233,7 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
     candidates.emplace_back("with quarter-wave plates (circular polariscope)", [=](Scene& s, ParameterTable& t) {
       make_circular_polariscope(s.microscope, constant(t, "next phase_deg", 90));
     });
-  if (scene.ceiling == Ceiling::wave && (!now.focus_um || known(now.focus_um)))
+  if (base.demand.ceiling == Ceiling::wave && (!now.focus_um || known(now.focus_um)))
     for (const double by : {-3.0, 3.0}) {
       const double at = (now.focus_um ? table[now.focus_um].value : 0) + by;
       candidates.emplace_back(fmt::format("focused at {:+g} um", at), [=](Scene& s, ParameterTable& t) {

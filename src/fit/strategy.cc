@@ -82,7 +82,7 @@ FitResult with_chosen_rays(const FitJob& job, Outcome straight) {
   if (!job.options.choose_rays || !(straight.by_curved_rays >= 1)) return std::move(straight.result);
   FitJob curved = job;
   curved.options.choose_rays = false;
-  for_each_scene(curved.measurements, [](Scene& scene) { scene.rays = Rays::eikonal; });
+  curved.demand.rays = Rays::eikonal;
   FitResult better = fit_one(curved).result;
   for (MicrographResult& m : better.micrographs)
     m.plan.reasons.push_back(
@@ -128,7 +128,7 @@ FitResult with_doubted_priors(const FitJob& job, FitResult result) {
   return result;
 }
 
-/// Every branch, by rays or waves as the job's scenes say.
+/// Every branch, by rays or waves as the job demands.
 FitResult fit_by_given_waves(const FitJob& job) {
   if (job.branches.size() < 2) return with_doubted_priors(job, with_chosen_rays(job, fit_one(job)));
   std::vector<FitJob> jobs;
@@ -161,7 +161,7 @@ Waves waves_of(const FitJob& job) {
   const Theta theta = job.parameters.values();
   double an_image = 0;
   for_each_scene(job.measurements, [&](const Scene& scene) {
-    const WaveChoice choice = wave_choice(scene, theta);
+    const WaveChoice choice = wave_choice(scene, job.demand, theta);
     an_image += choice.seconds_an_image;
     waves.words = choice.words;
     waves.series = waves.series && choice.series;
@@ -200,7 +200,7 @@ FitResult fit_by_chosen_waves(const FitJob& job) {
       return by_rays;
     }
   }
-  for_each_scene(chosen.measurements, [](Scene& scene) { scene.ceiling = Ceiling::wave; });
+  chosen.demand.ceiling = Ceiling::wave;
   FitResult better = fit_by_given_waves(chosen);
   add_effort(better, by_rays);
   return better;

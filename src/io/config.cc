@@ -192,7 +192,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
   // An image may have a focus of its own, which only waves know.
   for (const Picture& own : micrographs) {
     const ParameterRef focus = own.scene.microscope.focus_um;
-    if (!focus || focus == shared.scene.microscope.focus_um || own.scene.ceiling == Ceiling::wave ||
+    if (!focus || focus == shared.scene.microscope.focus_um || reader.demand.ceiling == Ceiling::wave ||
         !is_defocused(reader, own.scene))
       continue;
     if (!reader.choose_waves) {
@@ -200,7 +200,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       continue;
     }
     reader.choose_waves = false;
-    for (Picture& micrograph : micrographs) micrograph.scene.ceiling = Ceiling::wave;
+    reader.demand.ceiling = Ceiling::wave;
   }
 
   // Without an image to look at there is only the view.
@@ -396,15 +396,15 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     const Theta theta = reader.table.values();
     if (use == ConfigUse::fit) {
       config.job.options.choose_waves = true;
-    } else if (const WaveChoice choice = wave_choice(config.scene, theta);
+    } else if (const WaveChoice choice = wave_choice(config.scene, reader.demand, theta);
                choice.seconds_an_image <= reader.max_seconds) {
-      config.scene.ceiling = Ceiling::wave;
-      for_each_scene(config.job.measurements, [](Scene& scene) { scene.ceiling = Ceiling::wave; });
+      reader.demand.ceiling = Ceiling::wave;
     } else {
       reader.warnings.push_back(choice.words +
                                 " Rays are taken instead: physics.max_seconds and ceiling: wave change that.");
     }
   }
+  config.job.demand = reader.demand;
   config.job.parameters = std::move(reader.table);
   config.job.warnings = std::move(reader.warnings);
   config.inputs.assign(reader.inputs.begin(), reader.inputs.end());

@@ -60,6 +60,7 @@ class ConfigReader {
   /// A scene without polarizers: what it shows is the retardance itself.
   bool polarizers = true;
   /// `physics: {rays: auto}`: the fit chooses.
+  Demand demand;  ///< of the config, as far as it is read
   bool choose_rays = true;
   /// `physics: {ceiling: auto}` on a sphere: waves where they pay, within the time given for a fit (s).
   bool choose_waves = false;

@@ -463,14 +463,14 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   }
 }
 
-void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
+void read_demand(ConfigReader& reader, const Block& root, const Scene& scene) {
   const Block accuracy = reader.block(root, "accuracy", {"intensity"}, false);
-  scene.intensity_accuracy = reader.plain(accuracy, "intensity", numbers::within(1e-12, 0.1)).value_or(1e-4);
+  reader.demand.intensity_accuracy = reader.plain(accuracy, "intensity", numbers::within(1e-12, 0.1)).value_or(1e-4);
 
   const Block physics = reader.block(root, "physics", {"ceiling", "rays", "max_seconds"}, false);
   if (const YamlNode* rays = physics.find("rays")) {
     const std::string which = reader.choice(physics, "rays", {"straight", "eikonal", "auto"}).value_or("straight");
-    scene.rays = which == "eikonal" ? Rays::eikonal : Rays::straight;
+    reader.demand.rays = which == "eikonal" ? Rays::eikonal : Rays::straight;
     reader.choose_rays = which == "auto";  // what a fit does without the key, too
     if (which == "eikonal" && !has_curved_rays(scene))
       reader.problems.add(rays->where,
@@ -499,10 +499,10 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
                         "the number engraved on the objective; without it use one_way");
   if (name == "wave" && physics.find("rays"))
     reader.problems.add(physics.find("rays")->where, "rays has no meaning under ceiling: wave", "give one of the two");
-  scene.ceiling = name == "e_only"        ? Ceiling::e_only
-                  : name == "reflections" ? Ceiling::reflections
-                  : name == "wave"        ? Ceiling::wave
-                                          : Ceiling::one_way;
+  reader.demand.ceiling = name == "e_only"        ? Ceiling::e_only
+                          : name == "reflections" ? Ceiling::reflections
+                          : name == "wave"        ? Ceiling::wave
+                                                  : Ceiling::one_way;
   if (physics.find("max_seconds")) {
     NumberSpec seconds = numbers::within(0, 1e7);
     seconds.unit = "s";
@@ -513,19 +513,19 @@ void read_numerics(ConfigReader& reader, const Block& root, Scene& scene) {
   std::vector<std::string> methods = {"auto"};
   methods.insert(methods.end(), transport_method_names().begin(), transport_method_names().end());
   methods.insert(methods.end(), {"series", "split_step"});
-  scene.method = reader.choice(transport, "method", methods).value_or("auto");
-  const bool wave_method = scene.method == "series" || scene.method == "split_step";
+  reader.demand.method = reader.choice(transport, "method", methods).value_or("auto");
+  const bool wave_method = reader.demand.method == "series" || reader.demand.method == "split_step";
   const bool defocused = is_defocused(reader, scene);
   // Left to itself: waves for spheres, where the objective's aperture is known and nobody asked for rays. Only waves
   // know defocus.
   if (name == "auto" && sphere && scene.microscope.objective_na && !physics.find("rays") &&
-      (scene.method == "auto" || wave_method)) {
+      (reader.demand.method == "auto" || wave_method)) {
     if (defocused || wave_method)
-      scene.ceiling = Ceiling::wave;
+      reader.demand.ceiling = Ceiling::wave;
     else
       reader.choose_waves = true;
   }
-  if (defocused && scene.ceiling != Ceiling::wave) add_defocus_problem(reader, scene);
+  if (defocused && reader.demand.ceiling != Ceiling::wave) add_defocus_problem(reader, scene);
 }
 
 }  // namespace
@@ -547,7 +547,7 @@ Scene read_scene(ConfigReader& reader, const Block& root) {
   read_sample(reader, root, scene);
   read_microscope(reader, root, scene);
   check_material_ranges(reader, root, scene);
-  read_numerics(reader, root, scene);
+  read_demand(reader, root, scene);
   return scene;
 }
 

@@ -97,7 +97,7 @@ template double IncidenceTable::at<double>(const double&) const;
 template Pack IncidenceTable::at<Pack>(const Pack&) const;
 
 template <class S>
-DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
+DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value, Continuity continuity) {
   const Droplet& droplet = std::get<Droplet>(scene.sample);
   const Indices<S> n = material_indices<S>(scene.material, value, wavelength_um(scene, value));
   DropletOptics<S> o;
@@ -124,11 +124,11 @@ DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value) {
     o.axial = std::make_shared<const AxialField<S>>(e, value.get(axial.ring_radius, 0.0),
                                                     static_cast<bool>(axial.ring_radius));
   }
-  o.continuity = scene.ceiling == Ceiling::e_only ? Continuity::e_only : Continuity::e_and_h;
+  o.continuity = continuity;
   return o;
 }
 
-#define BIREFIT_INSTANTIATE(S) template DropletOptics<S> droplet_optics<S>(const Scene&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S) template DropletOptics<S> droplet_optics<S>(const Scene&, const Values<S>&, Continuity);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

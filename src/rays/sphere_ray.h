@@ -84,8 +84,10 @@ DropletRay<S> ray_at(const S& psi, const S& ratio, const S& radius_um) {
   return r;
 }
 
+/// `continuity`: for who sends light along rays; where they go does not ask.
 template <class S>
-DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value);
+DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value,
+                                Continuity continuity = Continuity::e_and_h);
 /// rim.rho_max() with its derivatives by the indices and the aperture (where it has one).
 template <class S>
 S rim_edge(const RimTable& rim, const S& ratio, const S& n_host, const S& objective_na) {

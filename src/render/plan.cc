@@ -21,28 +21,28 @@
 namespace birefit {
 namespace {
 
-void check_method(const Scene& scene) {
-  if (scene.method == "auto") return;
-  if (scene.ceiling == Ceiling::wave) {
-    if (scene.method == "split_step" || (scene.method == "series" && has_series(scene))) return;
-    if (scene.method == "series")
+void check_method(const Scene& scene, const Demand& demand) {
+  if (demand.method == "auto") return;
+  if (demand.ceiling == Ceiling::wave) {
+    if (demand.method == "split_step" || (demand.method == "series" && has_series(scene))) return;
+    if (demand.method == "series")
       throw UserError(Where{}, "transport method 'series' is for radial droplets without twist and concentric shells",
                       "use auto or split_step");
-    throw UserError(Where{}, fmt::format("transport method '{}' is for rays", scene.method),
+    throw UserError(Where{}, fmt::format("transport method '{}' is for rays", demand.method),
                     "ceiling: wave knows series and split_step; or leave transport.method at auto");
   }
-  if (scene.method == "series" || scene.method == "split_step")
-    throw UserError(Where{}, fmt::format("transport method '{}' belongs to ceiling: wave", scene.method),
+  if (demand.method == "series" || demand.method == "split_step")
+    throw UserError(Where{}, fmt::format("transport method '{}' belongs to ceiling: wave", demand.method),
                     "set physics.ceiling: wave, or leave transport.method at auto");
   const auto& names = transport_method_names();
-  if (std::find(names.begin(), names.end(), scene.method) == names.end())
-    throw UserError(Where{}, fmt::format("transport method '{}' does not exist", scene.method),
+  if (std::find(names.begin(), names.end(), demand.method) == names.end())
+    throw UserError(Where{}, fmt::format("transport method '{}' does not exist", demand.method),
                     fmt::format("use auto or one of: {}", fmt::join(names, ", ")));
-  if ((scene.method == "berreman") != (scene.ceiling == Ceiling::reflections))
+  if ((demand.method == "berreman") != (demand.ceiling == Ceiling::reflections))
     throw UserError(
-        Where{}, fmt::format("transport method '{}' and this physics.ceiling exclude each other", scene.method),
+        Where{}, fmt::format("transport method '{}' and this physics.ceiling exclude each other", demand.method),
         "berreman computes all reflections and belongs to ceiling: reflections; leave transport.method at auto");
-  if (scene.method == "modal" && kind_of(scene).passes_axis)
+  if (demand.method == "modal" && kind_of(scene).passes_axis)
     throw UserError(
         Where{},
         "transport method 'modal' is for cells, slabs and plates: in a droplet the axis passes every ray's wavevector",
@@ -88,19 +88,23 @@ void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
 
 }  // namespace
 
-RenderPlan plan(const Scene& scene, const Theta& theta, const Observable& observable) {
-  check_method(scene);
+RenderPlan plan(const Scene& scene, const Demand& demand, const Theta& theta, const Observable& observable) {
+  check_method(scene, demand);
   check_validity(scene, theta);
   const Values<double> value(theta, {});
   const SampleKind& kind = kind_of(scene, observable);
-  const Planning planning{scene, value, observable,
+  const Planning planning{scene,
+                          demand,
+                          value,
+                          observable,
                           [&](const RenderPlan& trial, const std::vector<std::array<int, 2>>& pixels) {
                             return render_pixels(scene, trial, theta, pixels, {}, 1).intensity;
                           },
                           picture_of};
   RenderPlan result;
-  if (scene.ceiling == Ceiling::wave) {
-    result = has_series(scene) && scene.method != "split_step" ? plan_series(scene, value) : plan_wave(planning);
+  if (demand.ceiling == Ceiling::wave) {
+    result =
+        has_series(scene) && demand.method != "split_step" ? plan_series(scene, demand, value) : plan_wave(planning);
     note_illumination(scene, value, largest_phase(scene, theta), result);
   } else {
     result = kind.plan(planning);
@@ -113,10 +117,10 @@ RenderPlan plan(const Scene& scene, const Theta& theta, const Observable& observ
     result.reasons.push_back("half a turn about the viewing axis leaves the picture as it is: half of it is computed");
   if (symmetry == Symmetry::mirror)
     result.reasons.push_back("the lower half of the picture is the upper one's mirror image: half of it is computed");
-  result.physics = scene.ceiling == Ceiling::e_only        ? "e_only"
-                   : scene.ceiling == Ceiling::reflections ? "reflections"
-                   : scene.ceiling == Ceiling::wave        ? "wave"
-                                                           : "one_way";
+  result.physics = demand.ceiling == Ceiling::e_only        ? "e_only"
+                   : demand.ceiling == Ceiling::reflections ? "reflections"
+                   : demand.ceiling == Ceiling::wave        ? "wave"
+                                                            : "one_way";
   return result;
 }
 
@@ -139,12 +143,11 @@ double march_error(const Scene& scene, const Theta& theta, int threads) {
 
 bool has_curved_rays(const Scene& scene) { return rays_stay_meridional(scene.sample); }
 
-WaveChoice wave_choice(const Scene& scene, const Theta& theta) {
-  Scene waves = scene;
-  waves.ceiling = Ceiling::wave;
-  waves.rays = Rays::straight;
+WaveChoice wave_choice(const Scene& scene, Demand demand, const Theta& theta) {
+  demand.ceiling = Ceiling::wave;
+  demand.rays = Rays::straight;
   try {
-    const RenderPlan by_waves = plan(waves, theta);
+    const RenderPlan by_waves = plan(scene, demand, theta);
     const double seconds = by_waves.cost_seconds;
     return {seconds, !by_waves.wave, fmt::format("Wave optics of this scene takes about {:.2g} s an image.", seconds)};
   } catch (const UserError& error) {
@@ -153,8 +156,8 @@ WaveChoice wave_choice(const Scene& scene, const Theta& theta) {
   }
 }
 
-double ripple_period(const Scene& scene, const Theta& theta, int index) {
-  if (scene.ceiling != Ceiling::wave || !has_series(scene) || scene.method == "split_step") return 0;
+double ripple_period(const Scene& scene, const Demand& demand, const Theta& theta, int index) {
+  if (demand.ceiling != Ceiling::wave || !has_series(scene) || demand.method == "split_step") return 0;
   return series_ripple_period(scene, Values<double>(theta, {}), index);
 }
 

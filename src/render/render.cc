@@ -570,7 +570,7 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
 
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   const Values<double> value(theta, {});
-  if (scene.ceiling == Ceiling::wave)
+  if (plan.demand.ceiling == Ceiling::wave)
     throw UserError(Where{}, "under ceiling: wave a point of the image has no Jones matrix of its own ray",
                     "use `render`, or ceiling: one_way");
   const SampleKind& kind = kind_of(scene);

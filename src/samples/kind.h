@@ -14,7 +14,7 @@ struct SampleKind {
   /// By rays; waves are planned by samples/waves for all kinds that have them.
   RenderPlan (*plan)(const Planning&);
   /// The rays on which transport methods are judged; null: closed forms, nothing to choose.
-  Pilots (*pilots)(const Scene&, const Values<double>&);
+  Pilots (*pilots)(const Scene&, const Demand&, const Values<double>&);
   /// Retardances at points fixed relative to the sample (rad): how fast fringes go by a parameter.
   std::vector<double> (*phases_rad)(const Scene&, const Values<double>&);
   /// Adds to a plan what holds of the sample by whatever physics; may be null.

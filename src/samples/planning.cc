@@ -14,9 +14,9 @@ std::string effort_text(const std::string& method, int steps) {
   return fmt::format("{} {}", steps, method == "diagonal" ? "Gauss nodes" : "steps");
 }
 
-void check_closed_form(const Scene& scene, const std::string& what) {
-  if (scene.method != "auto" && scene.method != "diagonal")
-    throw UserError(Where{}, fmt::format("transport method '{}' does not apply to {}", scene.method, what),
+void check_closed_form(const Demand& demand, const std::string& what) {
+  if (demand.method != "auto" && demand.method != "diagonal")
+    throw UserError(Where{}, fmt::format("transport method '{}' does not apply to {}", demand.method, what),
                     "leave transport.method at auto");
 }
 

@@ -18,11 +18,20 @@ using RenderPicture = std::function<Image(const Scene&, const RenderPlan&, const
 /// What a kind's planner is given.
 struct Planning {
   const Scene& scene;
+  const Demand& demand;
   const Values<double>& value;
   const Observable& observable;
   /// The means over a few pixels (column, row) by a plan, as the picture will have them: render_pixels().
   std::function<Eigen::VectorXd(const RenderPlan&, const std::vector<std::array<int, 2>>&)> means_at;
   RenderPicture picture;
+
+  /// Nothing chosen yet.
+  RenderPlan start() const {
+    RenderPlan plan;
+    plan.demand = demand;
+    plan.observable = observable;
+    return plan;
+  }
 };
 
 /// Of the accuracy asked for: the table's error stays far below it, so that neither the image nor its slope shows the
@@ -36,7 +45,7 @@ std::string sci(double x);
 /// "12 steps", or Gauss nodes.
 std::string effort_text(const std::string& method, int steps);
 /// Throws UserError where a method was asked for by name that closed forms do not have; `what`: "a crystal bar".
-void check_closed_form(const Scene& scene, const std::string& what);
+void check_closed_form(const Demand& demand, const std::string& what);
 /// points(r): a pixel side, of pixels whose middles are about r pixels from the centre.
 void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double bins,
                       const std::function<int(double)>& points);

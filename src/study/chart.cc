@@ -194,10 +194,8 @@ struct PixelTruth {
   std::vector<std::array<int, 2>> pixels;
   Eigen::VectorXd intensity;
 };
-PixelTruth pixel_truth(Scene scene, const Theta& theta) {
-  scene.method = "magnus4";
-  scene.intensity_accuracy = 1e-7;
-  RenderPlan fine = plan(scene, theta);
+PixelTruth pixel_truth(const Scene& scene, const Theta& theta) {
+  RenderPlan fine = plan(scene, {.intensity_accuracy = 1e-7, .method = "magnus4"}, theta);
   fine.samples = {8};
   fine.fringe_means = false;
   PixelTruth truth;
@@ -211,7 +209,7 @@ PixelTruth pixel_truth(Scene scene, const Theta& theta) {
 }
 
 /// The frame of pixels so many times finer, averaged: none of its pixels is planned as the frame's are.
-Image by_finer_pixels(Scene scene, Theta theta) {
+Image by_finer_pixels(Scene scene, const Demand& demand, Theta theta) {
   constexpr int kFiner = 9;
   const int w = scene.view.width, h = scene.view.height;
   scene.view.width *= kFiner, scene.view.height *= kFiner;
@@ -220,7 +218,7 @@ Image by_finer_pixels(Scene scene, Theta theta) {
     double& at = theta[static_cast<std::size_t>(centre.index)];
     at = (at + 0.5) * kFiner - 0.5;  // pixel centres are whole numbers
   }
-  const Image fine = render(scene, plan(scene, theta), theta).intensity;
+  const Image fine = render(scene, plan(scene, demand, theta), theta).intensity;
   Image mean(w, h);
   for (int row = 0; row < h; ++row)
     for (int j = 0; j < kFiner; ++j) {
@@ -232,7 +230,7 @@ Image by_finer_pixels(Scene scene, Theta theta) {
 }
 
 void measure_frames(MethodChart& chart, const std::function<void(const std::string&)>& say) {
-  for (FrameScene& f : frame_scenes()) {
+  for (const FrameScene& f : frame_scenes()) {
     if (say) say("frames of " + f.name);
     const Theta theta = f.table.values();
     const bool by_pixels = f.name == "evaluation_slab";
@@ -241,13 +239,11 @@ void measure_frames(MethodChart& chart, const std::function<void(const std::stri
     if (by_pixels) {
       some = pixel_truth(f.scene, theta);
     } else {
-      f.scene.intensity_accuracy = 1e-10;
-      exact = by_finer_pixels(f.scene, theta);
+      exact = by_finer_pixels(f.scene, {.intensity_accuracy = 1e-10}, theta);
     }
     for (const double asked : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
       if (by_pixels && asked < 1e-4) break;  // kinks of its splines keep the modes from less: minutes by magnus4
-      f.scene.intensity_accuracy = asked;
-      const RenderPlan chosen = plan(f.scene, theta);
+      const RenderPlan chosen = plan(f.scene, {.intensity_accuracy = asked}, theta);
       ChartFrame frame;
       frame.scene = f.name, frame.method = chosen.method, frame.asked = asked;
       Rendering rendering;

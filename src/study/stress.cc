@@ -240,11 +240,9 @@ void measure_pictures(bool quick, std::vector<StressPoint>& points) {
         const bool planned_only = trap.sample == "plate";  // planning by name for every direction takes too long
         for (const bool reflections : {false, true}) {
           if (reflections && trap.sample != "cell") continue;
-          trap.scene.ceiling = reflections ? Ceiling::reflections : Ceiling::one_way;
-          trap.scene.intensity_accuracy = kTruth;
-          trap.scene.method = "auto";
-          const Image truth = render(trap.scene, plan(trap.scene, theta), theta, {}, 1).intensity;
-          trap.scene.intensity_accuracy = kAsked;
+          Demand demand{.ceiling = reflections ? Ceiling::reflections : Ceiling::one_way, .intensity_accuracy = kTruth};
+          const Image truth = render(trap.scene, plan(trap.scene, demand, theta), theta, {}, 1).intensity;
+          demand.intensity_accuracy = kAsked;
           std::vector<std::string> methods{"auto"};
           if (!reflections && !planned_only)
             for (const TransportMethod<double>* method : transport_methods<double>())
@@ -252,8 +250,8 @@ void measure_pictures(bool quick, std::vector<StressPoint>& points) {
                   !(method->info().slow_axes && trap.sample != "cell"))
                 methods.emplace_back(method->info().name);
           for (const std::string& method : methods) {
-            trap.scene.method = method;
-            const RenderPlan chosen = plan(trap.scene, theta);
+            demand.method = method;
+            const RenderPlan chosen = plan(trap.scene, demand, theta);
             StressPoint p{crossed ? "crossed_polarizer_deg" : "parallel_polarizer_deg",
                           polarizer_deg,
                           fmt::format("{} of a {}{}", method, sample, reflections ? ", reflections" : ""),

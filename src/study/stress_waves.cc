@@ -125,9 +125,8 @@ void measure_wave_traps(bool quick, const std::function<void(const std::string&)
   std::string telling;
   for (const Trap& trap : wave_traps(quick)) {
     if (say && trap.sweep != telling) say(telling = trap.sweep);
-    BallScene b(trap.ball);
+    const BallScene b(trap.ball);
     const Theta theta = b.table.values();
-    b.scene.ceiling = Ceiling::wave;
     // Estimate and image of a method, or why there is none.
     const auto attempt = [&](const std::string& method, const auto& work) {
       StressPoint p{trap.sweep, trap.value, method + " of a ball", kNan, kInfinite, 0, ""};
@@ -149,8 +148,7 @@ void measure_wave_traps(bool quick, const std::function<void(const std::string&)
     };
     const auto planned = [&](const std::string& method) {
       return attempt(method, [&](StressPoint& p) {
-        b.scene.method = method;
-        const RenderPlan chosen = plan(b.scene, theta);
+        const RenderPlan chosen = plan(b.scene, {.ceiling = Ceiling::wave, .method = method}, theta);
         p.estimate = chosen.numerical_error + chosen.model_error;
         p.samples = chosen.wave
                         ? static_cast<double>(chosen.wave->grid.nx) * chosen.wave->grid.ny * chosen.wave->grid.slabs
@@ -164,12 +162,10 @@ void measure_wave_traps(bool quick, const std::function<void(const std::string&)
     const bool exact_known = trap.ball.tilt_deg < 0 && trap.ball.twist_deg == 0 && trap.ball.offset_um == 0;
     Image exact;
     if (exact_known) {
-      b.scene.intensity_accuracy = 1e-4;
       const Image series = planned("series");
       if (series.size() > 0) judge(points.back(), series_error(trap.ball, series));
-      b.scene.intensity_accuracy = 1e-8;
-      b.scene.method = "series";
-      exact = render(b.scene, plan(b.scene, theta), theta, {}, 1).intensity;
+      const Demand closer{.ceiling = Ceiling::wave, .intensity_accuracy = 1e-8, .method = "series"};
+      exact = render(b.scene, plan(b.scene, closer, theta), theta, {}, 1).intensity;
     }
     const Image propagated = planned("split_step");
     if (exact_known && propagated.size() > 0) judge(points.back(), picture_error(propagated, exact));

@@ -35,23 +35,19 @@ std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const 
     const std::string name = fmt::format("dn {:g} in {:g}", ball.birefringence, ball.host);
     const double radius = ball.radius_um, na = ball.objective_na;
     const Theta theta = b.table.values();
-    Scene waves = b.scene;
-    waves.ceiling = Ceiling::wave;
-    const RenderPlan series = plan(waves, theta);
+    const Scene& scene = b.scene;
+    const RenderPlan series = plan(scene, {.ceiling = Ceiling::wave}, theta);
     Image exact;
-    const double exact_seconds = seconds_of([&] { exact = render(waves, series, theta).intensity; });
+    const double exact_seconds = seconds_of([&] { exact = render(scene, series, theta).intensity; });
     points.push_back({name, radius, na, "series", "", exact_seconds, 0, kNan});
     for (const Rays rays : {Rays::straight, Rays::eikonal}) {
-      Scene scene = b.scene;
-      scene.rays = rays;
-      const RenderPlan by_rays = plan(scene, theta);
+      const RenderPlan by_rays = plan(scene, {.rays = rays}, theta);
       Image image;
       const double seconds = seconds_of([&] { image = render(scene, by_rays, theta).intensity; });
       points.push_back({name, radius, na, rays == Rays::straight ? "straight" : "eikonal", "", seconds,
                         picture_error(image, exact), kNan});
     }
-    waves.method = "split_step";
-    RenderPlan propagated = plan(waves, theta);
+    RenderPlan propagated = plan(scene, {.ceiling = Ceiling::wave, .method = "split_step"}, theta);
     const WavePlan planned = *propagated.wave;
     for (const double finer : {1.0, 0.7, 1.4, 2.0}) {
       if (finer != 1 && !efforts) break;
@@ -62,14 +58,14 @@ std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const 
       changed->grid.slabs = std::max(4, static_cast<int>(planned.grid.slabs * finer));
       propagated.wave = changed;
       Image image;
-      const double seconds = seconds_of([&] { image = render(waves, propagated, theta).intensity; });
+      const double seconds = seconds_of([&] { image = render(scene, propagated, theta).intensity; });
       points.push_back({name, radius, na, "split_step", finer == 1 ? "" : fmt::format("{:g} times as fine", finer),
                         seconds, picture_error(image, exact),
                         finer == 1 ? propagated.model_error + propagated.numerical_error : kNan});
     }
     if (radius > 7) return;
     Image image;
-    const double seconds = seconds_of([&] { image = image_by_march(waves, theta); });
+    const double seconds = seconds_of([&] { image = image_by_march(scene, theta); });
     points.push_back({name, radius, na, "march", "", seconds, picture_error(image, exact), kNan});
   };
   const std::vector<double> radii = quick ? std::vector<double>{2, 4.5} : std::vector<double>{2, 3, 4.5, 7, 10, 15};

@@ -7,6 +7,7 @@
 // whose eigenvalues are the normal components q_o and q_e. Nothing divides by the angle between axis and wavevector.
 // D [I; Y] = [I; Y] N holds for the Berreman matrix D; a law test checks it for random media.
 
+#include "birefit/demand.h"
 #include "core/jones.h"
 #include "medium/column.h"
 
@@ -17,6 +18,9 @@ enum class Continuity {
   e_and_h,  ///< E and H; only the backward wave is dropped: flux is conserved
   e_only,   ///< tangential E alone: the source paper's transport
 };
+inline Continuity continuity_of(const Demand& demand) {
+  return demand.ceiling == Ceiling::e_only ? Continuity::e_only : Continuity::e_and_h;
+}
 
 /// N = Complex<S>, or the scalar S itself in a lossless medium without total reflection: a quarter of the arithmetic.
 template <class N>

@@ -17,6 +17,7 @@ using namespace testing;
 struct CellCase {
   TableBuilder t;
   Scene scene;
+  Demand demand;
 };
 /// A cell of n_o = 1.5 in a host of 1.5: no reflections for ordinary light.
 CellCase cell_case(double birefringence, double thickness_um, double azimuth_deg, double twist_deg,
@@ -40,13 +41,13 @@ CellCase cell_case(double birefringence, double thickness_um, double azimuth_deg
   c.scene.sample = cell;
   c.scene.view.width = c.scene.view.height = 2;
   c.scene.view.rotation_deg = c.t.fixed("rotation_deg", rotation_deg);
-  c.scene.ceiling = Ceiling::e_only;  // pure retarders: no loss at the faces
-  c.scene.intensity_accuracy = 1e-9;
+  c.demand.ceiling = Ceiling::e_only;  // pure retarders: no loss at the faces
+  c.demand.intensity_accuracy = 1e-9;
   return c;
 }
 double intensity(const CellCase& c) {
   const Theta theta = c.t.table.values();
-  return render(c.scene, plan(c.scene, theta), theta, {}, 1).intensity(0, 0);
+  return render(c.scene, plan(c.scene, c.demand, theta), theta, {}, 1).intensity(0, 0);
 }
 
 TEST(Conventions, MalusLawWithoutRetardance) {

@@ -22,6 +22,7 @@ constexpr double kPi = std::numbers::pi;
 struct Ball {
   TableBuilder b;
   Scene scene;
+  Demand demand;
   explicit Ball(double host = 1.5, double polarizer_deg = 0) {
     scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", polarizer_deg);
@@ -41,7 +42,7 @@ struct Ball {
     d.diameter_um = b.fixed("diameter_um", 10);
     scene.sample = d;
     const Theta theta = b.table.values();
-    return render(scene, plan(scene, theta), theta, {}, 1).intensity;
+    return render(scene, plan(scene, demand, theta), theta, {}, 1).intensity;
   }
 };
 // Nested spheres solved once more by bisection elsewhere; printed with nine digits.
@@ -138,7 +139,7 @@ TEST(Ball, EccentricShellTendsToTheConcentricOne) {
 // gives I = sin^2(2 azimuth) sin^2(k0 dn S), S = sqrt(R^2 - rho^2).
 TEST(Ball, BipolarWithDistantPolesIsAUniformBall) {
   Ball ball(1.52);
-  ball.scene.ceiling = Ceiling::e_only;
+  ball.demand.ceiling = Ceiling::e_only;
   BipolarDirector poles;
   poles.azimuth_deg = ball.b.fixed("azimuth", 30);
   poles.pole_distance = ball.b.fixed("distance", 1e5);

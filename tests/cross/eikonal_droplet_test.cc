@@ -337,12 +337,13 @@ TEST(EikonalDroplet, DerivativesOfIntegratedRaysAreThoseOfDifferences) {
 struct Job {
   TableBuilder b;
   Scene scene;
+  Demand demand;
   ParameterRef birefringence;
   Job(double diameter_um, Rays rays, bool free, int size) {
     Droplet d;
     d.diameter_um = b.fixed("diameter_um", diameter_um);
     scene.sample = d;
-    scene.rays = rays;
+    demand.rays = rays;
     birefringence = free ? b.fitted("birefringence", 0.215, 0.19, 0.24) : b.fixed("birefringence", 0.22);
     ConstantIndices m;
     m.ordinary = b.fixed("ordinary", 1.52);
@@ -363,7 +364,7 @@ struct Job {
 FitResult fit_of(double diameter_um, Rays rays, int size) {
   const Job truth(diameter_um, Rays::eikonal, false, size);
   const Theta theta = truth.b.table.values();
-  const Image image = render(truth.scene, plan(truth.scene, theta), theta, {}, 1).intensity;
+  const Image image = render(truth.scene, plan(truth.scene, truth.demand, theta), theta, {}, 1).intensity;
   std::vector<double> counts;
   for (double i : image.values()) counts.push_back(100 + 3000 * i);
   Job job(diameter_um, rays, true, size);
@@ -377,6 +378,7 @@ FitResult fit_of(double diameter_um, Rays rays, int size) {
     }
   FitJob fit_job;
   fit_job.parameters = job.b.table;
+  fit_job.demand = job.demand;
   fit_job.measurements = {m};
   return fit(fit_job);
 }
@@ -428,7 +430,7 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
     const Job truth = job_of(Rays::eikonal, false);
     const Theta theta = truth.b.table.values();
     std::vector<double> counts;
-    const Image picture = render(truth.scene, plan(truth.scene, theta), theta, {}, 1).intensity;
+    const Image picture = render(truth.scene, plan(truth.scene, truth.demand, theta), theta, {}, 1).intensity;
     for (const double i : picture.values()) counts.push_back(100 + 3000 * i);
     Job job = job_of(Rays::straight, true);
     Picture m = micrograph_of("image", job.scene, camera(counts, 0.5, 4, 3), job.b.linear("gain", 3000),
@@ -438,6 +440,7 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
         if (std::hypot(c - 47.4, r - 47.8) * job.b.table[job.scene.view.pixel_size_um].value > 4) m.mask(c, r) = 0;
     FitJob fit_job;
     fit_job.parameters = job.b.table;
+    fit_job.demand = job.demand;
     fit_job.measurements = {m};
     fit_job.options.choose_rays = true;
     const FitResult result = fit(fit_job);
@@ -455,6 +458,7 @@ TEST(EikonalDroplet, AFitOfAnyOfTheseSamplesGoesOverToCurvedRays) {
 struct Seen {
   TableBuilder b;
   Scene scene;
+  Demand demand{.rays = Rays::eikonal};
   Seen(double host, double wall_um, double field, double ring, double na, double analyzer_deg,
        double core_index = 1.45) {
     Droplet d;
@@ -468,7 +472,6 @@ struct Seen {
       d.director = axial;
     }
     scene.sample = d;
-    scene.rays = Rays::eikonal;
     ConstantIndices m;
     m.ordinary = b.fixed("ordinary", 1.52);
     m.birefringence = b.fitted("birefringence", 0.2, 0.1, 0.3);
@@ -507,7 +510,7 @@ TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
                                           << ", field " << field << ", NA " << na << ", analyser " << analyzer_deg);
         const Seen s(host, wall, field, ring, na, analyzer_deg, core_index);
         const Theta theta = s.b.table.values();
-        const RenderPlan chosen = plan(s.scene, theta);
+        const RenderPlan chosen = plan(s.scene, s.demand, theta);
         const Values<double> value(theta, {});
         const auto model = make_pixel_model<double>(s.scene, chosen, value);
         model->tabulate(PixelModel<double>::Wanted::picture, 1);
@@ -550,7 +553,7 @@ TEST(EikonalDroplet, LightThatEntersIsInThePicture) {
         s.scene.view.width = s.scene.view.height = 150;
         s.b.table[s.scene.view.center_x_px].value = s.b.table[s.scene.view.center_y_px].value = 74.3;
         const Theta theta = s.b.table.values();
-        const Image image = render(s.scene, plan(s.scene, theta), theta, {}, 1).intensity;
+        const Image image = render(s.scene, plan(s.scene, s.demand, theta), theta, {}, 1).intensity;
         for (int r = 0; r < image.height(); ++r)
           for (int c = 0; c < image.width(); ++c) {
             const double rho = std::hypot(c - 74.3, r - 74.3) * 0.125;
@@ -591,7 +594,7 @@ TEST(EikonalDroplet, DerivativesKnowWhereLightBeginsAndEnds) {
     for (const double na : apertures) {
       const Seen s(host, wall, field, ring, na, 70, core_index);
       Theta theta = s.b.table.values();
-      const RenderPlan chosen = plan(s.scene, theta);
+      const RenderPlan chosen = plan(s.scene, s.demand, theta);
       for (int index = 0; index < s.b.table.size(); ++index) {
         if (!s.b.table[index].free) continue;
         const Image slope = render(s.scene, chosen, theta, {index}, 1).derivatives[0];
@@ -620,12 +623,9 @@ TEST(EikonalDroplet, DerivativesKnowWhereLightBeginsAndEnds) {
 }
 
 /// RMS of the difference from the picture by wave optics over the RMS of that.
-double error_of(const Scene& asked, const Theta& theta, Rays rays) {
-  Scene waves = asked, scene = asked;
-  waves.ceiling = Ceiling::wave;
-  scene.rays = rays;
-  const Image exact = render(waves, plan(waves, theta), theta).intensity,
-              image = render(scene, plan(scene, theta), theta).intensity;
+double error_of(const Scene& scene, const Theta& theta, Rays rays) {
+  const Image exact = render(scene, plan(scene, {.ceiling = Ceiling::wave}, theta), theta).intensity,
+              image = render(scene, plan(scene, {.rays = rays}, theta), theta).intensity;
   double difference = 0, size = 0;
   for (std::size_t i = 0; i < exact.values().size(); ++i) {
     difference += square(image.values()[i] - exact.values()[i]);

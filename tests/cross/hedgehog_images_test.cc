@@ -54,12 +54,11 @@ TEST(PeerHedgehog, VoxelImagesApproachTheClosedFormsAtFirstOrder) {
   EXPECT_GT(flux_50 / flux_200, 2.5);
 }
 
-Scene scene_of_beam_propagation(TableBuilder& b, Rays rays, int size, double diameter_um, double birefringence) {
+Scene scene_of_beam_propagation(TableBuilder& b, int size, double diameter_um, double birefringence) {
   Scene scene;
   Droplet droplet;
   droplet.diameter_um = b.fitted("diameter_um", diameter_um, 8, 10);
   scene.sample = droplet;
-  scene.rays = rays;
   scene.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fitted("birefringence", birefringence, 0.15, 0.3)};
   scene.surround_index = b.fixed("index", 1.52);
   scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
@@ -77,11 +76,12 @@ Scene scene_of_beam_propagation(TableBuilder& b, Rays rays, int size, double dia
 FitResult fit_of_beam_propagation(Rays rays, bool choose = false) {
   const Image image = read_pfm(data_path("peers/images/droplet_n152_bpm_nz200_centreNA0.8_I45.pfm"));
   TableBuilder b;
-  const Scene scene = scene_of_beam_propagation(b, rays, image.width(), 9.1, 0.21);
+  const Scene scene = scene_of_beam_propagation(b, image.width(), 9.1, 0.21);
   FitJob job;
   const ParameterRef gain = b.linear("gain", 1), offset = b.fixed("offset", 0);
   job.measurements.push_back(micrograph_of("bpm", scene, image.values(), gain, offset, {0.02, 0}));
   job.parameters = b.table;
+  job.demand.rays = rays;
   job.options.choose_rays = choose;
   return fit(job);
 }
@@ -90,9 +90,9 @@ FitResult fit_of_beam_propagation(Rays rays, bool choose = false) {
 double distance_from_beam_propagation(Rays rays) {
   const Image image = read_pfm(data_path("peers/images/droplet_n152_bpm_nz200_centreNA0.8_I45.pfm"));
   TableBuilder b;
-  const Scene scene = scene_of_beam_propagation(b, rays, image.width(), 9, 0.22);
+  const Scene scene = scene_of_beam_propagation(b, image.width(), 9, 0.22);
   const Theta theta = b.table.values();
-  const Image ours = render(scene, plan(scene, theta), theta, {}, 1).intensity;
+  const Image ours = render(scene, plan(scene, {.rays = rays}, theta), theta, {}, 1).intensity;
   double sum = 0, size = 0;
   for (std::size_t i = 0; i < image.size(); ++i)
     sum += std::pow(ours.values()[i] - image.values()[i], 2), size += std::pow(image.values()[i], 2);
@@ -134,7 +134,7 @@ TEST(PeerHedgehog, AFitGoesOverToCurvedRaysOnlyWhereTheyAreNoWorse) {
   EXPECT_NEAR(find_estimate(chosen, "birefringence")->value, find_estimate(curved, "birefringence")->value,
               0.01 * curved.parameters[0].stderr_);
   TableBuilder b;
-  const Scene scene = scene_of_beam_propagation(b, Rays::straight, 128, 9, 0.22);
+  const Scene scene = scene_of_beam_propagation(b, 128, 9, 0.22);
   FitJob job;
   const ParameterRef gain = b.linear("gain", 1), offset = b.fixed("offset", 0);
   const Theta theta = b.table.values();

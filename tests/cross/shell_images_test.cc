@@ -156,10 +156,8 @@ TEST(PeerShell, BendingRaysAtTheSphereGoesTowardsWaves) {
   scene.view.pixel_size_um = b.fixed("pixel_size_um", kBox / kSize);
   scene.view.center_x_px = scene.view.center_y_px = b.fixed("center", 0.5 * (kSize - 1));
   const Theta theta = b.table.values();
-  Scene waves = scene;
-  waves.ceiling = Ceiling::wave;
   const Image bent = render(scene, plan(scene, theta), theta, {}, 1).intensity,
-              wave = render(waves, plan(waves, theta), theta, {}, 1).intensity,
+              wave = render(scene, plan(scene, {.ceiling = Ceiling::wave}, theta), theta, {}, 1).intensity,
               peer = read_pfm(data_path(file_of("jones", true)));
   const auto pixels = [](const Image& image) { return [&image](int c, int r, double, double) { return image(c, r); }; };
   const double straight_off = distance(pixels(peer), pixels(wave)).rms,

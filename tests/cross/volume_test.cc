@@ -22,6 +22,7 @@ constexpr double kPi = std::numbers::pi;
 
 struct Sampled {
   Scene scene;
+  Demand demand;
   TableBuilder t;
   Theta theta() const { return t.table.values(); }
 };
@@ -78,7 +79,7 @@ TEST(Volume, UniformBoxIsOneRetarder) {
     });
     Sampled s = sampled(grid, 0.11, 12, 0.25);
     s.t.table[s.scene.view.rotation_deg].value = 12;
-    const RenderPlan p = plan(s.scene, s.theta());
+    const RenderPlan p = plan(s.scene, s.demand, s.theta());
     const Image image = render(s.scene, p, s.theta()).intensity;
     const double phase = 2 * kPi / 0.59 * 8 * 0.9 * seen(1.52, 1.52 + order * 0.11, std::cos(tilt) * std::cos(tilt));
     const double expected = std::pow(std::sin(2 * (azimuth + 12 * kPi / 180)) * std::sin(phase / 2), 2);
@@ -91,7 +92,7 @@ TEST(Volume, UniformBoxIsOneRetarder) {
 TEST(Volume, BesideTheBoxTheFieldIsOpen) {
   Sampled s = sampled(grid_of(4, 4, 4, 0.5, [](int, int, int) { return director_tensor(0.6, 0.8, 0); }), 0.1, 40, 0.2);
   s.t.table[s.scene.microscope.analyzer_deg].value = 30;
-  const RenderPlan p = plan(s.scene, s.theta());
+  const RenderPlan p = plan(s.scene, s.demand, s.theta());
   const Image image = render(s.scene, p, s.theta()).intensity;
   EXPECT_NEAR(image(0, 0), 0.75, 1e-12);
   EXPECT_NEAR(image(39, 20), 0.75, 1e-12);
@@ -112,11 +113,11 @@ TEST(Volume, TwistedBoxIsGoochAndTarrys) {
       return director_tensor(std::cos(a), std::sin(a), 0);
     });
     Sampled s = sampled(grid, 0.09, 3, 0.01);
-    s.scene.ceiling = Ceiling::e_only;
-    s.scene.intensity_accuracy = 1e-9;
+    s.demand.ceiling = Ceiling::e_only;
+    s.demand.intensity_accuracy = 1e-9;
     s.t.table[s.scene.microscope.polarizer_deg].value = 0.3 * 180 / kPi;
     s.t.table[s.scene.microscope.analyzer_deg].value = 0.3 * 180 / kPi + 90;
-    const RenderPlan p = plan(s.scene, s.theta());
+    const RenderPlan p = plan(s.scene, s.demand, s.theta());
     const double u = 2 * depth * 0.09 / 0.59,
                  expected = 1 - std::pow(std::sin(0.5 * kPi * std::sqrt(1 + u * u)), 2) / (1 + u * u);
     const double error = std::abs(render(s.scene, p, s.theta()).intensity(1, 1) - expected);
@@ -193,14 +194,14 @@ TEST(Volume, AgreesWithThinSlices) {
   v.center_x_px = 10.3, v.center_y_px = 9.1, v.um_per_px = 0.1;
   v.slices = 400;
   Sampled s = sampled(grid_of(v), 0.15, 21, 0.1);
-  s.scene.ceiling = Ceiling::e_only;
+  s.demand.ceiling = Ceiling::e_only;
   for (const auto& [ref, value] : {std::pair{s.scene.microscope.polarizer_deg, 17.0},
                                    {s.scene.microscope.analyzer_deg, 71.0},
                                    {s.scene.view.rotation_deg, 25.0},
                                    {s.scene.view.center_x_px, 10.3},
                                    {s.scene.view.center_y_px, 9.1}})
     s.t.table[ref].value = value;
-  RenderPlan p = plan(s.scene, s.theta());
+  RenderPlan p = plan(s.scene, s.demand, s.theta());
   p.method = "magnus4";
   p.steps = 40 * (v.nz - 1);
   const Theta theta = s.theta();
@@ -219,7 +220,7 @@ TEST(Volume, AgreesWithThinSlices) {
 /// Its picture by waves at NA 0.5, pixels out to 1 um beyond a sphere of that radius.
 Sampled sampled_waves(std::shared_ptr<const VolumeGrid> grid, double radius_um, double host) {
   Sampled s = sampled(std::move(grid), 0.18, 48, (2 * radius_um + 2) / 48);
-  s.scene.ceiling = Ceiling::wave;
+  s.demand.ceiling = Ceiling::wave;
   s.scene.microscope.objective_na = s.t.fixed("objective_na", 0.5);
   s.scene.surround_index = s.t.fixed("index", host);
   return s;
@@ -234,7 +235,8 @@ double error_against_droplet(const Sampled& sampled_scene, const RenderPlan& p, 
   direct(exact, droplet);
   exact.scene.sample = droplet;
   const Theta with_diameter = exact.theta();
-  return picture_error(image, render(exact.scene, plan(exact.scene, with_diameter), with_diameter).intensity);
+  return picture_error(image,
+                       render(exact.scene, plan(exact.scene, exact.demand, with_diameter), with_diameter).intensity);
 }
 
 // A radial ball on 64^3 nodes, host outside, by its exact series. Propagation is within 0.01 to 0.02 of the picture's
@@ -244,7 +246,7 @@ double error_against_droplet(const Sampled& sampled_scene, const RenderPlan& p, 
 TEST(Volume, RadialBallByWavesIsItsSeries) {
   for (const double host : {1.47, 1.52, 1.6}) {
     const Sampled s = sampled_waves(grid_of(radial_ball(64, 2, 2.3)), 2, host);
-    const RenderPlan p = plan(s.scene, s.theta());
+    const RenderPlan p = plan(s.scene, s.demand, s.theta());
     const double error = error_against_droplet(s, p, 2, [](Sampled&, Droplet&) {});
     std::printf("radial ball on 64^3 nodes in %g: %.4f of the picture's RMS from the series\n", host, error);
     EXPECT_LT(error, 0.03) << host;
@@ -269,7 +271,7 @@ TEST(Volume, TurnedBipolarBallByWavesIsTheDroplet) {
   Sampled s = sampled_waves(grid, radius, 1.5);
   s.t.table[s.scene.view.rotation_deg].value = 25;
   s.t.table[s.scene.microscope.analyzer_deg].value = 70;
-  const RenderPlan p = plan(s.scene, s.theta());
+  const RenderPlan p = plan(s.scene, s.demand, s.theta());
   const auto bipolar = [&](double tilt_deg) {
     return error_against_droplet(s, p, radius, [&](Sampled& exact, Droplet& droplet) {
       exact.t.table[exact.scene.view.rotation_deg].value = 0;
@@ -292,7 +294,7 @@ TEST(Volume, BoxByWavesAgreesWithTheMarch) {
   });
   const Sampled s = sampled_waves(grid, 1.6, 1.5);
   const Theta theta = s.theta();
-  const RenderPlan p = plan(s.scene, theta);
+  const RenderPlan p = plan(s.scene, s.demand, theta);
   EXPECT_FALSE(p.warnings.empty());  // no ball is like it: its error is not measured
   const double apart = picture_error(render(s.scene, p, theta).intensity, image_by_march(s.scene, theta));
   std::printf("box: propagation and march %.4f of the picture's RMS apart\n", apart);
@@ -303,16 +305,16 @@ TEST(Volume, WavesAreRefusedWhereSomethingIsMissing) {
   Sampled s = sampled_waves(grid_of(radial_ball(8, 1, 1.2)), 1, 1.5);
   const auto refused = [&](const char* what) {
     try {
-      plan(s.scene, s.theta());
+      plan(s.scene, s.demand, s.theta());
     } catch (const UserError& error) {
       return error.problems().front().what.find(what) != std::string::npos;
     }
     return false;
   };
   EXPECT_FALSE(refused(""));
-  s.scene.method = "series";
+  s.demand.method = "series";
   EXPECT_TRUE(refused("radial droplets"));
-  s.scene.method = "auto";
+  s.demand.method = "auto";
   s.scene.microscope.objective_na = {};
   EXPECT_TRUE(refused("objective_na"));
   s.scene.microscope.objective_na = s.t.fixed("objective_na", 0.5);
@@ -328,7 +330,7 @@ TEST(Volume, WavesAreRefusedWhereSomethingIsMissing) {
 TEST(Volume, PixelMeansHoldTheAccuracy) {
   IndependentVolume v = radial_ball(24, 100, 4);
   Sampled s = sampled(grid_of(v), 0.12, 24, 0.3);
-  const RenderPlan p = plan(s.scene, s.theta());
+  const RenderPlan p = plan(s.scene, s.demand, s.theta());
   const Image image = render(s.scene, p, s.theta()).intensity;
   RenderPlan fine = p;
   fine.samples.assign(1, 8);
@@ -340,8 +342,8 @@ TEST(Volume, PixelMeansHoldTheAccuracy) {
     for (int c = 0; c < 24; ++c)
       // a defect is no place for a promise
       if (std::hypot(c - 11.5, r - 11.5) > 3) worst = std::max(worst, std::abs(image(c, r) - reference(c, r)));
-  EXPECT_LT(worst, 3 * s.scene.intensity_accuracy);  // measured on a few pixels of each ring
-  EXPECT_FALSE(p.left_out.empty());                  // straight rays
+  EXPECT_LT(worst, 3 * s.demand.intensity_accuracy);  // measured on a few pixels of each ring
+  EXPECT_FALSE(p.left_out.empty());                   // straight rays
 }
 
 }  // namespace

@@ -110,6 +110,7 @@ struct Case {
   std::string name;
   testing::TableBuilder t;
   Scene scene;
+  Demand demand;
   std::vector<int> parameters;
   Observable observable = {};
 };
@@ -422,10 +423,10 @@ std::vector<Case> cases() {
     volume.grid = grid;
     volume.scale = c.t.fixed("scale", 1.1);
     c.scene.sample = volume;
-    if (name.ends_with("alone")) c.scene.ceiling = Ceiling::e_only;
+    if (name.ends_with("alone")) c.demand.ceiling = Ceiling::e_only;
     if (waves) {
       grid->nodes[9] = {};  // the host: a surface inside
-      c.scene.ceiling = Ceiling::wave;
+      c.demand.ceiling = Ceiling::wave;
       c.scene.microscope.objective_na = c.t.fixed("objective_na", 0.6);
       c.scene.microscope.focus_um = c.t.fixed("focus_um", 0.7);
     }
@@ -435,7 +436,7 @@ std::vector<Case> cases() {
   for (const std::string name : {"waves: series", "waves: series of a shell", "waves: twisted", "waves: bipolar",
                                  "waves: hedgehog in a field", "waves: eccentric shell"}) {
     Case c = base(name);
-    c.scene.ceiling = Ceiling::wave;
+    c.demand.ceiling = Ceiling::wave;
     c.scene.microscope.objective_na = c.t.fixed("objective_na", 0.6);
     c.scene.microscope.focus_um = c.t.fixed("focus_um", 0.7);
     c.scene.microscope.aplanatic = name == "waves: series of a shell" || name == "waves: bipolar";
@@ -482,11 +483,11 @@ std::vector<Case> cases() {
 TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
   for (Case& c : cases()) {
     const Theta theta = c.t.table.values();
-    RenderPlan p = plan(c.scene, theta, c.observable);
+    RenderPlan p = plan(c.scene, c.demand, theta, c.observable);
     // Points that go from one part of a table to another jump by a little of the accuracy (PolarTable and RadialTable
     // look at that).
     p.disc.clear();
-    if (c.scene.ceiling != Ceiling::wave) p.radial_panels = 0;
+    if (c.demand.ceiling != Ceiling::wave) p.radial_panels = 0;
     std::vector<int> active;
     for (int i = 0; i < c.t.table.size(); ++i) active.push_back(i);
     const Rendering r = render(c.scene, p, theta, active, 1);
@@ -528,7 +529,7 @@ TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
 TEST(Gradients, SameBitsWhateverTheNumberOfThreads) {
   Case c = cases()[1];
   const Theta theta = c.t.table.values();
-  const RenderPlan p = plan(c.scene, theta, c.observable);
+  const RenderPlan p = plan(c.scene, c.demand, theta, c.observable);
   const Rendering one = render(c.scene, p, theta, {0, 1, 3}, 1), two = render(c.scene, p, theta, {0, 1, 3}, 2);
   EXPECT_EQ(one.intensity.values(), two.intensity.values());
   for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(one.derivatives[k].values(), two.derivatives[k].values());

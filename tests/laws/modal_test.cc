@@ -168,7 +168,7 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
       worst = std::max(worst, std::abs(a.intensity.values()[i] - b.intensity.values()[i]));
       brightest = std::max(brightest, b.intensity.values()[i]);
     }
-    EXPECT_LT(worst, 0.01 * scene.intensity_accuracy);
+    EXPECT_LT(worst, 0.01 * few.demand.intensity_accuracy);
     EXPECT_GT(brightest, 0.3);
     std::vector<int> carrying{scene.view.center_x_px.index, scene.view.center_y_px.index};
     std::visit(
@@ -277,7 +277,7 @@ TEST(FringeTable, SquaresThatAreNoLongerSmoothAreLeftToRays) {
     double worst = 0;
     for (std::size_t i = 0; i < a.intensity.size(); ++i)
       worst = std::max(worst, std::abs(a.intensity.values()[i] - b.intensity.values()[i]));
-    EXPECT_LT(worst, scene.intensity_accuracy) << degrees;
+    EXPECT_LT(worst, few.demand.intensity_accuracy) << degrees;
   }
 }
 
@@ -294,16 +294,15 @@ TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
   table.table[std::get<Plate>(scene.sample).half_angle_deg].value = 30;
   scene.view.camera =
       SideCamera{table.fixed("tilt_x_deg", 20), table.fixed("tilt_y_deg", 0), table.fixed("half_field_deg", 10)};
-  scene.method = "magnus4";
   const Theta theta = table.table.values();
-  const RenderPlan planned = plan(scene, theta);
+  const RenderPlan planned = plan(scene, {.method = "magnus4"}, theta);
   RenderPlan fine = planned;
   fine.samples = {8};
   const Image picture = render(scene, planned, theta).intensity, truth = render(scene, fine, theta).intensity;
   double worst = 0;
   for (std::size_t i = 0; i < picture.size(); ++i)
     worst = std::max(worst, std::abs(picture.values()[i] - truth.values()[i]));
-  EXPECT_LT(worst, scene.intensity_accuracy);
+  EXPECT_LT(worst, planned.demand.intensity_accuracy);
 }
 
 // Wherever squares and registers end, with derivatives or without, a picture is that of all rays.
@@ -327,7 +326,7 @@ TEST(FringeTable, AnyWidthWillDo) {
         double worst = 0;
         for (std::size_t i = 0; i < rays.size(); ++i)
           worst = std::max(worst, std::abs(picture.values()[i] - rays.values()[i]));
-        EXPECT_LT(worst, 0.01 * scene.intensity_accuracy) << width << " wide, derivatives: " << by.size();
+        EXPECT_LT(worst, 0.01 * planned.demand.intensity_accuracy) << width << " wide, derivatives: " << by.size();
       }
   }
 }

@@ -30,7 +30,7 @@ Kind small(Kind kind) {
   view.width = view.height = kSide;
   double pixel_um = share * kind.table.values()[static_cast<std::size_t>(view.pixel_size_um.index)];
   // Waves are sent through a box as large as the droplet: half of it costs an eighth.
-  if (auto* droplet = std::get_if<Droplet>(&kind.scene.sample); droplet && kind.scene.ceiling == Ceiling::wave)
+  if (auto* droplet = std::get_if<Droplet>(&kind.scene.sample); droplet && kind.demand.ceiling == Ceiling::wave)
     droplet->diameter_um = kind.number("diameter", 4), pixel_um *= 0.5;
   view.pixel_size_um = kind.number("pixel_size_um", pixel_um);
   return kind;
@@ -63,7 +63,7 @@ RenderPlan plan_of(Kind kind) {
   // Planned for elliptic light: for a picture that is as good as any.
   set_polarizers(kind.scene.microscope, kind, 17, 80);
   kind.scene.microscope.behind.emplace_back(retarder(kind, 70, 25));
-  return plan(kind.scene, kind.table.values());
+  return plan(kind.scene, kind.demand, kind.table.values());
 }
 
 struct Term {
@@ -286,13 +286,13 @@ TEST_F(Parts, ACompensatorThatUndoesACellLeavesDarkness) {
     kind.scene.sample = cell;
     kind.scene.material = ConstantIndices{kind.number("ordinary", 1.5), kind.number("birefringence", birefringence)};
     kind.scene.surround_index = kind.number("surround", 1.0);
-    kind.scene.ceiling = Ceiling::e_only;  // faces let ordinary and extraordinary light through alike: a retarder
+    kind.demand.ceiling = Ceiling::e_only;  // faces let ordinary and extraordinary light through alike: a retarder
     kind.scene.microscope.wavelength_nm = kind.number("wavelength", 550);
     const double p = between(0, 180);
     set_polarizers(kind.scene.microscope, kind, p, p + 90);
     const auto light = [&] {
       const Theta theta = kind.table.values();
-      return render(kind.scene, plan(kind.scene, theta), theta, {}, 1).intensity(0, 0);
+      return render(kind.scene, plan(kind.scene, kind.demand, theta), theta, {}, 1).intensity(0, 0);
     };
     EXPECT_GT(light(), 1e-4) << draw;
     const Retarder undoing = retarder(kind, -360 * thickness * birefringence / 0.55, axis);
@@ -328,7 +328,7 @@ TEST_F(Parts, WithoutBirefringenceLightFollowsMalus) {
     const double cos2 = std::pow(std::cos(between * 3.14159265358979323846 / 180), 2);
     const auto light = [&] {
       const Theta theta = kind.table.values();
-      return render(kind.scene, plan(kind.scene, theta), theta, {}, 1).intensity(0, 0);
+      return render(kind.scene, plan(kind.scene, kind.demand, theta), theta, {}, 1).intensity(0, 0);
     };
     kind.scene.microscope.analyzer_extinction_ratio = {};
     EXPECT_NEAR(light(), cos2, 1e-14);

@@ -114,11 +114,13 @@ struct Sphere {
 struct SphereScene {
   TableBuilder b;
   Scene scene;
+  Demand demand;
   std::vector<int> parameters;  ///< diameter, birefringence, ordinary index, host's index, wavelength, centre
 };
 /// Its scene, every pixel cut into `finer` x `finer`.
 SphereScene scene_of(const Sphere& sphere, const Director& director, double accuracy, int finer = 1) {
   SphereScene r;
+  r.demand.ceiling = sphere.ceiling, r.demand.intensity_accuracy = accuracy;
   TableBuilder& b = r.b;
   Scene& s = r.scene;
   Droplet droplet;
@@ -128,11 +130,9 @@ SphereScene scene_of(const Sphere& sphere, const Director& director, double accu
   const ConstantIndices material{b.fixed("ordinary", 1.52), b.fixed("birefringence", sphere.birefringence)};
   s.material = material;
   s.surround_index = b.fixed("surround", sphere.host);
-  s.ceiling = sphere.ceiling;
   s.microscope.wavelength_nm = b.fixed("wavelength_nm", sphere.wavelength_nm);
   s.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
   s.microscope.analyzer_deg = b.fixed("analyzer_deg", sphere.analyzer_deg);
-  s.intensity_accuracy = accuracy;
   s.view.width = s.view.height = sphere.size() * finer;
   s.view.pixel_size_um = b.fixed("pixel_size_um", sphere.pixel_um / finer);
   // The same place: pixel centres are whole numbers.
@@ -146,7 +146,7 @@ SphereScene scene_of(const Sphere& sphere, const Director& director, double accu
 }
 Image picture_of(const SphereScene& s) {
   const Theta theta = s.b.table.values();
-  return render(s.scene, plan(s.scene, theta), theta, {}, 1).intensity;
+  return render(s.scene, plan(s.scene, s.demand, theta), theta, {}, 1).intensity;
 }
 
 /// The largest difference of any pixel from the mean of pixels a ninth the size, in units of the accuracy asked of
@@ -387,7 +387,7 @@ TEST(PixelMeans, DerivativesAtRimsAndEdgesAreThoseOfDifferences) {
           sphere.ceiling = ceiling, sphere.host = host, sphere.analyzer_deg = analyzer;
           const SphereScene s = scene_of(sphere, sample.director, 1e-7);
           const Theta theta = s.b.table.values();
-          const RenderPlan p = plan(s.scene, theta);
+          const RenderPlan p = plan(s.scene, s.demand, theta);
           const Rendering exact = render(s.scene, p, theta, s.parameters, 1);
           for (std::size_t k = 0; k < s.parameters.size(); ++k) {
             // where the indices are equal the rim turns from grazing rays to total reflection
@@ -423,7 +423,6 @@ TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
         s.sample = droplet;
         s.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fixed("birefringence", 0.22)};
         s.surround_index = b.fixed("surround", 1.43);
-        s.ceiling = Ceiling::wave;
         s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
         s.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
         s.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
@@ -434,7 +433,7 @@ TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
         s.view.center_x_px = b.fixed("center_x", 0.5 * size + 0.3);
         s.view.center_y_px = b.fixed("center_y", 0.5 * size - 0.2);
         const Theta theta = b.table.values();
-        const RenderPlan planned = plan(s, theta);
+        const RenderPlan planned = plan(s, {.ceiling = Ceiling::wave}, theta);
         RenderPlan fine = planned;
         fine.samples = {8};
         const Image picture = render(s, planned, theta, {}, 1).intensity,
@@ -442,7 +441,8 @@ TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
         double worst = 0;
         for (std::size_t i = 0; i < picture.size(); ++i)
           worst = std::max(worst, std::abs(picture.values()[i] - truth.values()[i]));
-        EXPECT_LE(worst, s.intensity_accuracy) << diameter << " um, NA " << na << ", pixels of " << pixel << " um";
+        EXPECT_LE(worst, planned.demand.intensity_accuracy)
+            << diameter << " um, NA " << na << ", pixels of " << pixel << " um";
         EXPECT_LE(worst, 2 * planned.numerical_error)
             << diameter << " um, NA " << na << ", pixels of " << pixel << " um";
       }

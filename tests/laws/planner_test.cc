@@ -24,6 +24,7 @@ struct RandomScene {
   std::mt19937_64 random;
   TableBuilder table;
   Scene scene;
+  Demand demand;
   std::string kind;
 
   RandomScene(unsigned long seed, int size) : random(seed) {
@@ -45,7 +46,7 @@ RandomScene random_scene(unsigned long seed) {
   Scene& s = r.scene;
   const double n_o = between(1.45, 1.6), dn = between(-0.1, 0.25);
   s.material = ConstantIndices{b.fixed("ordinary", n_o), b.fixed("birefringence", dn)};
-  s.ceiling = between(0, 1) < 0.3 ? Ceiling::e_only : Ceiling::one_way;
+  r.demand.ceiling = between(0, 1) < 0.3 ? Ceiling::e_only : Ceiling::one_way;
   const int kind = static_cast<int>(between(0, 4));
   if (kind <= 1) {
     Droplet droplet;
@@ -98,7 +99,7 @@ RandomScene random_unsymmetric_scene(unsigned long seed) {
   Scene& s = r.scene;
   s.material = ConstantIndices{b.fixed("ordinary", between(1.45, 1.6)), b.fixed("birefringence", between(-0.1, 0.25))};
   s.surround_index = b.fixed("surround", between(1.4, 1.55));
-  s.ceiling = between(0, 1) < 0.3 ? Ceiling::e_only : Ceiling::one_way;
+  r.demand.ceiling = between(0, 1) < 0.3 ? Ceiling::e_only : Ceiling::one_way;
   Droplet droplet;
   const double diameter = std::pow(10, between(0.3, 1.3));
   droplet.diameter_um = b.fixed("diameter_um", diameter);
@@ -133,10 +134,10 @@ RandomScene random_unsymmetric_scene(unsigned long seed) {
 /// Worst pixel of the planned picture against one planned for 1e-7, over the accuracy asked.
 double worst_over_asked(RandomScene& r, double asked) {
   const Theta theta = r.table.table.values();
-  r.scene.intensity_accuracy = 1e-7;
-  const Image exact = render(r.scene, plan(r.scene, theta), theta, {}, 1).intensity;
-  r.scene.intensity_accuracy = asked;
-  const Image planned = render(r.scene, plan(r.scene, theta), theta, {}, 1).intensity;
+  r.demand.intensity_accuracy = 1e-7;
+  const Image exact = render(r.scene, plan(r.scene, r.demand, theta), theta, {}, 1).intensity;
+  r.demand.intensity_accuracy = asked;
+  const Image planned = render(r.scene, plan(r.scene, r.demand, theta), theta, {}, 1).intensity;
   double worst = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const double error = std::abs(planned.values()[i] - exact.values()[i]);
@@ -207,8 +208,8 @@ void expect_rays_kept(unsigned long first, unsigned long last) {
     RandomScene r = random_unsymmetric_scene(seed);
     const Theta theta = r.table.table.values();
     const double asked = std::pow(10, -2 - static_cast<double>(seed % 3));
-    r.scene.intensity_accuracy = asked;
-    const RenderPlan planned = plan(r.scene, theta);
+    r.demand.intensity_accuracy = asked;
+    const RenderPlan planned = plan(r.scene, r.demand, theta);
     RenderPlan exact = planned;
     for (DiscSquare& square : exact.disc) square.smooth = false, square.steps = 512;
     const Image a = render(r.scene, planned, theta, {}, 2).intensity,
@@ -232,9 +233,10 @@ TEST(LongPlanner, UnsymmetricDropletsAreWithinTheAccuracyAsked) { expect_rays_ke
 /// accuracy on the same pilot rays. Efforts as on the chart, twice as many each time, from one on; 0 where there is no
 /// choice.
 double planned_over_cheapest(const Scene& scene, const Theta& theta, const RenderPlan& planned) {
-  if (planned.method == "closed_form" || scene.ceiling == Ceiling::reflections) return 0;
+  if (planned.method == "closed_form" || planned.demand.ceiling == Ceiling::reflections) return 0;
   const Values<double> value(theta, {});
-  const Pilots pilots = kind_of(scene).pilots(scene, value);
+  const Pilots pilots = kind_of(scene).pilots(scene, planned.demand, value);
+  const double accuracy = planned.demand.intensity_accuracy;
   int cheapest = 1 << 30;
   for (const TransportMethod<double>* method : transport_methods<double>()) {
     if (method->info().reflections) continue;
@@ -243,7 +245,7 @@ double planned_over_cheapest(const Scene& scene, const Theta& theta, const Rende
       const Mesh mesh = pilots.mesh(n);
       const int samples = pilots.samples(*method, mesh);
       if (samples >= cheapest) break;
-      if (pilots.error(*method, mesh, scene.intensity_accuracy) <= scene.intensity_accuracy) cheapest = samples;
+      if (pilots.error(*method, mesh, accuracy) <= accuracy) cheapest = samples;
     }
   }
   const Mesh mesh = planned.mesh.empty() ? pilots.mesh(planned.steps) : planned.mesh;
@@ -255,13 +257,13 @@ void expect_economical(unsigned long first, unsigned long last) {
   for (unsigned long seed = first; seed <= last; ++seed) {
     RandomScene r = random_scene(seed);
     const Theta theta = r.table.table.values();
-    r.scene.intensity_accuracy = std::pow(10, -2 - static_cast<double>(seed % 3));
-    const RenderPlan planned = plan(r.scene, theta);
+    r.demand.intensity_accuracy = std::pow(10, -2 - static_cast<double>(seed % 3));
+    const RenderPlan planned = plan(r.scene, r.demand, theta);
     const double ratio = planned_over_cheapest(r.scene, theta, planned);
     auto& [count, worst] = seen[r.kind];
     ++count;
     worst = std::max(worst, ratio);
-    EXPECT_LE(ratio, 1.5) << r.kind << ", seed " << seed << ", asked " << r.scene.intensity_accuracy << ": "
+    EXPECT_LE(ratio, 1.5) << r.kind << ", seed " << seed << ", asked " << r.demand.intensity_accuracy << ": "
                           << planned.method << " " << planned.steps;
   }
   for (const auto& [kind, s] : seen)
@@ -285,7 +287,7 @@ TEST(Planner, ShippedScenesTakeAtMostHalfMoreSamplesThanTheCheapestMethod) {
       continue;
     }
     const Theta theta = config.job.parameters.values();
-    const RenderPlan planned = plan(config.scene, theta, config.observable);
+    const RenderPlan planned = plan(config.scene, config.job.demand, theta, config.observable);
     if (planned.physics == "wave") continue;  // no rays whose samples could be counted
     const double ratio = planned_over_cheapest(config.scene, theta, planned);
     judged += ratio > 0;
@@ -300,7 +302,7 @@ TEST(Planner, TotalReflectionOfOnePolarisationIsNoHole) {
   RandomScene r = random_scene(102);
   ASSERT_EQ(r.kind, "radial droplet");
   const Theta theta = r.table.table.values();
-  const Rendering image = render(r.scene, plan(r.scene, theta), theta, {0, 1}, 1);
+  const Rendering image = render(r.scene, plan(r.scene, r.demand, theta), theta, {0, 1}, 1);
   for (const double x : image.intensity.values()) EXPECT_TRUE(std::isfinite(x));
   for (const Image& d : image.derivatives)
     for (const double x : d.values()) EXPECT_TRUE(std::isfinite(x));

@@ -128,7 +128,7 @@ TEST(PolarTable, PicturesAreThoseOfRays) {
                 rays = render(j.scene, with_rays_alone(p), theta, {}, 2).intensity;
     // A hundredth of the accuracy at places between; a pixel's mean takes four thirds of five points' errors.
     const double error = largest_difference(table, rays);
-    EXPECT_LT(error, 3e-2 * j.scene.intensity_accuracy) << c.name;
+    EXPECT_LT(error, 3e-2 * Demand{}.intensity_accuracy) << c.name;
     EXPECT_GT(error, 0) << c.name;
     std::printf("  %-30s %3ld of %3zu parts smooth, off by %.1e\n", c.name, static_cast<long>(smooth), p.disc.size(),
                 error);
@@ -191,14 +191,14 @@ TEST(PolarTable, ACoreThatIsSeenTwiceHasNoDisc) {
   EXPECT_EQ(of_core(there), 0);
   EXPECT_LT(largest_difference(render(j.scene, there, theta, {}, 2).intensity,
                                render(j.scene, with_rays_alone(there), theta, {}, 2).intensity),
-            3e-2 * j.scene.intensity_accuracy);
+            3e-2 * Demand{}.intensity_accuracy);
   const Theta seen_twice = theta;
   set("offset_z_um", 0.2);
   const RenderPlan apart = plan(j.scene, theta);
   ASSERT_GT(of_core(apart), 0);
   EXPECT_LT(largest_difference(render(j.scene, apart, seen_twice, {}, 2).intensity,
                                render(j.scene, with_rays_alone(apart), seen_twice, {}, 2).intensity),
-            0.5 * j.scene.intensity_accuracy);
+            0.5 * Demand{}.intensity_accuracy);
 }
 
 // A fit moves the droplet, lets it grow and turns it with the plan it has; what is no longer smooth (a core's edge has
@@ -216,7 +216,7 @@ TEST(PolarTable, PartsFollowTheDroplet) {
                                               render(j.scene, with_rays_alone(p), theta, {}, 2).intensity);
       // Parts are given up at a tail of a tenth of the accuracy. Where a kink has just come in, between a part's end
       // and its first point, no tail shows it.
-      EXPECT_LT(error, 0.5 * j.scene.intensity_accuracy) << c.name;
+      EXPECT_LT(error, 0.5 * Demand{}.intensity_accuracy) << c.name;
     }
   }
 }

@@ -89,7 +89,8 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
     // The planner builds tables to 1e-3 of the accuracy; ten times that leaves room between the radii it looked at. A
     // director from elements has kinks between them, which polynomials follow to less, their slopes above all.
     const bool elements = c.field > 0;
-    EXPECT_LT(worst(read.intensity, direct.intensity), (elements ? 2e-2 : 1e-2) * s.intensity_accuracy) << c.name;
+    EXPECT_LT(worst(read.intensity, direct.intensity), (elements ? 2e-2 : 1e-2) * table.demand.intensity_accuracy)
+        << c.name;
     for (std::size_t j = 0; j < by.size(); ++j) {
       // To the accuracy asked for, relative to the largest. Derivatives of a root at its end have no bound: a
       // thousandth of the pixels is left out.
@@ -101,7 +102,8 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
       }
       std::sort(error.begin(), error.end());
       EXPECT_GT(size, 0) << c.name;
-      EXPECT_LT(error[error.size() - 1 - error.size() / 1000], (elements ? 5 : 1) * s.intensity_accuracy * size)
+      EXPECT_LT(error[error.size() - 1 - error.size() / 1000],
+                (elements ? 5 : 1) * table.demand.intensity_accuracy * size)
           << c.name << ", " << b.table[by[j]].name;
     }
   }

@@ -27,6 +27,7 @@ struct Droplet96 {
   Scene scene;
   Picture m;
   std::optional<Scene> nature;  ///< where it is not what the fit takes it for
+  Demand natural;               ///< how nature makes its picture
   ParameterRef diameter, birefringence, center_x, center_y, polarizer, analyzer, gain, offset;
 
   Droplet96() {
@@ -51,7 +52,7 @@ struct Droplet96 {
   Image light() const {
     const Theta theta = b.table.values();
     const Scene& seen = nature ? *nature : scene;
-    return render(seen, plan(seen, theta), theta, {}, 1).intensity;
+    return render(seen, plan(seen, natural, theta), theta, {}, 1).intensity;
   }
 };
 
@@ -334,7 +335,7 @@ TEST(WrongModel, IsNeverAGoodFitAroundAWrongNumber) {
          shell.wall_um = d.b.fixed("wall", 4);
          sample.director = shell;
        })},
-      {"curved rays", with([](Droplet96& d, birefit::Droplet&) { d.nature->rays = Rays::eikonal; })},
+      {"curved rays", with([](Droplet96& d, birefit::Droplet&) { d.natural.rays = Rays::eikonal; })},
       {"two droplets", with([](Droplet96&, birefit::Droplet&) {})}};
   for (auto [name, what] : cases) {
     if (std::string(name) == "two droplets")  // one above the other, to be seen through each other

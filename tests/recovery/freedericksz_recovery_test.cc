@@ -39,7 +39,6 @@ FitJob voltage_job(double v, double start, unsigned long seed, double pretilt_de
   scene.surround_index = b.fixed("surround", 1.5);
   scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
-  scene.ceiling = Ceiling::e_only;
   scene.view.width = scene.view.height = kSide;
   scene.view.rotation_deg = b.fixed("rotation_deg", 0);
   const ParameterRef gain = b.fixed("gain", kGain), offset = b.fixed("offset", 0);
@@ -59,6 +58,7 @@ FitJob voltage_job(double v, double start, unsigned long seed, double pretilt_de
                                              gain, offset, {3, 1}));
   }
   job.parameters = b.table;
+  job.demand.ceiling = Ceiling::e_only;
   job.options.threads = 1;
   return job;
 }

@@ -44,7 +44,7 @@ double chi_square_at(const Posed& posed, const Theta& theta) {
   double sum = 0;
   for (std::size_t g = 0; g < posed.job.measurements.size(); ++g) {
     const Picture& m = picture(posed.job, g);
-    const Image shown = render(m.scene, plan(m.scene, theta), theta, {}, 1).intensity;
+    const Image shown = render(m.scene, plan(m.scene, posed.job.demand, theta), theta, {}, 1).intensity;
     const auto of = [&](ParameterRef ref) { return theta[static_cast<std::size_t>(ref.index)]; };
     for (std::size_t i = 0; i < shown.values().size(); ++i)
       if (m.mask.values()[i])
@@ -326,10 +326,11 @@ TEST_P(RandomProblems, SymmetriesShowTheSamePictures) {
       others.push_back(posed.truth);
       others.back()[static_cast<std::size_t>(parameter)] += period;
     }
-    for (Scene scene : p.scenes) {
-      scene.intensity_accuracy = 1e-5;
+    Demand demand = p.demand;
+    demand.intensity_accuracy = 1e-5;
+    for (const Scene& scene : p.scenes) {
       const auto shown = [&](const Theta& theta) {
-        return render(scene, plan(scene, theta), theta, {}, 1).intensity.values();
+        return render(scene, plan(scene, demand, theta), theta, {}, 1).intensity.values();
       };
       const std::vector<double> expected = shown(posed.truth);
       for (const Theta& other : others) {
@@ -346,9 +347,10 @@ TEST_P(RandomProblems, PicturesAreTheProgramsToo) {
     RandomProblem p = draw(GetParam(), number);
     const Theta truth = p.b.table.values();
     for (std::size_t g = 0; g < p.light.size(); ++g) {
-      Scene scene = p.scenes[g];
-      scene.intensity_accuracy = 1e-5;
-      const std::vector<double> values = render(scene, plan(scene, truth), truth, {}, 1).intensity.values();
+      const Scene& scene = p.scenes[g];
+      Demand demand = p.demand;
+      demand.intensity_accuracy = 1e-5;
+      const std::vector<double> values = render(scene, plan(scene, demand, truth), truth, {}, 1).intensity.values();
       for (std::size_t i = 0; i < values.size(); ++i) {
         if (!p.masks.empty() && !p.masks[g].values()[i]) continue;
         ASSERT_NEAR(values[i], p.light[g][i], 3e-4) << number << " " << g;

@@ -42,7 +42,6 @@ FitJob pitch_job(double pitch_um, double azimuth_deg, std::mt19937_64& random) {
   scene.sample = Cell{b.fixed("thickness_um", kThickness), helix};
   scene.material = ConstantIndices{b.fixed("ordinary", 1.5), b.fixed("birefringence", kBirefringence)};
   scene.surround_index = b.fixed("surround", 1.5);
-  scene.ceiling = Ceiling::e_only;
   scene.view.width = scene.view.height = 1;
   scene.view.rotation_deg = b.fixed("rotation_deg", 0);
   const ParameterRef gain = b.fixed("gain", kGain), offset = b.fixed("offset", 0);
@@ -61,6 +60,7 @@ FitJob pitch_job(double pitch_um, double azimuth_deg, std::mt19937_64& random) {
           gain, offset, {kNoise, 0}));
     }
   job.parameters = b.table;
+  job.demand.ceiling = Ceiling::e_only;
   job.options.threads = 1;
   return job;
 }

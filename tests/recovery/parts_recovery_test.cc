@@ -74,7 +74,6 @@ TEST(PartsRecovery, TheApertureOfADropletByWaves) {
     scene.sample = droplet;
     scene.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fixed("birefringence", 0.15)};
     scene.surround_index = b.fixed("surround", 1.5);
-    scene.ceiling = Ceiling::wave;
     scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 560);
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
     scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
@@ -86,10 +85,11 @@ TEST(PartsRecovery, TheApertureOfADropletByWaves) {
     Theta truth = b.table.values();
     truth[static_cast<std::size_t>(droplet.diameter_um.index)] = kDiameter;
     truth[static_cast<std::size_t>(scene.microscope.objective_na.index)] = kAperture;
-    std::vector<double> mean = render(scene, plan(scene, truth), truth).intensity.values();
+    std::vector<double> mean = render(scene, plan(scene, {.ceiling = Ceiling::wave}, truth), truth).intensity.values();
     for (double& value : mean) value = kOffset + kGain * value;
     constexpr double kRead = 5, kPerPhoton = 0.5;
     FitJob job;
+    job.demand.ceiling = Ceiling::wave;
     job.measurements.push_back(
         micrograph_of("image", scene, camera(mean, kPerPhoton, kRead, 7, false), gain, offset, {kRead, kPerPhoton}));
     job.parameters = b.table;
@@ -121,11 +121,11 @@ FitJob leaking_cell(double ratio, bool known_light) {
   scene.surround_index = b.fixed("surround", 1.5);
   scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 1000 * truth.wavelength_um);
   scene.microscope.analyzer_extinction_ratio = b.fitted("extinction_ratio", 40, 2, 2000);
-  scene.ceiling = Ceiling::e_only;
   scene.view.width = scene.view.height = kSide;
   const ParameterRef gain = known_light ? b.fixed("gain", kGain) : b.linear("gain", 1500),
                      offset = known_light ? b.fixed("offset", kOffset) : b.linear("offset", 0);
   FitJob job;
+  job.demand.ceiling = Ceiling::e_only;
   unsigned long seed = 3;
   for (const double analyzer : {0.0, 30.0, 60.0, 90.0, 120.0}) {
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 20);

@@ -101,7 +101,7 @@ TEST(PlateRecovery, TruthIsTheRenderedImage) {
   std::printf("  %s, %d steps, %zu mesh, numerical %.1e; render against truth: rms %.2g, worst %.2g\n",
               chosen.method.c_str(), chosen.steps, chosen.mesh.size(), chosen.numerical_error, rms, worst);
   EXPECT_LT(rms, 2e-5);
-  EXPECT_LT(worst, scene.intensity_accuracy);
+  EXPECT_LT(worst, chosen.demand.intensity_accuracy);
 }
 
 // Start 30 % off, dozens of fringe orders away.

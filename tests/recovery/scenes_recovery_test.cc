@@ -39,6 +39,8 @@ struct Draw {
   }
 };
 
+const Demand kDemand{.intensity_accuracy = 1e-3};  // a tenth of the least noise
+
 void microscope(Draw& d, int size, double pixel_um, double half_field_um) {
   Scene& s = d.scene;
   s.microscope.wavelength_nm = d.b.fixed("wavelength_nm", 590);
@@ -52,7 +54,6 @@ void microscope(Draw& d, int size, double pixel_um, double half_field_um) {
   s.view.center_y_px =
       half_field_um > 0 ? d.drawn("center_y", middle - 1, middle + 1, 1) : d.b.fixed("center_y", middle);
   s.view.rotation_deg = d.b.fixed("rotation_deg", 0);
-  s.intensity_accuracy = 1e-3;  // a tenth of the least noise
 }
 
 void droplet(Draw& d, const std::function<void(Draw&, Droplet&)>& director) {
@@ -85,11 +86,12 @@ Scatter scatter(int draws, const std::function<void(Draw&)>& make, const std::st
     Fitted& f = fitted[static_cast<std::size_t>(i)];
     f.truth = d.b.table;
     const Theta truth = f.truth.values();
-    const Image exact = render(d.scene, plan(d.scene, truth), truth, {}, 1).intensity;
+    const Image exact = render(d.scene, plan(d.scene, kDemand, truth), truth, {}, 1).intensity;
     std::vector<double> counts;
     std::normal_distribution<double> noise(0, kNoise);
     for (double value : exact.values()) counts.push_back(kGain * value + noise(d.random));
     FitJob job;
+    job.demand = kDemand;
     job.options.threads = 1;
     job.options.scan_pixels = 200;  // bounds within a fringe or two: searches have their own test
     job.options.scan_candidates = 2;
@@ -229,9 +231,10 @@ TEST(BranchRecovery, TheBranchThatMadeThePictureIsReported) {
     const Theta truth = d.b.table.values();
     std::vector<double> counts;
     std::normal_distribution<double> noise(0, kNoise);
-    const Image exact = render(d.scene, plan(d.scene, truth), truth, {}, 2).intensity;
+    const Image exact = render(d.scene, plan(d.scene, kDemand, truth), truth, {}, 2).intensity;
     for (double value : exact.values()) counts.push_back(kGain * value + noise(d.random));
     FitJob job;
+    job.demand = kDemand;
     const ParameterRef gain = d.b.linear("gain", 900), offset = d.b.linear("offset", 5);
     job.measurements.push_back(micrograph_of("branch", d.scene, counts, gain, offset, {kNoise, 0}));
     job.parameters = d.b.table;
@@ -281,9 +284,10 @@ TEST(LongBranchRecovery, TheLikelierBranchIsTheTrueOne) {
     const Theta truth = d.b.table.values();
     std::vector<double> counts;
     std::normal_distribution<double> normal(0, noise);
-    const Image exact = render(d.scene, plan(d.scene, truth), truth, {}, 1).intensity;
+    const Image exact = render(d.scene, plan(d.scene, kDemand, truth), truth, {}, 1).intensity;
     for (const double value : exact.values()) counts.push_back(kGain * value + normal(d.random));
     FitJob job;
+    job.demand = kDemand;
     job.options.threads = 1;
     job.options.scan_pixels = 200;  // bounds within a fringe: the search is for the branch
     job.options.scan_candidates = 2;

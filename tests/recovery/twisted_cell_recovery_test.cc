@@ -36,7 +36,6 @@ FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed
   scene.material = ConstantIndices{b.fixed("ordinary", 1.5), b.fitted("birefringence", 0.12, 0.09, 0.17)};
   scene.surround_index = b.fixed("surround", 1.5);
   scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 1000 * kWavelength);
-  scene.ceiling = Ceiling::e_only;
   scene.view.width = scene.view.height = kSide;
   scene.view.rotation_deg = b.fixed("rotation", 0);
   const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
@@ -70,6 +69,7 @@ FitJob cell_job(double counts_per_photon, double read_counts, unsigned long seed
     ++k;
   }
   job.parameters = b.table;
+  job.demand.ceiling = Ceiling::e_only;
   job.options.threads = 1;
   return job;
 }

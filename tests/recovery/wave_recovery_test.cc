@@ -30,13 +30,11 @@ struct WaveDraw {
   FitJob job(Ceiling ceiling, const std::string& method) const {
     FitJob job;
     TableBuilder table = b;
-    Scene fitted = scene;
-    fitted.ceiling = ceiling;
-    fitted.method = method;
+    job.demand = {.ceiling = ceiling, .method = method};
     const ParameterRef gain = table.linear("gain", 900), offset = table.linear("offset", 5);
     // Nobody's gain is below zero: that would pass off dark fringes as bright ones.
     table.table[gain].lower = table.table[gain].physical_lower = 0;
-    job.measurements.push_back(micrograph_of("droplet", fitted, counts, gain, offset, {noise, 0}));
+    job.measurements.push_back(micrograph_of("droplet", scene, counts, gain, offset, {noise, 0}));
     job.parameters = table.table;
     return job;
   }
@@ -331,7 +329,6 @@ struct BipolarDraw {
                  azimuth = between(10, 80), tilt = between(0, 50), aperture = between(0.4, 0.7);
     const double middle = 0.5 * (kSize - 1), cx = middle + between(-1, 1), cy = middle + between(-1, 1);
     Scene& s = droplet;
-    s.ceiling = Ceiling::wave;
     s.material = ConstantIndices{b.fixed("ordinary", 1.52), b.fitted("birefringence", between(0.9, 1.1) * birefringence,
                                                                      0.6 * birefringence, 1.4 * birefringence)};
     s.surround_index = b.fixed("surround", host);
@@ -393,6 +390,7 @@ void check_bipolar(bool as_samples, int draws, double least_share) {
   for (int i = first_problem(); i < first_problem() + draws; ++i) {
     BipolarDraw d(static_cast<unsigned>(i), as_samples);
     FitJob job;
+    job.demand.ceiling = Ceiling::wave;
     const ParameterRef gain = d.b.linear("gain", 900), offset = d.b.linear("offset", 5);
     job.measurements.push_back(
         micrograph_of("droplet", as_samples ? d.sampled : d.droplet, d.counts, gain, offset, {d.noise, 0}));

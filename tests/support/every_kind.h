@@ -17,6 +17,7 @@ struct Kind {
   std::string name;
   ParameterTable table;
   Scene scene;
+  Demand demand;
   std::vector<int> four;  ///< to differentiate by; fewer where the kind has fewer
 
   ParameterRef number(const std::string& what, double value) { return table.add_constant(what, value); }
@@ -160,9 +161,9 @@ inline std::vector<Kind> every_kind() {
   std::vector<Kind> all;
   constexpr int kSize = 500;
   constexpr double kPixelUm = 0.025;
-  const auto add = [&](const char* name, int size, double pixel_um, Sample (*sample)(Kind&)) -> Scene& {
+  const auto add = [&](const char* name, int size, double pixel_um, Sample (*sample)(Kind&)) -> Kind& {
     all.push_back(scene_of(name, size, pixel_um, sample));
-    return all.back().scene;
+    return all.back();
   };
   add("radial", kSize, kPixelUm, radial);
   add("twisted", kSize, kPixelUm, twisted);
@@ -176,16 +177,17 @@ inline std::vector<Kind> every_kind() {
   add("cell", 8, 0, cell);
   add("cell_in_field", 8, 0, cell_in_field);
   add("volume", 200, 0.07, volume);
-  add("curved", 128, 0.1, radial).rays = Rays::eikonal;
-  add("curved_shell", 128, 0.1, shell).rays = Rays::eikonal;
+  add("curved", 128, 0.1, radial).demand.rays = Rays::eikonal;
+  add("curved_shell", 128, 0.1, shell).demand.rays = Rays::eikonal;
   for (const bool exactly : {true, false}) {
-    Scene& scene = add(exactly ? "waves_series" : "waves_propagated", 160, 0.08, exactly ? radial : bipolar);
-    scene.ceiling = Ceiling::wave;
-    scene.microscope.objective_na = all.back().number("objective_na", 0.8);
+    Kind& kind = add(exactly ? "waves_series" : "waves_propagated", 160, 0.08, exactly ? radial : bipolar);
+    kind.demand.ceiling = Ceiling::wave;
+    kind.scene.microscope.objective_na = kind.number("objective_na", 0.8);
   }
   for (birefit::study::FrameScene& f : birefit::study::frame_scenes()) {
     if (std::holds_alternative<Droplet>(f.scene.sample)) continue;
-    all.push_back({f.name, std::move(f.table), std::move(f.scene), {f.parameters.begin(), f.parameters.begin() + 4}});
+    all.push_back(
+        {f.name, std::move(f.table), std::move(f.scene), {}, {f.parameters.begin(), f.parameters.begin() + 4}});
   }
   return all;
 }

@@ -131,7 +131,7 @@ inline Scene cell_scene(RandomProblem& p, const CellSize& size, const CellAngle&
   s.sample = sample;
   s.material = ConstantIndices{p.b.fixed("ordinary", 1.5), size.birefringence};
   s.surround_index = p.b.fixed("surround", 1.5);
-  s.ceiling = Ceiling::e_only;  // what the independent models compute
+  p.demand.ceiling = Ceiling::e_only;  // what the independent models compute
   return s;
 }
 

@@ -58,7 +58,7 @@ inline void freedericksz_table(RandomProblem& p) {
   Scene s = seen(p, 1, 1);
   s.material = ConstantIndices{p.b.fixed("ordinary", model.n_o), p.b.fixed("birefringence", birefringence)};
   s.surround_index = p.b.fixed("surround", model.n_o);
-  s.ceiling = Ceiling::e_only;
+  p.demand.ceiling = Ceiling::e_only;
   const double wavelength_um = p.between(0.45, 0.65);
   s.microscope.wavelength_nm = p.b.fixed("wavelength", 1000 * wavelength_um);
   const bool crossed = p.chance(0.7);

@@ -26,6 +26,7 @@ constexpr double kProblemGain = 1000;
 struct RandomProblem {
   TableBuilder b;
   std::vector<Scene> scenes;
+  Demand demand;
   /// What each scene shows, by a model that shares no code with the program; empty: the program's own render.
   std::vector<std::vector<double>> light;
   std::vector<Mask> masks;  ///< of each scene; none: all pixels
@@ -97,7 +98,7 @@ inline Posed pose(RandomProblem& p, const std::string& name, Ceiling ceiling = C
   Posed posed;
   for (Scene& scene : p.scenes) {
     if (ceiling != Ceiling::wave) continue;
-    scene.ceiling = ceiling;
+    p.demand.ceiling = ceiling;
     scene.microscope.objective_na = p.b.fixed("objective_na", p.between(0.4, 0.9));
   }
   posed.noise = kProblemGain * p.scaled(p.least_noise, 0.05);
@@ -106,9 +107,10 @@ inline Posed pose(RandomProblem& p, const std::string& name, Ceiling ceiling = C
   std::vector<std::vector<double>> pictures;
   for (std::size_t g = 0; g < p.scenes.size(); ++g) {
     if (p.light.empty()) {
-      Scene exact = p.scenes[g];
-      if (ceiling != Ceiling::wave) exact.intensity_accuracy = 1e-5;
-      pictures.push_back(render(exact, plan(exact, posed.truth), posed.truth, {}, 1).intensity.values());
+      Demand demand = p.demand;
+      if (ceiling != Ceiling::wave) demand.intensity_accuracy = 1e-5;
+      const Scene& scene = p.scenes[g];
+      pictures.push_back(render(scene, plan(scene, demand, posed.truth), posed.truth, {}, 1).intensity.values());
     } else {
       pictures.push_back(p.light[g]);
     }
@@ -138,6 +140,7 @@ inline Posed pose(RandomProblem& p, const std::string& name, Ceiling ceiling = C
     if (!p.masks.empty()) std::get<Picture>(posed.job.measurements.back()).mask = p.masks[g];
   }
   posed.job.parameters = p.b.table;
+  posed.job.demand = p.demand;
   posed.job.options.threads = 1;
   return posed;
 }

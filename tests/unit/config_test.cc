@@ -224,7 +224,7 @@ TEST_F(Config, WavesOfASampledFieldNeedApertureAndSurround) {
 
 TEST_F(Config, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
   const std::string without = replaced(kRender, ", objective_na: 0.8", ""), &with_objective = kRender;
-  const auto ceiling = [&](const std::string& text) { return load(text).scene.ceiling; };
+  const auto ceiling = [&](const std::string& text) { return load(text).job.demand.ceiling; };
   EXPECT_EQ(ceiling(without), Ceiling::one_way);
   EXPECT_EQ(ceiling(with_objective), Ceiling::wave);
   EXPECT_EQ(ceiling(with_objective + "physics: {rays: straight}\n"), Ceiling::one_way);
@@ -320,7 +320,7 @@ TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
   // The shared one on the mid plane, one image's not: waves, or an error.
   const std::string own = "micrographs:\n  - {image: a.tif}\n  - {image: b.tif, set: {microscope.focus_um: -1}}\n" +
                           replaced(one, "objective_na: 0.8", "objective_na: 0.8, focus_um: 0");
-  EXPECT_EQ(picture(load(own + "physics: {max_seconds: 0}\n", ConfigUse::fit).job, 0).scene.ceiling, Ceiling::wave);
+  EXPECT_EQ(load(own + "physics: {max_seconds: 0}\n", ConfigUse::fit).job.demand.ceiling, Ceiling::wave);
   EXPECT_NE(mistakes(own + "physics: {ceiling: one_way}\n", ConfigUse::fit).find("defocus needs wave optics"),
             std::string::npos);
 }

@@ -213,7 +213,7 @@ TEST_F(Materials, ABirefringenceFactorLeavesTheOrdinaryIndex) {
 TEST_F(Materials, WhatTheLiteratureDoesNotKnowIsAModelErrorUntilItIsFitted) {
   const auto model_error = [&](const std::string& material) {
     const birefit::Config config = load(material, 589);
-    return plan(config.scene, config.job.parameters.values()).model_error;
+    return plan(config.scene, config.job.demand, config.job.parameters.values()).model_error;
   };
   // 5 um of E7 retard by 11.6 rad, 4 % of that are 0.46 rad: up to 0.23 in intensity.
   const double known = model_error("{name: E7}");
@@ -242,13 +242,13 @@ TEST_F(Materials, NothingIsExtrapolated) {
 TEST_F(Materials, ScenesMadeInCodeAreCheckedByThePlanner) {
   birefit::Config config = load("{name: 5CB, haller: {clearing_k: 308.7, exponent: 0.16}, temperature_k: 300}", 589);
   Theta theta = config.job.parameters.values();
-  EXPECT_NO_THROW(plan(config.scene, theta));
+  EXPECT_NO_THROW(plan(config.scene, config.job.demand, theta));
   Theta warm = theta;
   warm[static_cast<std::size_t>(std::get<LawIndices>(config.scene.material).temperature_k.index)] = 309;
-  EXPECT_THROW(plan(config.scene, warm), UserError);
+  EXPECT_THROW(plan(config.scene, config.job.demand, warm), UserError);
   Theta red = theta;
   red[static_cast<std::size_t>(config.scene.microscope.wavelength_nm.index)] = 700;
-  EXPECT_THROW(plan(config.scene, red), UserError);
+  EXPECT_THROW(plan(config.scene, config.job.demand, red), UserError);
 }
 
 TEST_F(Materials, EveryMistakeHasItsPlace) {
@@ -297,7 +297,7 @@ TEST_F(Materials, HeatedPlateTakesAnyNematic) {
         "589}, polarizer_deg: 0, analyzer_deg: 90}\n");
   const birefit::Config config = load_config(folder_ / "plate.yaml", ConfigUse::render);
   const Theta theta = config.job.parameters.values();
-  EXPECT_NO_THROW(plan(config.scene, theta));
+  EXPECT_NO_THROW(plan(config.scene, config.job.demand, theta));
   write("hot.yaml",
         "image_size_px: [8, 8]\nsample:\n  plate: {thickness_um: 50, director: {uniform: {axis: [1, 1, 0]}}, heat: "
         "{fourier_number: 0.1, cold_k: 290, hot_k: 309}, view: {half_angle_deg: 5}}\n"

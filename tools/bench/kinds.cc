@@ -48,7 +48,7 @@ class Timed {
   Timed(const Kind& kind, bool derivatives)
       : kind_(kind),
         theta_(kind.table.values()),
-        plan_(plan(kind.scene, theta_)),
+        plan_(plan(kind.scene, kind.demand, theta_)),
         active_(derivatives ? kind.four : std::vector<int>{}) {}
   double seconds() {
     return seconds_of([&] { render(kind_.scene, plan_, theta_, active_, 1, out_); });

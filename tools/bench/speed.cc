@@ -83,6 +83,7 @@ double seconds_of(const std::function<void()>& work) {
 struct DropletScene {
   ParameterTable table;
   Scene scene;
+  Demand demand;
   std::vector<int> four, eight;
 };
 /// 500 x 500 pixels, E12, 9.3 um in 1.43 at 590 nm; twisted: the fully coupled scene.
@@ -101,7 +102,7 @@ DropletScene droplet_scene(bool twisted, int size, double pixel_um) {
   s.scene.microscope.polarizer_deg = s.table.add_constant("polarizer_deg", 0);
   s.scene.microscope.analyzer_deg = s.table.add_constant("analyzer_deg", 90);
   s.scene.view.width = s.scene.view.height = size;
-  s.scene.view.pixel_size_um = pixel_um;
+  s.scene.view.pixel_size_um = s.table.add_constant("pixel_size_um", pixel_um);
   s.scene.view.center_x_px = s.table.add_constant("center_x", 0.5 * size + 0.3);
   s.scene.view.center_y_px = s.table.add_constant("center_y", 0.5 * size - 0.2);
   s.four = {droplet.diameter_um.index, material.birefringence.index, s.scene.view.center_x_px.index,
@@ -192,10 +193,8 @@ void time_waves(int rounds) {
     s.scene.microscope.objective_na = s.table.add_constant("objective_na", 0.8);
     const Theta theta = s.table.values();
     const RenderPlan rays = plan(s.scene, theta);
-    s.scene.ceiling = Ceiling::wave;
-    const RenderPlan series = plan(s.scene, theta);
-    s.scene.method = "split_step";
-    const RenderPlan propagated = plan(s.scene, theta);
+    const RenderPlan series = plan(s.scene, {.ceiling = Ceiling::wave}, theta);
+    const RenderPlan propagated = plan(s.scene, {.ceiling = Ceiling::wave, .method = "split_step"}, theta);
     // Diameter and indices change the light itself; two of `four` only move the picture.
     const std::vector<int> of_light{s.eight[0], s.eight[1], s.eight[4], s.eight[5]};
     Rendering out, derivatives;
@@ -282,9 +281,8 @@ void time_curved(int rounds) {
       if (ring > 0) axial.ring_radius = s.table.add_constant("ring_radius", ring);
       droplet.director = axial;
     }
-    s.scene.rays = Rays::eikonal;
     const Theta theta = s.table.values();
-    const RenderPlan p = plan(s.scene, theta);
+    const RenderPlan p = plan(s.scene, {.rays = Rays::eikonal}, theta);
     Rendering out, out_four;
     std::vector<double> image, four;
     for (int i = 0; i < rounds; ++i) {
@@ -374,6 +372,7 @@ FitJob job_of(DropletScene s, Image values, const std::array<Range, 4>& ranges, 
   micrograph.scene = s.scene;
   FitJob job;
   job.parameters = s.table;
+  job.demand = s.demand;
   job.measurements = {micrograph};
   return job;
 }
@@ -435,13 +434,13 @@ void time_fit_by_waves() {
   bipolar.azimuth_deg = s.table.add_constant("azimuth_deg", 30);
   bipolar.tilt_deg = s.table.add_constant("tilt_deg", 0);
   std::get<Droplet>(s.scene.sample).director = bipolar;
-  s.scene.ceiling = Ceiling::wave;
+  s.demand.ceiling = Ceiling::wave;
   s.scene.microscope.objective_na = s.table.add_constant("objective_na", 0.8);
   s.table[s.scene.surround_index].value = 1.5;
   const std::array<double, 4> truth{9.0, 0.12, 80.3, 79.2};
   for (std::size_t k = 0; k < truth.size(); ++k) s.table[s.four[k]].value = truth[k];
   const Theta theta = s.table.values();
-  Image values = render(s.scene, plan(s.scene, theta), theta).intensity;
+  Image values = render(s.scene, plan(s.scene, s.demand, theta), theta).intensity;
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0, 0.002);
   for (double& value : values.values()) value += noise(random);
@@ -466,12 +465,12 @@ void time_fit(int size, int rounds, bool by_waves) {
   DropletScene s = droplet_scene(false, size, truth.pixel_um);
   std::vector<double> mean;
   if (by_waves) {
-    s.scene.ceiling = Ceiling::wave;
+    s.demand.ceiling = Ceiling::wave;
     s.scene.microscope.objective_na = s.table.add_constant("objective_na", 0.75);
     const std::array<double, 4> values{9.3, 0.22, truth.center_x_px, truth.center_y_px};
     for (std::size_t k = 0; k < values.size(); ++k) s.table[s.four[k]].value = values[k];
     const Theta theta = s.table.values();
-    const Image intensity = render(s.scene, plan(s.scene, theta), theta).intensity;
+    const Image intensity = render(s.scene, plan(s.scene, s.demand, theta), theta).intensity;
     for (const double value : intensity.values()) mean.push_back(150 + 3200 * value);
   } else {
     for (int row = 0; row < size; ++row)
@@ -520,7 +519,7 @@ int main(int argc, char** argv) {
       if (i < 3) rays_scalar.push_back(seconds_of([&] { render_scalar(s.scene, every, theta); }));
     }
     std::printf("500 x 500 %s droplet (%s, %d steps, accuracy %.0e):\n", twisted ? "twisted" : "radial",
-                p.method.c_str(), p.steps, s.scene.intensity_accuracy);
+                p.method.c_str(), p.steps, p.demand.intensity_accuracy);
     std::printf("  image, all threads            %8.2f ms\n", 1e3 * median(both));
     std::printf("  image, one thread             %8.2f ms   %.2f times all threads\n", 1e3 * median(one),
                 ratio(one, both));

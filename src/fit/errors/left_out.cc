@@ -77,10 +77,12 @@ void measure_propagation(const Task& task, const Optimum& optimum, LeftOut& left
     if (!twin) return;
     try {
       pictures.emplace_back();
-      for (const Scene& scene : twin->scenes)
+      for (std::size_t i = 0; i < twin->scenes.size(); ++i) {
+        const Scene& scene = twin->scenes[i];
+        const RenderPlan chosen = plan(scene, RadialTwin::demand(i, task.job.demand), twin->theta);
         pictures.back().push_back(
-            lit(m, optimum.theta,
-                render(scene, plan(scene, twin->theta), twin->theta, {}, task.job.options.threads).intensity));
+            lit(m, optimum.theta, render(scene, chosen, twin->theta, {}, task.job.options.threads).intensity));
+      }
     } catch (const UserError& error) {  // too large for the series
       left_out.warnings.push_back(std::string("What wave propagation errs by could not be measured on a ball of this "
                                               "size; the error bars do not contain it. ") +
@@ -109,15 +111,13 @@ void measure_propagation(const Task& task, const Optimum& optimum, LeftOut& left
 }
 
 void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {
-  const auto has_curved = [](const Sight& sight) {
-    const Scene& scene = sight.picture->scene;
-    return has_curved_rays(scene) && scene.rays == Rays::straight && scene.ceiling != Ceiling::wave;
-  };
-  if (optimum.stopped || task.unknowns.searched.empty() ||
-      !std::all_of(task.sights.begin(), task.sights.end(), has_curved))
+  const auto has_curved = [](const Sight& sight) { return has_curved_rays(sight.picture->scene); };
+  const Demand& demand = task.job.demand;
+  if (optimum.stopped || demand.rays != Rays::straight || demand.ceiling == Ceiling::wave ||
+      task.unknowns.searched.empty() || !std::all_of(task.sights.begin(), task.sights.end(), has_curved))
     return;
   FitJob curved = task.job;
-  for_each_scene(curved.measurements, [](Scene& scene) { scene.rays = Rays::eikonal; });
+  curved.demand.rays = Rays::eikonal;
   const Task curved_task(curved);
   std::vector<RenderPlan> plans, straight_plans;
   std::vector<PixelSet> sets;
@@ -174,25 +174,23 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
 void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {
   const auto has_waves = [](const Sight& sight) {
     const Scene& scene = sight.picture->scene;
-    return std::holds_alternative<Droplet>(scene.sample) && scene.ceiling == Ceiling::one_way &&
-           scene.microscope.objective_na;
+    return std::holds_alternative<Droplet>(scene.sample) && scene.microscope.objective_na;
   };
   const FitJob& job = task.job;
-  if (optimum.stopped || task.unknowns.searched.empty() ||
+  if (optimum.stopped || job.demand.ceiling != Ceiling::one_way || task.unknowns.searched.empty() ||
       !std::all_of(task.sights.begin(), task.sights.end(), has_waves))
     return;
   constexpr double kMostSeconds = 10;  // for a warning
+  const Demand by_waves{.ceiling = Ceiling::wave, .intensity_accuracy = job.demand.intensity_accuracy};
   std::vector<Image> values;
   for (int g = 0; g < task.frames(); ++g) {
     const Picture& micrograph = task.picture(g);
-    Scene waves = micrograph.scene;
-    waves.ceiling = Ceiling::wave;
-    waves.method = "auto";
-    waves.rays = Rays::straight;
-    const WaveChoice choice = wave_choice(waves, optimum.theta);
+    const Scene& scene = micrograph.scene;
+    const WaveChoice choice = wave_choice(scene, by_waves, optimum.theta);
     if (choice.seconds_an_image > (job.options.choose_waves ? job.options.max_seconds : kMostSeconds)) return;
-    values.push_back(lit(micrograph, optimum.theta,
-                         render(waves, plan(waves, optimum.theta), optimum.theta, {}, job.options.threads).intensity));
+    values.push_back(
+        lit(micrograph, optimum.theta,
+            render(scene, plan(scene, by_waves, optimum.theta), optimum.theta, {}, job.options.threads).intensity));
   }
   const Eigen::VectorXd change = change_by_values(task, optimum, values, 12);
   const Shift shift = largest_shift(task, change, sd);

@@ -47,7 +47,7 @@ struct Task {
   const Picture& picture(int frame) const { return *sights[static_cast<std::size_t>(frame)].picture; }
   const Observable& observable(int frame) const { return sights[static_cast<std::size_t>(frame)].observable; }
   RenderPlan planned(int frame, const Theta& theta) const {
-    return plan(picture(frame).scene, theta, observable(frame));
+    return plan(picture(frame).scene, job.demand, theta, observable(frame));
   }
   const Parameter& searched(std::size_t j) const { return job.parameters[unknowns.searched[j]]; }
   /// `searched` in the table's places.

@@ -13,11 +13,10 @@ namespace {
 FitJob job_by_rays(const FitJob& job) {
   FitJob by_rays = job;
   by_rays.branches.clear();
-  for_each_scene(by_rays.measurements, [](Scene& scene) {
-    scene.ceiling = Ceiling::one_way, scene.method = "auto", scene.microscope.focus_um = {};
-    // They are off by a quarter of the image: good enough to start from.
-    scene.intensity_accuracy = std::max(scene.intensity_accuracy, 1e-2);
-  });
+  for_each_scene(by_rays.measurements, [](Scene& scene) { scene.microscope.focus_um = {}; });
+  // They are off by a quarter of the image: good enough to start from.
+  by_rays.demand.ceiling = Ceiling::one_way, by_rays.demand.method = "auto";
+  by_rays.demand.intensity_accuracy = std::max(job.demand.intensity_accuracy, 1e-2);
   return by_rays;
 }
 

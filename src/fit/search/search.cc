@@ -88,16 +88,18 @@ PixelSet mean_of(const Picture& micrograph, const Frame& frame) {
 
 /// Rough enough to be quick, and finer than what the mean of a frame is known to: what the plan is off by would be
 /// another minimum's advantage.
-RenderPlan rough_plan(Scene scene, const Observable& observable, const Theta& theta) {
+RenderPlan rough_plan(const Task& task, int g, const Theta& theta) {
   constexpr double kRough = 1e-4;
-  scene.intensity_accuracy = std::max(scene.intensity_accuracy, kRough);
-  return plan(scene, theta, observable);
+  Demand demand = task.job.demand;
+  demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
+  return plan(task.picture(g).scene, demand, theta, task.observable(g));
 }
 /// Of hundreds of pixels, each with noise of its own, that are rays of their own: a third of a percent tells valleys.
-RenderPlan rougher_plan(Scene scene, const Theta& theta) {
+RenderPlan rougher_plan(const Task& task, int g, const Theta& theta) {
   constexpr double kRough = 3e-3;
-  scene.intensity_accuracy = std::max(scene.intensity_accuracy, kRough);
-  return plan(scene, theta);
+  Demand demand = task.job.demand;
+  demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
+  return plan(task.picture(g).scene, demand, theta);
 }
 
 /// The problem of what the grid looks at.
@@ -110,8 +112,8 @@ std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, co
     sets.push_back(is_one_number(micrograph)
                        ? mean_of(micrograph, frame)
                        : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g))));
-    plans.push_back(is_one_number(micrograph)      ? rough_plan(micrograph.scene, task.observable(g), theta)
-                    : has_own_rays(task, frame, g) ? rougher_plan(micrograph.scene, theta)
+    plans.push_back(is_one_number(micrograph)      ? rough_plan(task, g, theta)
+                    : has_own_rays(task, frame, g) ? rougher_plan(task, g, theta)
                                                    : frame.plan);
   }
   auto problem = std::make_unique<LeastSquares>(task, std::move(plans), std::move(sets));

@@ -63,8 +63,8 @@ class CrystalModel final : public PixelModel<S> {
 }  // namespace
 
 RenderPlan plan_bar(const Planning& planning) {
-  check_closed_form(planning.scene, "a crystal bar");
-  RenderPlan plan;
+  check_closed_form(planning.demand, "a crystal bar");
+  RenderPlan plan = planning.start();
   plan.method = "closed_form";
   plan.reasons.push_back("a crystal between electrodes is one retarder per pixel: sin^2 in closed form");
   const Crystal& crystal = std::get<Crystal>(planning.scene.sample);

@@ -15,7 +15,7 @@ EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const 
       aplanatic_(scene.microscope.aplanatic),
       symmetry_(round_symmetry(scene, value, light_.line(), false)),
       panels_(plan.part_panels),
-      allowed_tail_(std::max(0.05 * scene.intensity_accuracy, 3 * plan.numerical_error)) {
+      allowed_tail_(std::max(0.05 * plan.demand.intensity_accuracy, 3 * plan.numerical_error)) {
   passing_ = PassingLight<S>(value(scene.view.pixel_size_um), optics_.radius_um, light_.line().open());
   std::vector<S> ends = fan_p_.ends_um();
   ends.insert(ends.end(), fan_s_.ends_um().begin(), fan_s_.ends_um().end());

@@ -37,10 +37,10 @@ std::vector<double> disc_phases(const Scene& scene, const Values<double>& value)
 RenderPlan plan_disc(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
-  check_closed_form(scene, "a photoelastic disc");
+  check_closed_form(planning.demand, "a photoelastic disc");
   if (!scene.view.pixel_size_um)
     throw UserError(Where{}, "a disc needs micrograph.pixel_size_um", "the size of a pixel on the disc");
-  RenderPlan plan;
+  RenderPlan plan = planning.start();
   plan.method = "closed_form";
   plan.reasons.push_back("plane stress is the same at all depths: one retarder a point, in closed form");
   const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
@@ -67,7 +67,7 @@ RenderPlan plan_disc(const Planning& planning) {
     if (std::abs(r - radius_px) < 2) return 8;  // the edge
     const double f = std::min(119.999, r / radius_px * 120);
     const std::size_t i = static_cast<std::size_t>(f);
-    return samples_for(std::max(gradient[i], gradient[i + 1]), scene.intensity_accuracy);
+    return samples_for(std::max(gradient[i], gradient[i + 1]), plan.demand.intensity_accuracy);
   });
   plan.samples.push_back(1);  // outside
   const double fastest = *std::max_element(gradient.begin(), gradient.end());

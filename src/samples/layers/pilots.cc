@@ -59,11 +59,11 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
   return t;
 }
 
-Pilots planar_pilots(const Scene& scene, const Values<double>& value) {
+Pilots planar_pilots(const Scene& scene, const Demand& demand, const Values<double>& value) {
   Pilots pilots;
   // Not one node set comes twice here: remembering them would only cost the search.
   const auto fresh = [&] {
-    auto optics = std::make_shared<PlanarOptics<double>>(planar_optics(scene, value));
+    auto optics = std::make_shared<PlanarOptics<double>>(planar_optics(scene, value, continuity_of(demand)));
     optics->column->freeze();
     return optics;
   };
@@ -73,7 +73,7 @@ Pilots planar_pilots(const Scene& scene, const Values<double>& value) {
   const auto add = [&](std::shared_ptr<const PlanarOptics<double>> optics, double tx, double ty) {
     const double c = 1 / std::sqrt(1 + tx * tx + ty * ty);
     const Ray<double> ray{optics->k0, optics->n_host * c * tx, optics->n_host * c * ty, optics->continuity};
-    const Mesh mesh = adapted_mesh(*optics->column, ray, std::max(scene.intensity_accuracy / 40, 1e-13));
+    const Mesh mesh = adapted_mesh(*optics->column, ray, std::max(demand.intensity_accuracy / 40, 1e-13));
     const Mat2<double> exact = planar_jones<double>(*optics, transport_method<double>("magnus4"), mesh, tx, ty);
     pilots.rays.push_back([=](const TransportMethod<double>& method, const Mesh& m) {
       try {

@@ -103,7 +103,7 @@ bool plan_fringe_means(const Planning& planning, const PlanarOptics<double>& o, 
   for (int i : {0, w - 1})
     for (int j : {0, h - 1}) pilots.push_back({i, j});
   const double error = (planning.means_at(trial, pilots) - planning.means_at(points, pilots)).cwiseAbs().maxCoeff();
-  if (!(error <= scene.intensity_accuracy)) return false;
+  if (!(error <= plan.demand.intensity_accuracy)) return false;
   plan = trial;
   plan.numerical_error = std::max(plan.numerical_error, error);
   return true;
@@ -115,8 +115,8 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
   const int w = scene.view.width, h = scene.view.height;
   // Less than 1e-9 the powers of a phase of some hundred radians do not hold.
   constexpr double kLeast = 1e-9;
-  if (scene.intensity_accuracy < 10 * kLeast) return;
-  const double target = std::max(kSquaresShare * scene.intensity_accuracy, kLeast);
+  if (plan.demand.intensity_accuracy < 10 * kLeast) return;
+  const double target = std::max(kSquaresShare * plan.demand.intensity_accuracy, kLeast);
   constexpr int kColumns = 8, kRims = 2 * FringeBlocks::kRim;
   const Values<Pack> lanes = value.template as<Pack>();
   const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
@@ -129,7 +129,7 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
     const double least = static_cast<double>(blocks.count()) * FringeTable<Pack>::kRays;
     if (least >= fewest) break;
     const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1),
-                                  kGivenUp * scene.intensity_accuracy, 0, {},
+                                  kGivenUp * plan.demand.intensity_accuracy, 0, {},
                                   [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
     std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
     parallel_for(blocks.count(), 0, [&](int b) {
@@ -176,9 +176,11 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
 }
 
 /// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
-RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o,
+RenderPlan plan_reflections(const Planning& planning, const PlanarOptics<double>& o,
                             const std::vector<std::pair<double, double>>& directions) {
-  RenderPlan plan;
+  const Scene& scene = planning.scene;
+  const Values<double>& value = planning.value;
+  RenderPlan plan = planning.start();
   plan.method = "berreman";
   const Berreman<double> method;
   // Halving a step of order 4 leaves a sixteenth of its error.
@@ -192,12 +194,12 @@ RenderPlan plan_reflections(const Scene& scene, const Values<double>& value, con
                                                      planar_jones<double>(o, method, halved, tx, ty)));
     return largest;
   };
-  plan.steps = choose(kSteps, scene.intensity_accuracy, change, plan.numerical_error);
+  plan.steps = choose(kSteps, plan.demand.intensity_accuracy, change, plan.numerical_error);
   plan.reasons.push_back(
       fmt::format("{} steps of the 4 x 4 transport hold the intensity to {} on {} directions (asked: {})", plan.steps,
-                  sci(plan.numerical_error), directions.size(), sci(scene.intensity_accuracy)));
+                  sci(plan.numerical_error), directions.size(), sci(plan.demand.intensity_accuracy)));
   plan.reasons.push_back("asked for by physics.ceiling: all reflections, between the two faces too");
-  if (plan.numerical_error > scene.intensity_accuracy)
+  if (plan.numerical_error > plan.demand.intensity_accuracy)
     plan.warnings.push_back(fmt::format("Even {} steps err by {}.", plan.steps, sci(plan.numerical_error)));
   double largest_phase = 0, round_trip = 0;
   OpticalPoint<double> middle;
@@ -224,7 +226,7 @@ bool has_fringes(const Effort& effort) {
 /// Whether the slow solutions of the modes hold in the whole picture, not only on the pilots: where the axis comes near
 /// the wavevector the modes turn too fast for them. What their last pass changes tells.
 bool slow_everywhere(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o,
-                     const Effort& effort) {
+                     const Effort& effort, double accuracy) {
   const ConeView<double> cone(scene, value);
   const double w = scene.view.width, h = scene.view.height;
   const Mesh mesh = uniform_mesh(effort.steps, o.column->breaks);
@@ -241,7 +243,7 @@ bool slow_everywhere(const Scene& scene, const Values<double>& value, const Plan
       if (modes_turn_over(medium, ray, 0, 1, 32)) return false;
       const Mat2<double> all = together(modal_transfer(*o.column, ray, mesh, kPasses)),
                          fewer = together(modal_transfer(*o.column, ray, mesh, kPasses - 1));
-      if (!(intensity_distance(all, fewer) <= scene.intensity_accuracy)) return false;
+      if (!(intensity_distance(all, fewer) <= accuracy)) return false;
     }
   return true;
 }
@@ -315,12 +317,12 @@ void check_total_reflection(const Scene& scene, const Values<double>& value, con
 /// The method and its effort, into the plan with the reasons.
 void choose_transport(const Scene& scene, const Values<double>& value, const PlanarOptics<double>& o,
                       const Directions& directions, RenderPlan& plan) {
-  const double target = scene.intensity_accuracy;
+  const double target = plan.demand.intensity_accuracy;
   const bool cone = cone_half_angle(scene).has_value();
-  const Pilots pilots = planar_pilots(scene, value);
-  const bool choose_freely = scene.method == "auto";
-  Effort effort =
-      cheapest_effort(pilots, target, choose_freely ? "" : scene.method, false, choose_freely && !cone ? "modal" : "");
+  const Pilots pilots = planar_pilots(scene, plan.demand, value);
+  const bool choose_freely = plan.demand.method == "auto";
+  Effort effort = cheapest_effort(pilots, target, choose_freely ? "" : plan.demand.method, false,
+                                  choose_freely && !cone ? "modal" : "");
   if (cone && choose_freely && !has_fringes(effort)) {
     // Pixel means come in closed form from transport in the modes: worth half as many samples again.
     for (const char* name : {"diagonal", "modal"}) {
@@ -331,7 +333,7 @@ void choose_transport(const Scene& scene, const Values<double>& value, const Pla
       }
     }
   }
-  if (cone && choose_freely && effort.method->info().slow_axes && !slow_everywhere(scene, value, o, effort))
+  if (cone && choose_freely && effort.method->info().slow_axes && !slow_everywhere(scene, value, o, effort, target))
     effort = cheapest_effort(pilots, target, "", false, "modal");
   plan.method = effort.method->info().name;
   plan.steps = effort.steps;
@@ -339,8 +341,8 @@ void choose_transport(const Scene& scene, const Values<double>& value, const Pla
   const std::string what =
       fmt::format("{}: {}, {} samples of the medium a ray, hold the intensity to {} on {} pilot rays (asked: {})",
                   plan.method, effort_text(plan.method, plan.steps), effort.samples, sci(effort.error), pilots.size(),
-                  sci(scene.intensity_accuracy));
-  if (effort.error > target && scene.method == "auto") {
+                  sci(plan.demand.intensity_accuracy));
+  if (effort.error > target && plan.demand.method == "auto") {
     // Steps where they are needed, by their own estimate.
     double local_errors = 0;
     for (const auto& [tx, ty] : directions) {
@@ -405,7 +407,7 @@ void plan_cone_pixels(const Planning& planning, const PlanarOptics<double>& o, R
     sample_by_radius(plan, cx, cy, bins, [&](double r) {
       const double f = std::min(23.999, r / bins * 24);
       const std::size_t i = static_cast<std::size_t>(f);
-      return samples_for(std::max(gradient[i], gradient[i + 1]), scene.intensity_accuracy);
+      return samples_for(std::max(gradient[i], gradient[i + 1]), plan.demand.intensity_accuracy);
     });
     const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
     plan.reasons.push_back(fmt::format("pixel means from up to {} x {} rays a pixel", most, most));
@@ -417,13 +419,13 @@ void plan_cone_pixels(const Planning& planning, const PlanarOptics<double>& o, R
 RenderPlan plan_planar(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
-  RenderPlan plan;
+  RenderPlan plan = planning.start();
   if (scene.view.camera) check_horizon(scene, value);
-  const PlanarOptics<double> o = planar_optics(scene, value);
+  const PlanarOptics<double> o = planar_optics(scene, value, continuity_of(planning.demand));
   o.column->freeze();  // no node set comes twice: remembering them would only cost the search
   const Directions directions = pilot_directions(scene, value);
   check_total_reflection(scene, value, o);
-  if (scene.ceiling == Ceiling::reflections) return plan_reflections(scene, value, o, directions);
+  if (plan.demand.ceiling == Ceiling::reflections) return plan_reflections(planning, o, directions);
   choose_transport(scene, value, o, directions, plan);
   double largest_phase = 0;
   for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
@@ -438,7 +440,7 @@ RenderPlan plan_planar(const Planning& planning) {
   double r = 0;
   for (const auto& f : faces)
     r = std::max({r, reflectance(std::sqrt(f.ordinary), o.n_host), reflectance(std::sqrt(f.extraordinary), o.n_host)});
-  plan.model_error = r + (scene.ceiling == Ceiling::e_only ? 0.03 : 0.0);
+  plan.model_error = r + (plan.demand.ceiling == Ceiling::e_only ? 0.03 : 0.0);
   if (r > 0.01)
     plan.left_out.push_back(
         fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by "

@@ -18,7 +18,7 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
                                                         std::size_t most = 12);
 
 /// The rays that judge methods.
-Pilots planar_pilots(const Scene&, const Values<double>&);
+Pilots planar_pilots(const Scene&, const Demand&, const Values<double>&);
 
 /// Of a slab one row a direction of the microscope, else one a pixel.
 void add_planar_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);

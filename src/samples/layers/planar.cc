@@ -14,13 +14,13 @@
 namespace birefit {
 
 template <class S>
-PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value) {
+PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value, Continuity continuity) {
   PlanarOptics<S> o;
   o.column = std::make_unique<CachedColumn<S>>(make_planar_column<S>(
       scene.sample, scene.material, value, value.radians(scene.view.rotation_deg), wavelength_um(scene, value)));
   o.k0 = wavenumber_per_um(scene, value);
   o.n_host = host_index(scene, value);
-  o.continuity = scene.ceiling == Ceiling::e_only ? Continuity::e_only : Continuity::e_and_h;
+  o.continuity = continuity;
   return o;
 }
 
@@ -115,7 +115,8 @@ class PlanarModel final : public PixelModel<S> {
   PlanarModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
       : scene_(scene),
         value_(value),
-        optics_(planar_optics(scene, value)),
+        accuracy_(plan.demand.intensity_accuracy),
+        optics_(planar_optics(scene, value, continuity_of(plan.demand))),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.column->breaks) : plan.mesh),
         light_(scene.microscope, value),
@@ -275,14 +276,14 @@ class PlanarModel final : public PixelModel<S> {
       if constexpr (std::is_same_v<T, S> && ScalarTraits<S>::derivatives == 0) {
         return this->optics();
       } else {
-        own = planar_optics(scene_, value_inside);
+        own = planar_optics(scene_, value_inside, optics_.continuity);
         planar_fringe(*own, coupling_, mesh_, k0, raise, light, T(0.0), T(0.0));
         own->column->freeze();
         return *own;
       }
     }();
     const ConeView<T> cone(scene_, value_inside);
-    table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * scene_.intensity_accuracy, threads, places,
+    table_ = FringeTable<S>(blocks_, tabulated_blocks_, kGivenUp * accuracy_, threads, places,
                             [&](const P& column, const P& row) {
                               const auto t = cone.at(column, row);
                               return planar_fringe(optics, coupling_, mesh_, k0, raise, light, t.x, t.y);
@@ -297,6 +298,7 @@ class PlanarModel final : public PixelModel<S> {
   }
   const Scene& scene_;
   Values<S> value_;
+  double accuracy_;  ///< of the intensity, demanded
   PlanarOptics<S> optics_;
   const TransportMethod<S>& method_;
   Mesh mesh_;
@@ -322,7 +324,7 @@ std::unique_ptr<PixelModel<S>> make_planar_model(const Scene& scene, const Rende
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                     \
   template std::unique_ptr<PixelModel<S>> make_planar_model<S>(const Scene&, const RenderPlan&, const Values<S>&); \
-  template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&);                                       \
+  template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&, Continuity);                           \
   template Mat2<S> planar_jones<S>(const PlanarOptics<S>&, const TransportMethod<S>&, const Mesh&, const S&, const S&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 #define BIREFIT_INSTANTIATE_RAISED(S, R)                                                                               \

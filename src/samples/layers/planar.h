@@ -13,8 +13,9 @@ struct PlanarOptics {
   Continuity continuity = Continuity::e_and_h;
 };
 
+/// `continuity`: for who sends light through it.
 template <class S>
-PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value);
+PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value, Continuity continuity = Continuity::e_and_h);
 
 /// Jones matrix in the lab's x, y after unrolling s and p by the azimuth, faces included; (tx, ty) = tan(incidence in
 /// the host) times the unit vector of the azimuth.

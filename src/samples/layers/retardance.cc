@@ -48,7 +48,7 @@ RenderPlan plan_retardance(const Planning& planning) {
   if (!std::holds_alternative<Cell>(scene.sample) || !optics.column->planar)
     throw UserError(Where{}, "a retardance is that of a cell whose axis does not turn about the light",
                     "give the signal as an intensity");
-  RenderPlan plan;
+  RenderPlan plan = planning.start();
   plan.method = "diagonal";
   // The two indices' difference is what is asked for: relative to itself, of whatever sign and size.
   constexpr int kMost = 4096;

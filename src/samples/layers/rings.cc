@@ -50,11 +50,11 @@ class RingModel final : public PixelModel<S> {
 }  // namespace
 
 RenderPlan plan_rings(const Planning& planning) {
-  check_closed_form(planning.scene, "a table of rings");
+  check_closed_form(planning.demand, "a table of rings");
   if (planning.observable.ring_numbers.empty())
     throw UserError(Where{}, "a plate with screen_distance_um needs a table of ring radii",
                     "micrograph: {image: rings.csv}");
-  RenderPlan plan;
+  RenderPlan plan = planning.start();
   plan.method = "closed_form";
   plan.reasons.push_back(
       "the rings of a plate cut normal to its axis lie where the retardance is a whole number of waves: radii in "

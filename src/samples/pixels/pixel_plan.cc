@@ -41,7 +41,7 @@ int fewest_points(const std::vector<std::array<double, 2>>& pixels, int n, int m
 
 void measure_points(const Scene& scene, const PixelModel<Pack>& model, RenderPlan& plan) {
   // Pilots are few, of edges the hardest among them.
-  const double target = 0.25 * scene.intensity_accuracy;
+  const double target = 0.25 * plan.demand.intensity_accuracy;
   double worst = 0;
   // Pixel grids may lie anywhere about the sample: pilots are no pixels of this one.
   const auto place = [&](double radius, double turn) {

@@ -166,7 +166,7 @@ class BallRaysIn final : public BallRays<R> {
   using P = PlainOf<R>;
   BallRaysIn(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const Values<R>& all,
              const Directions<S, R>& up, bool places)
-      : optics_(ball_optics(scene, value)),
+      : optics_(ball_optics(scene, value, continuity_of(plan.demand))),
         medium_(in_radii(droplet_optics(scene, all))),
         light_(scene.microscope, all),
         rim_(rim_table(optics_.sphere)),
@@ -304,7 +304,7 @@ class BallImage final : public PixelModel<S> {
   BallImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, bool core_apart)
       : scene_(scene),
         plan_(plan),
-        optics_(ball_optics(scene, value)),
+        optics_(ball_optics(scene, value, continuity_of(plan.demand))),
         rim_(rim_table(optics_.sphere)),
         light_(scene.microscope, value),
         view_(scene, value),
@@ -315,7 +315,7 @@ class BallImage final : public PixelModel<S> {
         core_apart_(core_apart),
         map_(plan.disc) {
     if (shell_in(optics_)) {
-      plain_ = ball_optics(scene, value.template as<P>());
+      plain_ = ball_optics(scene, value.template as<P>(), continuity_of(plan.demand));
       core_map_ = DiscMap(plan.disc, true);
       const auto table = [&]<class T>(const BallOptics<T>& o, const T& edge_um, int panels) {
         return RadialTable<T>(panels, 3, 1, [&](const P& v, T* out) {
@@ -411,7 +411,7 @@ class BallImage final : public PixelModel<S> {
     std::vector<DiscSquare> squares = plan_.disc;
     if (!core_apart_)  // it was when the picture was planned
       for (DiscSquare& q : squares) q.smooth = q.smooth && !q.of_core;
-    table_ = PolarTable<S>(squares, kGivenUp * scene_.intensity_accuracy, threads,
+    table_ = PolarTable<S>(squares, kGivenUp * plan_.demand.intensity_accuracy, threads,
                            [this](int square, const P& v, const P& c, const P& s) {
                              const std::size_t i = static_cast<std::size_t>(square);
                              return light_at(plan_.disc[i], v, c, s, meshes_[mesh_of_[i]]);
@@ -591,11 +591,11 @@ namespace {
 class StepsOfSquare {
  public:
   StepsOfSquare(const Scene& scene, const RenderPlan& plan, const Values<double>& value)
-      : optics_(ball_optics(scene, value.as<Pack>())),
+      : optics_(ball_optics(scene, value.as<Pack>(), continuity_of(plan.demand))),
         beside_(beside_core(optics_)),
         rim_(rim_table(optics_.sphere)),
         method_(transport_method<Pack>(plan.method)),
-        target_(0.25 * scene.intensity_accuracy) {
+        target_(0.25 * plan.demand.intensity_accuracy) {
     std::visit(
         [&](const auto& field) {
           if (ball_breaks(field).size() == 1) return;
@@ -821,7 +821,7 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, double t
       }
       q.smooth = q.points > kWorth * kRays;  // to be tried
     });
-    const PolarTable<Pack> table(open, kGivenUp * scene.intensity_accuracy, 0,
+    const PolarTable<Pack> table(open, kGivenUp * plan.demand.intensity_accuracy, 0,
                                  [&](int b, const Pack& v, const Pack& c, const Pack& s) {
                                    const DiscSquare& q = open[static_cast<std::size_t>(b)];
                                    return image.light_at(q, v, c, s, image.mesh(q.steps));

@@ -5,10 +5,10 @@
 namespace birefit {
 
 template <class S>
-BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value) {
+BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value, Continuity continuity) {
   const Droplet& droplet = std::get<Droplet>(scene.sample);
   BallOptics<S> o;
-  o.sphere = droplet_optics(scene, value);
+  o.sphere = droplet_optics(scene, value, continuity);
   const S rotation = value.radians(scene.view.rotation_deg);
   const S inverse_radius = inverse(o.sphere.radius_um);
   if (const auto* bipolar = std::get_if<BipolarDirector>(&droplet.director)) {
@@ -29,7 +29,7 @@ BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value) {
   return o;
 }
 
-#define BIREFIT_INSTANTIATE(S) template BallOptics<S> ball_optics<S>(const Scene&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S) template BallOptics<S> ball_optics<S>(const Scene&, const Values<S>&, Continuity);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

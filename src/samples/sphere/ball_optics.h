@@ -18,8 +18,9 @@ template <class S>
 Mesh ball_mesh(const BallOptics<S>& o, int steps) {
   return uniform_mesh(steps, std::visit([](const auto& field) { return ball_breaks(field); }, o.field));
 }
+/// `continuity` as of droplet_optics.
 template <class S>
-BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value);
+BallOptics<S> ball_optics(const Scene& scene, const Values<S>& value, Continuity continuity = Continuity::e_and_h);
 
 /// Calls f(column) with the medium along the ray that is seen at the azimuth (cos, sin).
 template <class S, class F>

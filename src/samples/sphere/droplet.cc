@@ -50,7 +50,7 @@ constexpr double kCentre = 1.0 / 64;
 
 template <class S>
 DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
-    : optics_(droplet_optics(scene, value)),
+    : optics_(droplet_optics(scene, value, continuity_of(plan.demand))),
       rim_(rim_table(optics_)),
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),

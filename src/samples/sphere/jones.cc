@@ -13,17 +13,17 @@ namespace birefit {
 void add_sphere_jones(const Scene& scene, const RenderPlan& plan, const Values<double>& value, JonesTable& table) {
   const int w = scene.view.width, h = scene.view.height;
   const Mesh mesh = plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh;
-  if (scene.rays == Rays::eikonal)
+  if (plan.demand.rays == Rays::eikonal)
     throw UserError(Where{},
                     "the two polarizations that curved rays bring to one place came by different ways: no Jones "
                     "matrix of one ray",
                     "use `render`, or physics.rays: straight");
-  const DropletOptics<double> optics = droplet_optics(scene, value);
+  const DropletOptics<double> optics = droplet_optics(scene, value, continuity_of(plan.demand));
   const RimTable rim = rim_table(optics);
   const TransportMethod<double>& method = transport_method<double>(plan.method);
   std::optional<BallOptics<double>> ball;
   const StepsByPlace steps(plan);
-  if (!looks_round(std::get<Droplet>(scene.sample))) ball = ball_optics(scene, value);
+  if (!looks_round(std::get<Droplet>(scene.sample))) ball = ball_optics(scene, value, continuity_of(plan.demand));
   for (int r = 0; r < h; ++r)
     for (int c = 0; c < w; ++c) {
       const double x = (c - value(scene.view.center_x_px)) * value(scene.view.pixel_size_um);

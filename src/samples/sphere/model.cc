@@ -14,8 +14,8 @@ template <class S>
 std::unique_ptr<PixelModel<S>> make_sphere_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
   if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
   if (looks_round(std::get<Droplet>(scene.sample)))
-    return scene.rays == Rays::eikonal ? make_eikonal_model(scene, plan, value)
-                                       : make_droplet_model(scene, plan, value);
+    return plan.demand.rays == Rays::eikonal ? make_eikonal_model(scene, plan, value)
+                                             : make_droplet_model(scene, plan, value);
   if constexpr (kForTablesOnly<S>)
     throw std::logic_error("a ray a point takes fewer derivatives at once");
   else

@@ -12,9 +12,9 @@ namespace birefit {
 
 namespace {
 
-Pilots droplet_pilots(const Scene& scene, const Values<double>& value) {
+Pilots droplet_pilots(const Scene& scene, const Demand& demand, const Values<double>& value) {
   Pilots pilots;
-  const DropletOptics<double> o = droplet_optics(scene, value);
+  const DropletOptics<double> o = droplet_optics(scene, value, continuity_of(demand));
   const RimTable rim = rim_table(o);
   const Mesh fine = uniform_mesh(o.coupled() ? 1024 : 512);
   for (double f : {0.003, 0.02, 0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97}) {
@@ -36,9 +36,9 @@ Pilots droplet_pilots(const Scene& scene, const Values<double>& value) {
   return pilots;
 }
 
-Pilots ball_pilots(const Scene& scene, const Values<double>& value) {
+Pilots ball_pilots(const Scene& scene, const Demand& demand, const Values<double>& value) {
   Pilots pilots;
-  const auto o = std::make_shared<const BallOptics<double>>(ball_optics(scene, value));
+  const auto o = std::make_shared<const BallOptics<double>>(ball_optics(scene, value, continuity_of(demand)));
   const RimTable rim = rim_table(o->sphere);
   const Mesh fine = ball_mesh(*o, 256), finer = ball_mesh(*o, 512);
   pilots.breaks = std::visit([](const auto& field) { return ball_breaks(field); }, o->field);
@@ -65,7 +65,7 @@ Pilots ball_pilots(const Scene& scene, const Values<double>& value) {
                    [](const Candidate& a, const Candidate& b) { return a.unsure < b.unsure; });
   constexpr std::size_t kLeast = 16;
   for (const Candidate& c : candidates) {
-    if (scene.method == "auto" && pilots.rays.size() >= kLeast && c.unsure > 0.1 * scene.intensity_accuracy) break;
+    if (demand.method == "auto" && pilots.rays.size() >= kLeast && c.unsure > 0.1 * demand.intensity_accuracy) break;
     pilots.rays.push_back([=](const TransportMethod<double>& method, const Mesh& mesh) {
       try {
         return or_huge(intensity_distance(c.exact, jones(c.fraction, c.azimuth, method, mesh)));
@@ -91,8 +91,9 @@ Pilots ball_pilots(const Scene& scene, const Values<double>& value) {
 
 }  // namespace
 
-Pilots sphere_pilots(const Scene& scene, const Values<double>& value) {
-  return looks_round(std::get<Droplet>(scene.sample)) ? droplet_pilots(scene, value) : ball_pilots(scene, value);
+Pilots sphere_pilots(const Scene& scene, const Demand& demand, const Values<double>& value) {
+  return looks_round(std::get<Droplet>(scene.sample)) ? droplet_pilots(scene, demand, value)
+                                                      : ball_pilots(scene, demand, value);
 }
 
 }  // namespace birefit

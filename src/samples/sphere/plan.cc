@@ -46,7 +46,7 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
   // A director from elements has small kinks between them, which no polynomial follows to more than this.
   const double share =
       std::holds_alternative<AxialDirector>(std::get<Droplet>(scene.sample).director) ? 10 * kTableShare : kTableShare;
-  const double target = std::max(share * scene.intensity_accuracy, 2e-11);
+  const double target = std::max(share * plan.demand.intensity_accuracy, 2e-11);
   // Rays were every point to have its own; of a droplet larger than the picture, its share.
   const double disc_px = std::numbers::pi * square(static_cast<double>(plan.samples.size()) * plan.sampling_bin_px);
   const double points = points_within(plan.samples, plan.sampling_bin_px).back() *
@@ -137,7 +137,7 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
   const double worst_reflection = std::max(reflectance(o.n_e, o.n_host), reflectance(o.n_o, o.n_host));
   plan.model_error = 2 * worst_reflection;
   const double size = 2 * o.radius_um * o.n_host / value(scene.microscope.wavelength_nm) * 1000;
-  if (size < 400 && scene.rays == Rays::eikonal)
+  if (size < 400 && plan.demand.rays == Rays::eikonal)
     plan.left_out.push_back(
         fmt::format("The droplet is {:.3g} wavelengths across: rays, curved as they are, leave out diffraction. An "
                     "image of beam propagation (23 wavelengths, "
@@ -152,7 +152,7 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
         "and its error bars contain that; "
         "elsewhere they do not.",
         size));
-  if (const double turned = turned_by_core(o); turned > 0.005 && scene.rays == Rays::straight)
+  if (const double turned = turned_by_core(o); turned > 0.005 && plan.demand.rays == Rays::straight)
     plan.warnings.push_back(
         fmt::format("Light is taken straight through the shell's core; refraction there would turn a ray half-way to "
                     "the core's edge by {:.2g} degrees, "
@@ -173,28 +173,30 @@ void measure_points_of(const Scene& scene, const Values<double>& value, RenderPl
   measure_points(scene, *model, plan);
 }
 
-RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
-  RenderPlan plan;
+RenderPlan plan_ball(const Planning& planning) {
+  const Scene& scene = planning.scene;
+  const Values<double>& value = planning.value;
+  RenderPlan plan = planning.start();
   const BallOptics<double> o = ball_optics(scene, value);
-  if (scene.method == "diagonal")
+  if (plan.demand.method == "diagonal")
     throw UserError(Where{}, "transport.method: diagonal cannot do this droplet: its director turns along the rays",
                     "use auto or magnus4");
   const RimTable rim = rim_table(o.sphere);
-  const Pilots pilots = sphere_pilots(scene, value);
-  const Effort effort =
-      cheapest_effort(pilots, scene.intensity_accuracy, scene.method == "auto" ? "" : scene.method, true, "modal");
+  const Pilots pilots = sphere_pilots(scene, plan.demand, value);
+  const Effort effort = cheapest_effort(pilots, plan.demand.intensity_accuracy,
+                                        plan.demand.method == "auto" ? "" : plan.demand.method, true, "modal");
   plan.method = effort.method->info().name;
   plan.steps = effort.steps;
   plan.numerical_error = effort.error;
   plan.reasons.push_back(
-      scene.method != "auto"
+      plan.demand.method != "auto"
           ? fmt::format("method {} was asked for by name", plan.method)
           : "the director leaves the plane of the ray: modes couple, so the full 2 x 2 transport is needed");
   plan.reasons.push_back(
       fmt::format("{}: {} steps, {} samples of the medium a ray, hold the intensity to {} on {} pilot rays (asked: "
                   "{}); no method needs fewer",
                   plan.method, plan.steps, effort.samples, sci(plan.numerical_error), pilots.size(),
-                  sci(scene.intensity_accuracy)));
+                  sci(plan.demand.intensity_accuracy)));
   const double px = value(scene.view.pixel_size_um), edge = rim.rho_max() * o.sphere.radius_um;
   const int bins = std::max(2, static_cast<int>(std::ceil(edge / px)) + 2);
   if (bins > 100000)
@@ -220,10 +222,10 @@ RenderPlan plan_ball(const Scene& scene, const Values<double>& value) {
     if (r < 3) return r < 2 ? 8 : 6;  // where a defect may be
     const double f = std::min(kRadii - 1e-9, r * px / edge * kRadii);
     return samples_for(std::max(gradient[static_cast<std::size_t>(f)], gradient[static_cast<std::size_t>(f) + 1]),
-                       scene.intensity_accuracy);
+                       plan.demand.intensity_accuracy);
   });
-  if (scene.method == "auto")
-    plan_disc_squares(scene, value, std::max(kSquaresShare * scene.intensity_accuracy, 1e-10), plan);
+  if (plan.demand.method == "auto")
+    plan_disc_squares(scene, value, std::max(kSquaresShare * plan.demand.intensity_accuracy, 1e-10), plan);
   else
     plan.reasons.push_back("the droplet does not look the same from all sides of the viewing axis: one ray a point");
   plan.samples.push_back(1);  // outside
@@ -265,7 +267,7 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
       if (high > jump - px && low < jump + px) return 8;
     // Of pixels whose middles lie in this bin, r - 1/2 to r + 1/2.
     const std::size_t first = static_cast<std::size_t>(std::lround(2 * r - 1));
-    return samples_for(std::max({across(first), across(first + 1), across(first + 2)}), scene.intensity_accuracy);
+    return samples_for(std::max({across(first), across(first + 1), across(first + 2)}), plan.demand.intensity_accuracy);
   });
   // Outside the droplet one sample is enough.
   plan.samples.push_back(1);
@@ -274,8 +276,10 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
 }
 
 /// Each mode on its own curved ray.
-RenderPlan plan_curved(const Scene& scene, const Values<double>& value) {
-  RenderPlan plan;
+RenderPlan plan_curved(const Planning& planning) {
+  const Scene& scene = planning.scene;
+  const Values<double>& value = planning.value;
+  RenderPlan plan = planning.start();
   plan.method = "eikonal";
   const DropletOptics<double> o = droplet_optics(scene, value);
   EikonalImage<Pack> image(scene, plan, value.template as<Pack>());
@@ -283,10 +287,11 @@ RenderPlan plan_curved(const Scene& scene, const Values<double>& value) {
                              ? fmt::format("each mode on its own curved ray, {} of the extraordinary one integrated",
                                            image.integrated_rays())
                              : "each mode on its own curved ray, in closed form");
-  if (scene.method != "auto")
-    plan.reasons.push_back(fmt::format("method {}, asked for by name, is for straight rays: not used", scene.method));
+  if (plan.demand.method != "auto")
+    plan.reasons.push_back(
+        fmt::format("method {}, asked for by name, is for straight rays: not used", plan.demand.method));
   // Rays in a field have small kinks between the director's elements, which no polynomial follows to more than this.
-  const double target = std::max((o.axial ? 100 : 1) * kTableShare * scene.intensity_accuracy, 2e-11);
+  const double target = std::max((o.axial ? 100 : 1) * kTableShare * plan.demand.intensity_accuracy, 2e-11);
   constexpr int kMost = 32;
   double left = 0;
   int radii = 0;
@@ -361,31 +366,31 @@ std::vector<double> sphere_phases(const Scene& scene, const Values<double>& valu
 RenderPlan plan_sphere(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
-  RenderPlan plan;
-  if (scene.ceiling == Ceiling::reflections)
+  RenderPlan plan = planning.start();
+  if (plan.demand.ceiling == Ceiling::reflections)
     throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
   const Droplet& droplet = std::get<Droplet>(scene.sample);
-  if (scene.rays == Rays::eikonal && !rays_stay_meridional(droplet))
+  if (plan.demand.rays == Rays::eikonal && !rays_stay_meridional(droplet))
     throw UserError(Where{},
                     "physics.rays: eikonal is for radial droplets without twist, shells whose core is in the middle "
                     "and droplets in a field along the view",
                     "use straight or auto");
-  if (!looks_round(droplet)) return plan_ball(scene, value);
-  if (scene.rays == Rays::eikonal) return plan_curved(scene, value);
+  if (!looks_round(droplet)) return plan_ball(planning);
+  if (plan.demand.rays == Rays::eikonal) return plan_curved(planning);
   const DropletOptics<double> o = droplet_optics(scene, value);
   const RimTable rim = rim_table(o);
   const bool twisted = o.coupled(), axial = o.axial != nullptr;
-  if (scene.method == "diagonal" && twisted)
+  if (plan.demand.method == "diagonal" && twisted)
     throw UserError(Where{}, "transport.method: diagonal cannot do a twisted director, its modes are coupled",
                     "use auto or magnus4");
-  const Pilots pilots = sphere_pilots(scene, value);
+  const Pilots pilots = sphere_pilots(scene, plan.demand, value);
   // The measure is an upper bound: no further margin. Twisted, the chord's map has a kink in the middle.
-  const Effort effort =
-      cheapest_effort(pilots, scene.intensity_accuracy, scene.method == "auto" ? "" : scene.method, twisted, "modal");
+  const Effort effort = cheapest_effort(pilots, plan.demand.intensity_accuracy,
+                                        plan.demand.method == "auto" ? "" : plan.demand.method, twisted, "modal");
   plan.method = effort.method->info().name;
   plan.steps = effort.steps;
   plan.numerical_error = effort.error;
-  if (scene.method != "auto")
+  if (plan.demand.method != "auto")
     plan.reasons.push_back(fmt::format("method {} was asked for by name", plan.method));
   else if (twisted)
     plan.reasons.push_back(
@@ -399,7 +404,7 @@ RenderPlan plan_sphere(const Planning& planning) {
       fmt::format("{}: {}, {} samples of the medium a ray, hold the intensity to {} on {} pilot rays (asked: {}); no "
                   "method needs fewer",
                   plan.method, effort_text(plan.method, plan.steps), effort.samples, sci(plan.numerical_error),
-                  pilots.size(), sci(scene.intensity_accuracy)));
+                  pilots.size(), sci(plan.demand.intensity_accuracy)));
   plan.reasons.push_back(
       "normal incidence in the frame of each refracted ray: a retarder (unit quaternion), no 4 x 4 and no oblique "
       "terms");

@@ -13,7 +13,7 @@ std::vector<double> sphere_phases(const Scene&, const Values<double>&);
 /// What holds of the sample by whatever physics its picture is made.
 void note_sphere(const Scene&, const Values<double>&, RenderPlan&);
 /// The rays that judge methods; throws UserError like the plan.
-Pilots sphere_pilots(const Scene&, const Values<double>&);
+Pilots sphere_pilots(const Scene&, const Demand&, const Values<double>&);
 
 /// Throws UserError where modes run on rays of their own.
 void add_sphere_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);

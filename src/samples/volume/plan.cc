@@ -104,9 +104,9 @@ Effort cheapest_steps(const Pilots& pilots, int cells, double target, const std:
 
 }  // namespace
 
-Pilots volume_pilots(const Scene& scene, const Values<double>& value) {
+Pilots volume_pilots(const Scene& scene, const Demand& demand, const Values<double>& value) {
   Pilots pilots;
-  const auto o = std::make_shared<const VolumeOptics<double>>(scene, value);
+  const auto o = std::make_shared<const VolumeOptics<double>>(scene, value, continuity_of(demand));
   pilots.breaks = o->breaks;
   const Mesh fine = uniform_mesh(8 * (o->grid->nz - 1), pilots.breaks),
              finer = uniform_mesh(16 * (o->grid->nz - 1), pilots.breaks);
@@ -118,7 +118,7 @@ Pilots volume_pilots(const Scene& scene, const Values<double>& value) {
     // method.
     const double unsure =
         intensity_distance(exact, volume_retarder<double>(*o, x, y, transport_method<double>("magnus4"), fine));
-    if (unsure > 0.1 * scene.intensity_accuracy && i < kMost - 4) continue;
+    if (unsure > 0.1 * demand.intensity_accuracy && i < kMost - 4) continue;
     pilots.rays.push_back([=, x = x, y = y](const TransportMethod<double>& method, const Mesh& mesh) {
       try {
         return or_huge(intensity_distance(exact, volume_retarder(*o, x, y, method, mesh)));
@@ -136,30 +136,30 @@ Pilots volume_pilots(const Scene& scene, const Values<double>& value) {
 RenderPlan plan_volume(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
-  if (scene.ceiling == Ceiling::reflections)
+  if (planning.demand.ceiling == Ceiling::reflections)
     throw UserError(Where{}, "ceiling: reflections is for cells and slabs", "use one_way");
   if (!scene.view.pixel_size_um)
     throw UserError(Where{}, "a volume needs micrograph.pixel_size_um", "the size of a pixel on the sample");
   const VolumeOptics<double> o(scene, value);
   const VolumeGrid& grid = *o.grid;
-  RenderPlan plan;
-  const Pilots pilots = volume_pilots(scene, value);
-  const Effort effort =
-      cheapest_steps(pilots, grid.nz - 1, 0.5 * scene.intensity_accuracy, scene.method == "auto" ? "" : scene.method);
+  RenderPlan plan = planning.start();
+  const Pilots pilots = volume_pilots(scene, planning.demand, value);
+  const Effort effort = cheapest_steps(pilots, grid.nz - 1, 0.5 * plan.demand.intensity_accuracy,
+                                       plan.demand.method == "auto" ? "" : plan.demand.method);
   plan.method = effort.method->info().name;
   plan.steps = effort.steps;
   plan.reasons.push_back(
-      scene.method != "auto"
+      plan.demand.method != "auto"
           ? fmt::format("method {} was asked for by name", plan.method)
           : "a sampled director turns along the rays: modes couple, so the full 2 x 2 transport is needed");
   plan.reasons.push_back(
       fmt::format("{}: {} steps, one or more between any two of the {} layers, {} samples of the medium a ray, hold "
                   "the intensity to {:.1e} on {} pilot rays (asked: {:.1e}); no method needs fewer",
                   plan.method, pilots.mesh(plan.steps).size() - 1, grid.nz, effort.samples, effort.error, pilots.size(),
-                  scene.intensity_accuracy));
-  if (effort.error > 0.5 * scene.intensity_accuracy)
+                  plan.demand.intensity_accuracy));
+  if (effort.error > 0.5 * plan.demand.intensity_accuracy)
     plan.warnings.push_back(fmt::format("The {} method errs by {:.1e} here.", plan.method, effort.error));
-  const double left = plan_pixel_means(scene, value, o, 0.5 * scene.intensity_accuracy, plan);
+  const double left = plan_pixel_means(scene, value, o, 0.5 * plan.demand.intensity_accuracy, plan);
   plan.numerical_error = effort.error + left;
   const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
   plan.reasons.push_back(
@@ -199,7 +199,7 @@ std::vector<double> volume_phases_of(const Scene& scene, const Values<double>& v
 }
 
 void add_volume_jones(const Scene& scene, const RenderPlan& plan, const Values<double>& value, JonesTable& table) {
-  const VolumeOptics<double> optics(scene, value);
+  const VolumeOptics<double> optics(scene, value, continuity_of(plan.demand));
   const Mesh layers = plan.mesh.empty() ? uniform_mesh(plan.steps, optics.breaks) : plan.mesh;
   for (int r = 0; r < scene.view.height; ++r)
     for (int c = 0; c < scene.view.width; ++c)

@@ -9,8 +9,8 @@
 namespace birefit {
 
 template <class S>
-VolumeOptics<S>::VolumeOptics(const Scene& scene, const Values<S>& value)
-    : grid(std::get<SampledVolume>(scene.sample).grid) {
+VolumeOptics<S>::VolumeOptics(const Scene& scene, const Values<S>& value, Continuity of_light)
+    : grid(std::get<SampledVolume>(scene.sample).grid), continuity(of_light) {
   const S scale = value.get(std::get<SampledVolume>(scene.sample).scale, 1.0);
   const Indices<S> n = material_indices<S>(scene.material, value, wavelength_um(scene, value));
   n_o = n.ordinary;
@@ -23,7 +23,6 @@ VolumeOptics<S>::VolumeOptics(const Scene& scene, const Values<S>& value)
   nodes_per_px_y = px * (1 / grid->spacing_um[1]);
   depth_um = scale * (grid->spacing_um[2] * (grid->nz - 1));
   sin_cos(value.radians(scene.view.rotation_deg), sin_turn, cos_turn);
-  if (scene.ceiling == Ceiling::e_only) continuity = Continuity::e_only;
   for (int k = 1; k + 1 < grid->nz; ++k) breaks.push_back(static_cast<double>(k) / (grid->nz - 1));
 }
 
@@ -84,7 +83,7 @@ class VolumeModel final : public PixelModel<S> {
  public:
   using P = PlainOf<S>;
   VolumeModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
-      : optics_(scene, value),
+      : optics_(scene, value, continuity_of(plan.demand)),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.breaks) : plan.mesh),
         light_(scene.microscope, value) {}

@@ -22,7 +22,8 @@ struct VolumeOptics {
   S n_o, birefringence, k0, depth_um;
   Continuity continuity = Continuity::e_and_h;
 
-  VolumeOptics(const Scene& scene, const Values<S>& value);
+  /// `of_light`: for who sends light through it.
+  VolumeOptics(const Scene& scene, const Values<S>& value, Continuity of_light = Continuity::e_and_h);
   /// Place in the box, in nodes from the first.
   void place(const S& column, const S& row, S& x, S& y) const {
     const S east = column - center_x_px, north = center_y_px - row;
@@ -49,7 +50,7 @@ std::vector<double> volume_phases(const VolumeOptics<double>&, int rays, double 
 int volume_samples(const VolumeOptics<double>&, const TransportMethod<double>&, const Mesh&);
 
 RenderPlan plan_volume(const Planning&);
-Pilots volume_pilots(const Scene&, const Values<double>&);
+Pilots volume_pilots(const Scene&, const Demand&, const Values<double>&);
 /// Retardances of rays spread over the box (rad).
 std::vector<double> volume_phases_of(const Scene&, const Values<double>&);
 

@@ -154,11 +154,12 @@ bool has_series(const Scene& scene) {
   return shell && !shell->offset_um[0];
 }
 
-RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
+RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<double>& value) {
   const DropletOptics<double> o = droplet_optics(scene, value);
   check_objective(scene, value, o.n_host);
   const double na = value(scene.microscope.objective_na), px = value(scene.view.pixel_size_um);
   RenderPlan plan;
+  plan.demand = demand;
   plan.method = "series";
   plan.physics = "wave";
   const double size = o.k0 * std::max({o.n_o, o.n_e, o.n_host}) * o.radius_um;
@@ -177,7 +178,8 @@ RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
       "a sphere with a radial axis has an exact solution of Maxwell's equations, cheaper than any other wave optics: "
       "its series");
   // Intensity has no wavevector beyond twice the aperture's: panels of a few radians of that.
-  const double target = std::max(1e-3 * scene.intensity_accuracy, 1e-11), finest = 2 * o.k0 * na * plan.series_reach_um;
+  const double target = std::max(1e-3 * plan.demand.intensity_accuracy, 1e-11),
+               finest = 2 * o.k0 * na * plan.series_reach_um;
   double error = 0;
   for (plan.radial_panels = std::max(2, static_cast<int>(finest / 8));;
        plan.radial_panels += std::max(1, plan.radial_panels / 4)) {
@@ -210,12 +212,12 @@ RenderPlan plan_series(const Scene& scene, const Values<double>& value) {
           left, 3 * std::abs(lane(
                         mean_over_one_pixel(image, column, row, n) - mean_over_one_pixel(image, column, row, 16), 0)));
     }
-    if (left <= 0.5 * scene.intensity_accuracy || n >= 8) break;
+    if (left <= 0.5 * plan.demand.intensity_accuracy || n >= 8) break;
   }
   plan.numerical_error = 2 * error + left;
   plan.reasons.push_back(
       fmt::format("pixel means from {0} x {0} points, measured: they are good to {1:.1e}", plan.samples[0], left));
-  if (plan.numerical_error > scene.intensity_accuracy)
+  if (plan.numerical_error > plan.demand.intensity_accuracy)
     plan.warnings.push_back(fmt::format(
         "Pixels as large as these ({:.3g} um) average over so many fringes that their means are good to {:.1e} only.",
         px, plan.numerical_error));

@@ -171,8 +171,6 @@ std::shared_ptr<const VolumeGrid> sampled_ball(const VolumeGrid& like, double ra
 std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta) {
   RadialTwin twin{{scene, scene}, theta};
   Scene &exact = twin.scenes[0], &propagated = twin.scenes[1];
-  exact.method = "series";
-  propagated.method = "split_step";
   if (std::holds_alternative<Droplet>(scene.sample)) {
     Droplet& droplet = std::get<Droplet>(exact.sample);
     if (auto* shell = std::get_if<ShellDirector>(&droplet.director))
@@ -237,11 +235,12 @@ double error_on_twin(RadialTwin twin, double scale, const RenderPicture& picture
     view.width = view.height = pixels;
     view.pixel_size_um.index = add_constant(twin.theta, (diameter + 4) / pixels);
     view.center_x_px.index = view.center_y_px.index = add_constant(twin.theta, 0.5 * (pixels - 1));
-    scene.intensity_accuracy = 1e-8;  // nearly dark pictures, too
   }
-  const Values<double> values(twin.theta, {});
+  const Scene& exact = twin.scenes.front();
+  Demand demand = RadialTwin::demand(0, {});
+  demand.intensity_accuracy = 1e-8;  // nearly dark pictures, too
   return picture_error(model(twin.scenes.back(), twin.theta),
-                       picture(twin.scenes.front(), plan_series(twin.scenes.front(), values), twin.theta));
+                       picture(exact, plan_series(exact, demand, Values<double>(twin.theta, {})), twin.theta));
 }
 
 std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {
@@ -278,7 +277,7 @@ RenderPlan plan_wave(const Planning& planning) {
   const Values<double>& value = planning.value;
   const WaveObject o = wave_object(scene, value);
   const double na = value(scene.microscope.objective_na);
-  RenderPlan plan;
+  RenderPlan plan = planning.start();
   plan.wave = plan_grids(scene, value, o);
   const WaveGrid& g = plan.wave->grid;
   plan.method = "split_step";
@@ -286,7 +285,7 @@ RenderPlan plan_wave(const Planning& planning) {
   plan.steps = g.slabs;
   plan.reasons.push_back(fmt::format(
       "a {}, {:.3g} wavelengths, {}", o.what, 2 * o.radius_um * o.n_host / wavelength_um(scene, value),
-      scene.method == "split_step" ? "propagation asked for by name" : "whose director has no exact series"));
+      plan.demand.method == "split_step" ? "propagation asked for by name" : "whose director has no exact series"));
   plan.reasons.push_back(fmt::format(
       "one-way wave optics on {} x {} points {:.3g} um apart, {} slabs of {:.3g} um, {} layers of the medium each",
       g.nx, g.ny, g.step_um, g.slabs, (g.exit_um - g.entry_um) / g.slabs, g.layers));

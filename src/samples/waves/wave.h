@@ -22,6 +22,13 @@ struct WavePlan {
 struct RadialTwin {
   std::vector<Scene> scenes;  ///< in that order
   Theta theta;                ///< of all of them: the scene's, constants of the twin behind it
+
+  /// Of scenes[i], all else as in `of`.
+  static Demand demand(std::size_t i, Demand of) {
+    of.ceiling = Ceiling::wave, of.rays = Rays::straight;
+    of.method = i == 0 ? "series" : "split_step";
+    return of;
+  }
 };
 /// Of a sphere, one of the same size and indices whose axis is radial (shells: concentric). Of a sampled field with
 /// host in its box, a ball of as much liquid crystal of full order in the box's middle, sampled at the same nodes. None
