@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/threads.h"
+#include "render/band.h"
 #include "render/render_scalar.h"
 #include "samples/kind.h"
 #include "samples/pixels/edge_pixels.h"
@@ -90,105 +91,224 @@ const PlainOf<S>& plain_of_plane(const S& x, [[maybe_unused]] int plane) {
     return x;
 }
 
-/// samples_at() of a part of one row of the picture. Rings of equal samples are painted from the inside out; a root a
-/// ring and row instead of one a pixel.
-class SampleRings {
+/// Paints bands of a picture, and of its derivatives, into images that are there. Rows of a band are computed as point
+/// values, `reach` beyond its ends, and made means over pixels as soon as their neighbours are known.
+template <class S>
+class BandPainter {
  public:
-  explicit SampleRings(const RenderPlan& plan)
-      : center_x_(plan.sampling_center_x_px), center_y_(plan.sampling_center_y_px) {
-    rings_.push_back({0, plan.samples.empty() ? std::uint8_t{1} : static_cast<std::uint8_t>(plan.samples[0])});
-    for (std::size_t i = 1; i < plan.samples.size(); ++i)
-      if (plan.samples[i] != plan.samples[i - 1])
-        rings_.push_back({static_cast<double>(i) * plan.sampling_bin_px, static_cast<std::uint8_t>(plan.samples[i])});
+  /// `model`: after tabulate(). `images`: the intensity's and its derivatives', as many as are wanted.
+  BandPainter(const PixelModel<S>& model, const RenderPlan& plan, int width, int height,
+              const std::vector<Image*>& images)
+      : model_(model),
+        plan_(plan),
+        rings_(plan),
+        images_(images),
+        planes_(static_cast<int>(images.size())),
+        w_(width),
+        h_(height),
+        in_phase_(model.in_phase()),
+        traits_(model.fringe_traits()),
+        symmetry_(model.symmetry()),
+        computed_(symmetry_ != Symmetry::none ? (height + 1) / 2 : height) {
+    for (int p = 0; p < kPlanes; ++p) fields_of_[static_cast<std::size_t>(p)] = model.fringe_fields(p);
+    // Flows read two pixels beyond (fringe.h).
+    if (std::any_of(fields_of_.begin(), fields_of_.end(), [](const FringeFields& f) { return f.flow.has_value(); }))
+      reach_ = kRim;
   }
-  void fill(int row, int first_column, std::uint8_t* out, int width) const {
-    std::fill(out, out + width, rings_[0].samples);
-    const double dy = row - center_y_, middle = center_x_ - first_column, w = width;
-    for (std::size_t i = 1; i < rings_.size(); ++i) {
-      const double square = rings_[i].radius * rings_[i].radius - dy * dy, half = square > 0 ? std::sqrt(square) : 0;
-      const int left = static_cast<int>(std::clamp(std::floor(middle - half) + 1, 0.0, w));
-      const int right = static_cast<int>(std::clamp(std::ceil(middle + half), 0.0, w));
-      std::fill(out, out + std::min(left, right), rings_[i].samples);
-      std::fill(out + right, out + width, rings_[i].samples);
+  /// Those with most of the object first: what is left at the end, when one thread waits for the other, is background.
+  std::vector<int> bands() const {
+    std::vector<int> all(static_cast<std::size_t>((computed_ + Band::kRows - 1) / Band::kRows));
+    std::iota(all.begin(), all.end(), 0);
+    const auto off_centre = [&](int b) { return std::abs((b + 0.5) * Band::kRows - plan_.sampling_center_y_px); };
+    std::sort(all.begin(), all.end(), [&](int a, int b) { return off_centre(a) < off_centre(b); });
+    return all;
+  }
+  /// The band, and what a symmetry makes of it. Any thread may call it for a band of its own.
+  void paint(int number) const {
+    thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
+    thread_local NeededPoints needed;
+    const int top = number * Band::kRows, rows = std::min(Band::kRows, computed_ - top);
+    band.resize(w_, plan_.fringe_means ? 4 * kPlanes : kPlanes, reach_);
+    find_samples(band, top, rows);
+    FringeScratch scratch;
+    for (int r = -reach_; r < rows + reach_; ++r) {
+      compute(band, needed, scratch, top, r);
+      if (r < reach_) continue;
+      const int done = r - reach_;
+      if (plan_.fringe_means)
+        average_fringes(band, top, done);
+      else
+        average_points(band, top, done);
+      sample_pixels(band, top, done);
+      if (model_.has_passing_light()) add_passing(top + done);
+    }
+    if (symmetry_ != Symmetry::none)
+      for (int row = top; row < top + rows; ++row) mirror(row);
+  }
+
+ private:
+  using P = PlainOf<S>;
+  static constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives, kRim = Band::kRim;
+  using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
+
+  int wide() const { return w_ + 2 * kRim; }
+  static P columns_from(double first) { return load_lanes<P>(kCount.data()) + P(first); }
+  Targets targets(int row, int column) const {
+    Targets out{};
+    for (std::size_t p = 0; p < images_.size(); ++p) out[p] = images_[p]->row(row) + column;
+    return out;
+  }
+
+  /// How many points each pixel takes.
+  void find_samples(Band& band, int top, int rows) const {
+    for (int r = -2 * reach_; r < rows + 2 * reach_; ++r)
+      rings_.fill(std::clamp(top + r, -reach_, h_ - 1 + reach_), -kRim, band.samples(r), wide());
+    if (model_.edges() == 0) return;
+    thread_local EdgeMarks marks;
+    marks.look(model_, top - 2 * reach_, rows + 4 * reach_, -kRim, wide());
+    for (int r = -2 * reach_; r < rows + 2 * reach_; ++r) marks.mark(r + 2 * reach_, band.samples(r));
+  }
+  /// Point values of row r of the band that begins with the picture's row `top`.
+  void compute(Band& band, NeededPoints& needed, FringeScratch& scratch, int top, int r) const {
+    needed.find(
+        reach_, [&](int k) { return band.samples(r + k); }, wide());
+    std::array<double*, static_cast<std::size_t>(4 * kPlanes)> fields;
+    if (plan_.fringe_means)
+      for (int f = 0; f < 4; ++f) band.clear(f * kPlanes, r, !needed.all());
+    for (int c0 = 0; c0 < wide(); c0 += kStep) {
+      if (plan_.fringe_means) {
+        for (int p = 0; p < 4 * kPlanes; ++p) fields[static_cast<std::size_t>(p)] = band.row(p, r) + c0;
+        if (const int run = model_.fringe_run(c0 - kRim, top + r, wide() - c0, scratch, fields.data()); run > 0) {
+          c0 += run - kStep;
+          continue;
+        }
+      }
+      if (!needed.any(c0, std::min(kStep, wide() - c0))) continue;
+      const P column = columns_from(c0 - 1.0 * kRim), row(static_cast<double>(top + r));
+      const auto put = [&](const S& v, int field) {
+        Targets out;
+        for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
+        store(v, out, kPlanes, 0, kStep);
+      };
+      if (plan_.fringe_means) {
+        const FringePoint<S> v = model_.fringe(column, row);
+        put(v.amplitude, 0), put(v.phase, 1), put(v.mean, 2);
+        if (!in_phase_) put(v.quadrature, 3);
+      } else {
+        put(model_.intensity(column, row), 0);
+      }
+    }
+  }
+  /// Means of pixels of one sample, by fringe_means().
+  void average_fringes(Band& band, int top, int r) const {
+    // Where rows begin is asked for once: a pack reads dozens of them.
+    std::array<std::array<const double*, 2 * kRim + 1>, static_cast<std::size_t>(4 * kPlanes)> from;
+    for (std::size_t p = 0; p < from.size(); ++p)
+      for (int j = -kRim; j <= kRim; ++j)
+        from[p][static_cast<std::size_t>(j + kRim)] = band.row(static_cast<int>(p), r + j);
+    const P row(static_cast<double>(top + r));
+    const Targets to = targets(top + r, 0);
+    for (int c0 = 0; c0 < w_; c0 += kStep) {
+      const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA {
+        return load_shifted<P>(
+            from[static_cast<std::size_t>(field * kPlanes + plane)][static_cast<std::size_t>(j + kRim)] + c0, i + kRim);
+      };
+      const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA {
+        store_lanes(mean, to[static_cast<std::size_t>(plane)] + c0, 0, std::min(kStep, w_ - c0));
+      };
+      const P column = columns_from(c0);
+      const auto means = [&]<bool kQuadrature, bool kFlows>() BIREFIT_INLINE_LAMBDA {
+        fringe_means<kQuadrature, kFlows, kPlanes, P>(planes_, traits_, column, row, fields_of_.data(), load, put);
+      };
+      if constexpr (kPlanes > 1)
+        if (reach_ > 1) {
+          if (in_phase_)
+            means.template operator()<false, true>();
+          else
+            means.template operator()<true, true>();
+          continue;
+        }
+      if (in_phase_)
+        means.template operator()<false, false>();
+      else
+        means.template operator()<true, false>();
+    }
+  }
+  /// Means of pixels of one sample from point values: over a unit square of a smooth function f + laplacian f / 24,
+  /// here by the five-point formula.
+  void average_points(Band& band, int top, int r) const {
+    for (int p = 0; p < planes_; ++p) {
+      const double *up = band.row(p, r - 1) + kRim, *here = band.row(p, r) + kRim, *down = band.row(p, r + 1) + kRim;
+      double* out = images_[static_cast<std::size_t>(p)]->row(top + r);
+      for (int c = 0; c < w_; ++c)
+        out[c] = here[c] + (here[c - 1] + here[c + 1] + up[c] + down[c] - 4 * here[c]) * (1.0 / 24);
+    }
+  }
+  /// Pixels of several samples, packed into lanes by their number.
+  void sample_pixels(Band& band, int top, int r) const {
+    const std::uint8_t* n = band.samples(r) + kRim;
+    if (std::all_of(n, n + w_, [](std::uint8_t k) { return k == 1; })) return;
+    std::array<std::array<int, kLanes>, 9> waiting;
+    std::array<int, 9> count{};
+    const auto flush = [&](std::size_t most) {
+      double columns[kLanes];
+      for (int k = 0; k < kStep; ++k)
+        columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
+      const S v =
+          mean_over_pixels(model_, load_lanes<P>(columns), P(static_cast<double>(top + r)), static_cast<int>(most));
+      for (int k = 0; k < count[most]; ++k)
+        store(v, targets(top + r, waiting[most][static_cast<std::size_t>(k)]), planes_, k, 1);
+      count[most] = 0;
+    };
+    for (int c = 0; c < w_; ++c) {
+      if (n[c] == 1) continue;
+      if (n[c] & kEdgePixel) {
+        store(mean_over_cut_pixel(model_, plan_, c, top + r), targets(top + r, c), planes_, 0, 1);
+        continue;
+      }
+      const std::size_t most = n[c];
+      if (n[c] > 8 || (n[c] * n[c]) % kStep == 0) {
+        store(mean_over_one_pixel(model_, c, top + r, n[c]), targets(top + r, c), planes_, 0, 1);
+        continue;
+      }
+      waiting[most][static_cast<std::size_t>(count[most]++)] = c;
+      if (count[most] == kStep) flush(most);
+    }
+    for (std::size_t most = 2; most < 9; ++most)
+      if (count[most] > 0) flush(most);
+  }
+  void add_passing(int row) const {
+    for (int c0 = 0; c0 < w_; c0 += kStep) {
+      const S v = model_.passing(columns_from(c0), P(static_cast<double>(row)));
+      for (int p = 0; p < planes_; ++p) {
+        const P* light = &plain_of_plane(v, p);
+        double* out = images_[static_cast<std::size_t>(p)]->row(row) + c0;
+        for (int k = 0; k < std::min(kStep, w_ - c0); ++k) out[k] += lane(*light, k);
+      }
+    }
+  }
+  void mirror(int row) const {
+    const int other = h_ - 1 - row;
+    if (other == row) return;
+    for (Image* image : images_) {
+      if (symmetry_ == Symmetry::half_turn)
+        std::reverse_copy(image->row(row), image->row(row) + w_, image->row(other));
+      else
+        std::copy(image->row(row), image->row(row) + w_, image->row(other));
     }
   }
 
- private:
-  struct Ring {
-    double radius;
-    std::uint8_t samples;
-  };
-  double center_x_, center_y_;
-  std::vector<Ring> rings_;
-};
-
-/// Which points of a row are needed: one-sample pixels and their neighbours, `reach` pixels around them.
-class NeededPoints {
- public:
-  /// samples(r): those of row r, -reach to reach, w places each.
-  template <class Samples>
-  void find(int reach, const Samples& samples, int w) {
-    const std::uint8_t* here = samples(0);
-    all_ = std::all_of(here, here + w, [](std::uint8_t n) { return n == 1; });
-    if (all_) return;
-    const std::size_t size = static_cast<std::size_t>(w), margin = static_cast<std::size_t>(reach);
-    near_.assign(size + 2 * margin, 0);
-    flags_.assign(size, 0);
-    std::uint8_t *near = near_.data(), *flags = flags_.data();
-    for (int r = -reach; r <= reach; ++r) {
-      const std::uint8_t* n = samples(r);
-      for (std::size_t c = 0; c < size; ++c) near[c + margin] |= n[c] == 1;
-    }
-    for (std::size_t shift = 0; shift <= 2 * margin; ++shift)
-      for (std::size_t c = 0; c < size; ++c) flags[c] |= near[c + shift];
-  }
-  bool all() const { return all_; }
-  bool any(int first, int count) const {
-    if (all_) return true;
-    const auto from = flags_.begin() + first;
-    return std::find(from, from + count, 1) != from + count;
-  }
-
- private:
-  bool all_ = false;
-  std::vector<std::uint8_t> near_, flags_;
-};
-
-/// What a thread works on: a band of rows with `reach` more on either side. Rows are counted from the band's first,
-/// columns from the picture's rim, which is as wide as that of the squares of a table: their runs begin at a register's
-/// boundary. Point values of the last rows are at row(field * planes + plane, r); one field, the intensity, or with
-/// plan.fringe_means the four of a FringePoint.
-class Band {
- public:
-  static constexpr int kRim = FringeBlocks::kRim;
-  /// Many rows, so that few are computed twice; few, so that threads end together.
-  static constexpr int kRows = 25;
-  void resize(int width, int planes, int reach) {
-    held_ = 2 * reach + 1;
-    used_ = (static_cast<std::size_t>(width) + 2 * kRim + kLanes - 1) / kLanes * kLanes;
-    // A register more, and an odd number of cache lines: rows that begin at the same place of a page push each other
-    // out of the cache.
-    constexpr std::size_t kLine = 8;
-    wide_ = ((used_ + kLanes + kLine - 1) / kLine | 1) * kLine;
-    plane_ = wide_ * static_cast<std::size_t>(held_);
-    points_.resize(std::max(points_.size(), plane_ * static_cast<std::size_t>(planes)));
-    samples_.resize(wide_ * (kRows + 4 * kRim));
-  }
-  double* row(int plane, int r) {
-    return points_.data() + static_cast<std::size_t>(plane) * plane_ +
-           static_cast<std::size_t>((r + held_) % held_) * wide_;
-  }
-  /// Makes zeros of all of a row that is not computed: what is left of another picture would steer whole registers
-  /// (PixelMoments). Without `gaps` that is what lies beyond its end.
-  void clear(int plane, int r, bool gaps) { std::fill(row(plane, r) + (gaps ? 0 : used_), row(plane, r) + wide_, 0.0); }
-  /// Samples of row r, from -2 kRim on.
-  std::uint8_t* samples(int r) { return samples_.data() + static_cast<std::size_t>(r + 2 * kRim) * wide_; }
-
- private:
-  int held_ = 0;
-  std::size_t used_ = 0, wide_ = 0, plane_ = 0;
-  std::vector<double, xsimd::aligned_allocator<double, 64>> points_;
-  std::vector<std::uint8_t> samples_;
+  const PixelModel<S>& model_;
+  const RenderPlan& plan_;
+  SampleRings rings_;
+  const std::vector<Image*>& images_;
+  int planes_, w_, h_;
+  bool in_phase_;
+  FringeTraits traits_;
+  std::array<FringeFields, static_cast<std::size_t>(kPlanes)> fields_of_{};
+  Symmetry symmetry_;
+  int computed_;  ///< rows; the others are copied
+  int reach_ = 1;
 };
 
 /// The intensity and its derivatives by `active`, at most as many as S carries, into `images`; they are made where
@@ -197,187 +317,17 @@ template <class S>
 void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active,
                    int threads, const std::vector<Image*>& images) {
   const Values<S> value(theta, active);
-  std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
-  constexpr int kStep = kLanesOf<S>, kPlanes = 1 + ScalarTraits<S>::derivatives, kRim = Band::kRim;
-  const int w = scene.view.width, h = scene.view.height, wide = w + 2 * kRim,
-            planes = static_cast<int>(active.size()) + 1;
-  using Targets = std::array<double*, static_cast<std::size_t>(kPlanes)>;
+  const std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
   model->tabulate(PixelModel<S>::Wanted::picture, threads);
-  const bool in_phase = model->in_phase();
-  const FringeTraits traits = model->fringe_traits();
-  std::array<FringeFields, static_cast<std::size_t>(kPlanes)> fields_of{};
-  for (int p = 0; p < kPlanes; ++p) fields_of[static_cast<std::size_t>(p)] = model->fringe_fields(p);
-  // Flows read two pixels beyond (fringe.h).
-  const int reach =
-      std::any_of(fields_of.begin(), fields_of.end(), [](const FringeFields& f) { return f.flow.has_value(); }) ? kRim
-                                                                                                                : 1;
-  const SampleRings rings(plan);
-  parallel_for(planes, threads, [&](int p) {
+  const int w = scene.view.width, h = scene.view.height;
+  parallel_for(static_cast<int>(images.size()), threads, [&](int p) {
     Image& image = *images[static_cast<std::size_t>(p)];
     if (image.width() != w || image.height() != h) image = Image(w, h);
   });
-  const Symmetry symmetry = model->symmetry();
-  const int computed = symmetry != Symmetry::none ? (h + 1) / 2 : h;  // rows; the others are copied
-  // Bands with most of the object first: what is left at the end, when one thread waits for the other, is background.
-  std::vector<int> bands(static_cast<std::size_t>((computed + Band::kRows - 1) / Band::kRows));
-  std::iota(bands.begin(), bands.end(), 0);
-  const auto off_centre = [&](int b) { return std::abs((b + 0.5) * Band::kRows - plan.sampling_center_y_px); };
-  std::sort(bands.begin(), bands.end(), [&](int a, int b) { return off_centre(a) < off_centre(b); });
-  parallel_for(static_cast<int>(bands.size()), threads, [&](int i) {
-    const int b = bands[static_cast<std::size_t>(i)];
-    thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
-    thread_local NeededPoints needed;
-    const int top = b * Band::kRows, rows = std::min(Band::kRows, computed - top);
-    band.resize(w, plan.fringe_means ? 4 * kPlanes : kPlanes, reach);
-    for (int r = -2 * reach; r < rows + 2 * reach; ++r)
-      rings.fill(std::clamp(top + r, -reach, h - 1 + reach), -kRim, band.samples(r), wide);
-    if (model->edges() > 0) {
-      thread_local EdgeMarks marks;
-      marks.look(*model, top - 2 * reach, rows + 4 * reach, -kRim, wide);
-      for (int r = -2 * reach; r < rows + 2 * reach; ++r) marks.mark(r + 2 * reach, band.samples(r));
-    }
-    FringeScratch scratch;
-    const auto compute = [&](int r) {
-      needed.find(
-          reach, [&](int k) { return band.samples(r + k); }, wide);
-      std::array<double*, static_cast<std::size_t>(4 * kPlanes)> fields;
-      if (plan.fringe_means)
-        for (int f = 0; f < 4; ++f) band.clear(f * kPlanes, r, !needed.all());
-      for (int c0 = 0; c0 < wide; c0 += kStep) {
-        if (plan.fringe_means) {
-          for (int p = 0; p < 4 * kPlanes; ++p) fields[static_cast<std::size_t>(p)] = band.row(p, r) + c0;
-          if (const int run = model->fringe_run(c0 - kRim, top + r, wide - c0, scratch, fields.data()); run > 0) {
-            c0 += run - kStep;
-            continue;
-          }
-        }
-        if (!needed.any(c0, std::min(kStep, wide - c0))) continue;
-        const PlainOf<S> column = load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(c0 - 1.0 * kRim),
-                         row(static_cast<double>(top + r));
-        const auto put = [&](const S& v, int field) {
-          Targets out;
-          for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
-          store(v, out, kPlanes, 0, kStep);
-        };
-        if (plan.fringe_means) {
-          const FringePoint<S> v = model->fringe(column, row);
-          put(v.amplitude, 0), put(v.phase, 1), put(v.mean, 2);
-          if (!in_phase) put(v.quadrature, 3);
-        } else {
-          put(model->intensity(column, row), 0);
-        }
-      }
-    };
-    const auto finish = [&](int r) {
-      const auto targets = [&](int column) {
-        Targets out{};
-        for (std::size_t p = 0; p < images.size(); ++p) out[p] = images[p]->row(top + r) + column;
-        return out;
-      };
-      if (plan.fringe_means) {
-        // Where rows begin is asked for once: a pack reads dozens of them.
-        std::array<std::array<const double*, 2 * kRim + 1>, static_cast<std::size_t>(4 * kPlanes)> from;
-        for (std::size_t p = 0; p < from.size(); ++p)
-          for (int j = -kRim; j <= kRim; ++j)
-            from[p][static_cast<std::size_t>(j + kRim)] = band.row(static_cast<int>(p), r + j);
-        const PlainOf<S> row(static_cast<double>(top + r));
-        const Targets to = targets(0);
-        for (int c0 = 0; c0 < w; c0 += kStep) {
-          using P = PlainOf<S>;
-          const auto load = [&](int plane, int field, int j, int i) BIREFIT_INLINE_LAMBDA {
-            return load_shifted<P>(
-                from[static_cast<std::size_t>(field * kPlanes + plane)][static_cast<std::size_t>(j + kRim)] + c0,
-                i + kRim);
-          };
-          const auto put = [&](int plane, const P& mean) BIREFIT_INLINE_LAMBDA {
-            store_lanes(mean, to[static_cast<std::size_t>(plane)] + c0, 0, std::min(kStep, w - c0));
-          };
-          const P column = load_lanes<P>(kCount.data()) + P(static_cast<double>(c0));
-          const auto means = [&]<bool kQuadrature, bool kFlows>() BIREFIT_INLINE_LAMBDA {
-            fringe_means<kQuadrature, kFlows, kPlanes, P>(planes, traits, column, row, fields_of.data(), load, put);
-          };
-          if constexpr (kPlanes > 1)
-            if (reach > 1) {
-              if (in_phase)
-                means.template operator()<false, true>();
-              else
-                means.template operator()<true, true>();
-              continue;
-            }
-          if (in_phase)
-            means.template operator()<false, false>();
-          else
-            means.template operator()<true, false>();
-        }
-      } else {
-        for (int p = 0; p < planes; ++p) {
-          const double *up = band.row(p, r - 1) + kRim, *here = band.row(p, r) + kRim,
-                       *down = band.row(p, r + 1) + kRim;
-          double* out = images[static_cast<std::size_t>(p)]->row(top + r);
-          // Mean over a unit square of a smooth function: f + laplacian f / 24, here by the five-point formula.
-          for (int c = 0; c < w; ++c)
-            out[c] = here[c] + (here[c - 1] + here[c + 1] + up[c] + down[c] - 4 * here[c]) * (1.0 / 24);
-        }
-      }
-      // Pixels of several samples, packed into lanes by their number.
-      const std::uint8_t* n = band.samples(r) + kRim;
-      if (std::all_of(n, n + w, [](std::uint8_t k) { return k == 1; })) return;
-      std::array<std::array<int, kLanes>, 9> waiting;
-      std::array<int, 9> count{};
-      const auto flush = [&](std::size_t most) {
-        double columns[kLanes];
-        for (int k = 0; k < kStep; ++k)
-          columns[k] = waiting[most][static_cast<std::size_t>(std::min(k, count[most] - 1))];
-        const S v = mean_over_pixels(*model, load_lanes<PlainOf<S>>(columns), PlainOf<S>(static_cast<double>(top + r)),
-                                     static_cast<int>(most));
-        for (int k = 0; k < count[most]; ++k)
-          store(v, targets(waiting[most][static_cast<std::size_t>(k)]), planes, k, 1);
-        count[most] = 0;
-      };
-      for (int c = 0; c < w; ++c) {
-        if (n[c] == 1) continue;
-        if (n[c] & kEdgePixel) {
-          store(mean_over_cut_pixel(*model, plan, c, top + r), targets(c), planes, 0, 1);
-          continue;
-        }
-        const std::size_t most = n[c];
-        if (n[c] > 8 || (n[c] * n[c]) % kStep == 0) {
-          store(mean_over_one_pixel(*model, c, top + r, n[c]), targets(c), planes, 0, 1);
-          continue;
-        }
-        waiting[most][static_cast<std::size_t>(count[most]++)] = c;
-        if (count[most] == kStep) flush(most);
-      }
-      for (std::size_t most = 2; most < 9; ++most)
-        if (count[most] > 0) flush(most);
-    };
-    const auto add_passing = [&](int r) {
-      for (int c0 = 0; c0 < w; c0 += kStep) {
-        const S v = model->passing(load_lanes<PlainOf<S>>(kCount.data()) + PlainOf<S>(static_cast<double>(c0)),
-                                   PlainOf<S>(static_cast<double>(top + r)));
-        for (int p = 0; p < planes; ++p) {
-          const PlainOf<S>* light = &plain_of_plane(v, p);
-          double* out = images[static_cast<std::size_t>(p)]->row(top + r) + c0;
-          for (int k = 0; k < std::min(kStep, w - c0); ++k) out[k] += lane(*light, k);
-        }
-      }
-    };
-    for (int r = -reach; r < rows + reach; ++r) {
-      compute(r);
-      if (r < reach) continue;
-      finish(r - reach);
-      if (model->has_passing_light()) add_passing(r - reach);
-    }
-    if (symmetry == Symmetry::none) return;
-    for (int row = top; row < top + rows; ++row)
-      if (const int other = h - 1 - row; other != row)
-        for (Image* image : images) {
-          if (symmetry == Symmetry::half_turn)
-            std::reverse_copy(image->row(row), image->row(row) + w, image->row(other));
-          else
-            std::copy(image->row(row), image->row(row) + w, image->row(other));
-        }
-  });
+  const BandPainter<S> painter(*model, plan, w, h, images);
+  const std::vector<int> bands = painter.bands();
+  parallel_for(static_cast<int>(bands.size()), threads,
+               [&](int i) { painter.paint(bands[static_cast<std::size_t>(i)]); });
 }
 
 template <class S>

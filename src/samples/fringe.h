@@ -146,6 +146,38 @@ struct ThirdDerivatives {
   }
 };
 
+/// What the mean over a pixel changes by where its nine points are carried along: by their quadratic's derivatives and
+/// by third ones, of which they take a sixth for slope. `mean_by`: the mean's derivatives by the quadratic's numbers.
+template <class P>
+struct CarriedMean {
+  P by_column = P(0.0), by_row = P(0.0), by_growth = P(0.0);
+
+  BIREFIT_INLINE void carry(const NinePoints<P>& f, const NinePoints<P>& mean_by) {
+    by_column = by_column + (mean_by.f * f.x + mean_by.x * f.xx + mean_by.y * f.xy);
+    by_row = by_row + (mean_by.f * f.y + mean_by.x * f.xy + mean_by.y * f.yy);
+    by_growth = by_growth + (mean_by.x * f.x + mean_by.y * f.y) +
+                P(2.0) * (mean_by.xx * f.xx + mean_by.xy * f.xy + mean_by.yy * f.yy);
+  }
+  template <class At>
+  BIREFIT_INLINE void carry_third(const NinePoints<P>& f, const NinePoints<P>& mean_by, const At& at) {
+    const auto third = ThirdDerivatives<P>::of(f, at);
+    const P sixth = P(-1.0 / 6) * mean_by.f;
+    by_column = by_column + ((mean_by.xx + sixth) * third.xxx + mean_by.xy * third.xxy + mean_by.yy * third.xyy);
+    by_row = by_row + ((mean_by.yy + sixth) * third.yyy + mean_by.xy * third.xyy + mean_by.xx * third.xxy);
+    by_growth = by_growth + P(1.0 / 3) * (mean_by.x * third.xxx + mean_by.y * third.yyy);
+  }
+  /// The mean field itself, of which a pixel sees the curvature.
+  BIREFIT_INLINE void carry_mean(const NinePoints<P>& mean) {
+    by_column = by_column + mean.x;
+    by_row = by_row + mean.y;
+    by_growth = by_growth + P(1.0 / 12) * (mean.xx + mean.yy);
+  }
+  BIREFIT_INLINE P along(const FringeFlow& flow, const P& column, const P& row) const {
+    const P growth(flow.growth);
+    return (P(flow.column) + growth * column) * by_column + (P(flow.row) + growth * row) * by_row + growth * by_growth;
+  }
+};
+
 /// Mean over the middle pixel of nine at unit distance, second order in the curvature of phase and amplitude and exact
 /// in the phase's slope, with its derivatives. load(plane, field, row, column): plane 0 holds values, the others, of
 /// kMostPlanes at most, their derivatives by parameters; fields are numbered as in FringePoint, row and column from the
@@ -224,37 +256,19 @@ BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P
       xy * by.bend,
       yy * half_bend};
 
-  // Nine points that are carried along change by their quadratic's derivatives and by third ones, of which they take a
-  // sixth for slope.
-  [[maybe_unused]] P by_column(0.0), by_row(0.0), by_growth(0.0);
+  [[maybe_unused]] CarriedMean<P> carried;
   if constexpr (kFlows) {
-    const auto carry = [&](const NinePoints<P>& f, const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
-      by_column = by_column + (mean_by.f * f.x + mean_by.x * f.xx + mean_by.y * f.xy);
-      by_row = by_row + (mean_by.f * f.y + mean_by.x * f.xy + mean_by.y * f.yy);
-      by_growth = by_growth + (mean_by.x * f.x + mean_by.y * f.y) +
-                  P(2.0) * (mean_by.xx * f.xx + mean_by.xy * f.xy + mean_by.yy * f.yy);
-    };
-    const auto carry_third = [&](int number, const NinePoints<P>& f,
-                                 const NinePoints<P>& mean_by) BIREFIT_INLINE_LAMBDA {
-      const auto third = ThirdDerivatives<P>::of(f, field(0, number));
-      const P sixth = P(-1.0 / 6) * mean_by.f;
-      by_column = by_column + ((mean_by.xx + sixth) * third.xxx + mean_by.xy * third.xxy + mean_by.yy * third.xyy);
-      by_row = by_row + ((mean_by.yy + sixth) * third.yyy + mean_by.xy * third.xyy + mean_by.xx * third.xxy);
-      by_growth = by_growth + P(1.0 / 3) * (mean_by.x * third.xxx + mean_by.y * third.yyy);
-    };
-    carry(phase, by_phase);
-    carry_third(1, phase, by_phase);
-    carry(amplitude, by_amplitude);
-    if constexpr (kQuadrature) carry(quadrature, by_quadrature);
+    carried.carry(phase, by_phase);
+    carried.carry_third(phase, by_phase, field(0, 1));
+    carried.carry(amplitude, by_amplitude);
+    if constexpr (kQuadrature) carried.carry(quadrature, by_quadrature);
     const NinePoints<P> mean = NinePoints<P>::of(field(0, 2));
-    by_column = by_column + mean.x;
-    by_row = by_row + mean.y;
-    by_growth = by_growth + P(1.0 / 12) * (mean.xx + mean.yy);  // what a pixel sees of the curvature
+    carried.carry_mean(mean);
     if (!traits.even) {
       const P none(0.0), share(traits.averaged ? 0.0 : 1.0 / 24);
-      carry_third(2, mean, {P(1.0), none, none, share, none, share});
-      carry_third(0, amplitude, by_amplitude);
-      if constexpr (kQuadrature) carry_third(3, quadrature, by_quadrature);
+      carried.carry_third(mean, {P(1.0), none, none, share, none, share}, field(0, 2));
+      carried.carry_third(amplitude, by_amplitude, field(0, 0));
+      if constexpr (kQuadrature) carried.carry_third(quadrature, by_quadrature, field(0, 3));
     }
   }
   put(0, value);
@@ -265,9 +279,7 @@ BIREFIT_INLINE void fringe_means(int planes, const FringeTraits& traits, const P
     const FringeFields& moved = fields[plane];
     if constexpr (kFlows)
       if (moved.flow) {
-        const P growth(moved.flow->growth);
-        put(plane, (P(moved.flow->column) + growth * column) * by_column +
-                       (P(moved.flow->row) + growth * row) * by_row + growth * by_growth);
+        put(plane, carried.along(*moved.flow, column, row));
         continue;
       }
     P d(0.0);
