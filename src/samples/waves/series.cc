@@ -135,8 +135,9 @@ class SeriesImage final : public PixelModel<S> {
   DropletOptics<S> optics_;
   double reach_um_;
   int panels_;
+  S na_;
   Pupil pupil_;
-  S na_, focus_um_;
+  S focus_um_;
   RoundLight<S> light_;
   RoundView<S> view_;
   Symmetry symmetry_;
