@@ -41,6 +41,7 @@ struct ImageSeries {
   };
   std::filesystem::path path;
   std::string text;                  ///< the config as read
+  std::vector<std::string> set;      ///< what `--set` changes in it
   std::vector<SeriesFrame> frames;   ///< by rows of the table, else by name with numbers counted as such
   std::vector<Column> columns;       ///< of the table, `file` left out
   std::optional<std::size_t> along;  ///< column to draw the estimates against, which then may be no parameter
@@ -50,8 +51,9 @@ struct ImageSeries {
 };
 
 /// Reads and checks a series completely, every image of it; throws UserError with every mistake found. Frames whose own
-/// image is missing, damaged or of no use are marked `unreadable`; at least one is not.
-ImageSeries load_series(const std::filesystem::path& path);
+/// image is missing, damaged or of no use are marked `unreadable`; at least one is not. `set`:
+/// config_set.h.
+ImageSeries load_series(const std::filesystem::path& path, const std::vector<std::string>& set = {});
 
 /// The config of one frame, as if it were alone: it can be fitted. Throws FrameError where its image is of no use.
 Config load_frame(const ImageSeries& series, std::size_t frame);

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -30,5 +31,7 @@ inline constexpr int kExitInternalError = 3;
 
 /// --threads, checked: 0 (all cores) to 1024.
 void add_threads_option(CLI::App& app, int& threads);
+/// --set PATH=VALUE, any number of times.
+void add_set_option(CLI::App& app, std::vector<std::string>& set);
 
 }  // namespace birefit

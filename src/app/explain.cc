@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "birefit/config_set.h"
 #include "birefit/io.h"
 #include "samples/waves/wave.h"
 
@@ -20,6 +21,7 @@ namespace {
 
 struct Arguments {
   std::string config;
+  std::vector<std::string> set;
   std::string next;
   bool json = false, check = false;
 };
@@ -82,7 +84,7 @@ double seconds_an_image(const Scene& scene, const RenderPlan& chosen, const Thet
 }
 
 int run_explain(const Arguments& arguments) {
-  const Config config = load_config(arguments.config, ConfigUse::plan);
+  const Config config = load_config(arguments.config, ConfigUse::plan, std::nullopt, arguments.set);
   const ParameterTable& table = config.job.parameters;
   const Theta theta = table.values();
   const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
@@ -200,6 +202,7 @@ Command add_explain_command(CLI::App& app) {
       app.add_subcommand("explain", "which model and method would run, why, and what it costs and errs");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  add_set_option(*command, arguments->set);
   command->add_option("--next", arguments->next,
                       "which image to take next to know this parameter better: candidates, best first");
   command->add_flag("--json", arguments->json, "for scripts");

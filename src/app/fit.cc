@@ -10,6 +10,7 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/output.h"
+#include "birefit/config_set.h"
 #include "birefit/io.h"
 
 namespace birefit {
@@ -17,6 +18,7 @@ namespace {
 
 struct Arguments {
   std::string config;
+  std::vector<std::string> set;
   std::string image;
   std::string out;
   int threads = -1, coverage = 0;
@@ -28,9 +30,9 @@ int run_fit(const Arguments& arguments) {
   Problems problems;
   Config config;
   try {
-    config =
-        load_config(arguments.config, ConfigUse::fit,
-                    arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image));
+    config = load_config(arguments.config, ConfigUse::fit,
+                         arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image),
+                         arguments.set);
   } catch (const UserError& error) {
     problems.add(error);
   }
@@ -79,6 +81,7 @@ Command add_fit_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("fit", "estimate the parameters marked `fit`");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  add_set_option(*command, arguments->set);
   command->add_option("--image", arguments->image, "use this image in place of micrograph.image");
   command->add_option("--out", arguments->out, "folder for the results; default: the config's name + \"-fit\", here");
   add_threads_option(*command, arguments->threads);

@@ -9,6 +9,7 @@
 
 #include "app/commands.h"
 #include "app/output.h"
+#include "birefit/config_set.h"
 #include "birefit/io.h"
 
 namespace birefit {
@@ -16,6 +17,7 @@ namespace {
 
 struct Arguments {
   std::string config;
+  std::vector<std::string> set;
   std::string out;
   bool quiet = false;
 };
@@ -24,7 +26,7 @@ int run_jones(const Arguments& arguments) {
   Problems problems;
   Config config;
   try {
-    config = load_config(arguments.config, ConfigUse::render);
+    config = load_config(arguments.config, ConfigUse::render, std::nullopt, arguments.set);
   } catch (const UserError& error) {
     problems.add(error);
   }
@@ -72,6 +74,7 @@ Command add_jones_command(CLI::App& app) {
       app.add_subcommand("jones", "complex transmission matrices (slab scenes: per direction; others: per pixel)");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out, "table to write (.csv)")->required();
   command->add_flag("--quiet", arguments->quiet, "print nothing");
   return {command, [arguments] { return run_jones(*arguments); }};

@@ -18,6 +18,12 @@ void add_threads_option(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "number of threads; 0 = all cores")->check(CLI::Range(0, 1024));
 }
 
+void add_set_option(CLI::App& app, std::vector<std::string>& set) {
+  app.add_option("--set", set,
+                 "PATH=VALUE: another value of the config, for example sample.droplet.diameter_um=9.3; may be repeated")
+      ->allow_extra_args(false);
+}
+
 namespace {
 
 int run(int argc, char** argv) {

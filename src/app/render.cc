@@ -7,6 +7,7 @@
 
 #include "app/commands.h"
 #include "app/output.h"
+#include "birefit/config_set.h"
 #include "birefit/io.h"
 
 namespace birefit {
@@ -14,6 +15,7 @@ namespace {
 
 struct Arguments {
   std::string config;
+  std::vector<std::string> set;
   std::string out;
   int threads = 0;
   bool quiet = false;
@@ -23,7 +25,7 @@ int run_render(const Arguments& arguments) {
   Problems problems;
   Config config;
   try {
-    config = load_config(arguments.config, ConfigUse::render);
+    config = load_config(arguments.config, ConfigUse::render, std::nullopt, arguments.set);
   } catch (const UserError& error) {
     problems.add(error);
   }
@@ -56,6 +58,7 @@ Command add_render_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "the forward image at the config's values");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out, "image to write: .exr, .tif (float) or .png (16 bit)")->required();
   add_threads_option(*command, arguments->threads);
   command->add_flag("--quiet", arguments->quiet, "print nothing");

@@ -28,6 +28,7 @@ constexpr std::size_t kFramesTogether = 4;
 
 struct Arguments {
   std::string config;
+  std::vector<std::string> set;
   std::string out;
   int threads = -1;
   bool resume = false;
@@ -194,7 +195,7 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
 }
 
 int run_series(const Arguments& arguments) {
-  ImageSeries series = load_series(arguments.config);
+  ImageSeries series = load_series(arguments.config, arguments.set);
   const fs::path out = arguments.out.empty() ? fs::path(arguments.config).stem().string() + "-series" : arguments.out;
   std::error_code code;
   if (!arguments.resume && (fs::exists(out / "frames", code) || fs::exists(out / "series.csv", code)))
@@ -271,6 +272,7 @@ Command add_series_command(CLI::App& app) {
       app.add_subcommand("series", "fit every image of a series, with parameters of its own and shared ones");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML), with micrographs: {files: ..}")->required();
+  add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out,
                       "folder for the results; default: the config's name + \"-series\", here");
   command->add_flag("--resume", arguments->resume,

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "birefit/io.h"
+#include "birefit/config_set.h"
 #include "io/config_disc.h"
 #include "io/config_fit.h"
 #include "io/config_items.h"
@@ -24,6 +24,7 @@
 #include "io/config_signal.h"
 #include "io/config_signal_frames.h"
 #include "io/config_starts.h"
+#include "io/overrides.h"
 #include "medium/references.h"
 
 namespace birefit {
@@ -56,14 +57,14 @@ constexpr int kMaxImageSide = 16384;
 
 /// `image` replaces the single micrograph's file; with `series` the micrograph is one of its frames. Without `starts`
 /// nothing is looked for in the image: enough to know that a config is sound.
-Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
-            const std::optional<std::filesystem::path>& image, const ImageSeries* series = nullptr,
+Config load(const std::filesystem::path& path, const std::string& text, const std::vector<std::string>& set,
+            ConfigUse use, const std::optional<std::filesystem::path>& image, const ImageSeries* series = nullptr,
             std::size_t frame = 0, bool starts = true) {
   Config config;
   config.path = path;
-  config.text = std::move(text);
   ConfigReader reader(path.string(), path.parent_path(), use);
-  const YamlNode tree = parse_yaml(config.text, reader.file, reader.problems);
+  const YamlNode tree = parse_config(text, reader.file, set, reader.problems);
+  config.text = text_as_set(text, tree, set);
   const Block root{&tree, "", {reader.file}};
   reader.check_keys(tree, "",
                     {"micrograph", "micrographs", "calibration", "image_size_px", "sample", "microscope", "accuracy",
@@ -307,6 +308,9 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
     std::vector<Observable> observables(micrographs.size());
     std::vector<std::vector<Picture>> filled(micrographs.size());
     std::string of_colours;  // the first picture that is one colour of several
+    std::string of_codes;    // the first photograph of which nothing says how codes follow light
+    const YamlNode* block = root.find("micrograph");
+    const bool transfer_stated = block && block->find("transfer");
     const bool frames_missing = settings.calibrated() && !calibration;
     const bool mask_missing = settings.mask && !user_mask;
     for (std::size_t i = 0; i < items.size(); ++i) {
@@ -333,6 +337,7 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
       if (frames_missing || mask_missing) continue;
       if (loaded->colour || !settings.mosaic.bayer.empty())
         of_colours = of_colours.empty() ? micrograph.name : of_colours;
+      if (loaded->colour && loaded->bits == 8 && !transfer_stated && of_codes.empty()) of_codes = micrograph.name;
       filled[i] = pictures_of(reader, settings, calibration ? &*calibration : nullptr,
                               user_mask ? &*user_mask : nullptr, std::move(*loaded), where, micrograph);
     }
@@ -352,6 +357,10 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
           ": a channel of a colour camera passes light about 100 nm wide, unless a filter or the lamp's "
           "line makes it less; the model takes one wavelength. State microscope.light.bandwidth_nm (1 for "
           "a laser); in white light the intervals do not hold.");
+    if (!of_codes.empty())
+      reader.warnings.push_back(of_codes +
+                                ": colours of 8 bits are sRGB codes as a rule, which are no measure of light; they are "
+                                "taken as linear. State micrograph.transfer: srgb, or linear.");
     if (calibration && calibration->has_crossed && settings.offset_automatic) {
       Parameter& offset = reader.table[settings.offset];
       offset.value = calibration->crossed_median;
@@ -413,29 +422,34 @@ Config load(const std::filesystem::path& path, std::string text, ConfigUse use,
 
 }  // namespace
 
-Config load_config(const std::filesystem::path& path, ConfigUse use,
-                   const std::optional<std::filesystem::path>& image) {
+Config load_config(const std::filesystem::path& path, ConfigUse use, const std::optional<std::filesystem::path>& image,
+                   const std::vector<std::string>& set) {
   std::string text = read_text(path);
-  if (use != ConfigUse::fit && holds_series(text)) {
+  if (use != ConfigUse::fit && holds_series(text, set)) {
     // What the frames have in common shows in the first that can be read.
-    const ImageSeries series = read_series(path, std::move(text));
+    const ImageSeries series = read_series(path, std::move(text), set);
     for (std::size_t frame = 0;; ++frame) {
       try {
-        return load(path, series.text, use, image, &series, frame);
+        return load(path, series.text, set, use, image, &series, frame);
       } catch (const FrameError&) {
         if (frame + 1 == series.frames.size()) throw;
       }
     }
   }
-  return load(path, std::move(text), use, image);
+  return load(path, text, set, use, image);
+}
+
+Config load_config(const std::filesystem::path& path, ConfigUse use,
+                   const std::optional<std::filesystem::path>& image) {
+  return load_config(path, use, image, {});
 }
 
 Config load_frame(const ImageSeries& series, std::size_t frame) {
-  return load(series.path, series.text, ConfigUse::fit, std::nullopt, &series, frame);
+  return load(series.path, series.text, series.set, ConfigUse::fit, std::nullopt, &series, frame);
 }
 
 void check_frame(const ImageSeries& series, std::size_t frame) {
-  load(series.path, series.text, ConfigUse::fit, std::nullopt, &series, frame, false);
+  load(series.path, series.text, series.set, ConfigUse::fit, std::nullopt, &series, frame, false);
 }
 
 }  // namespace birefit

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "io/config_frames.h"
+#include "io/overrides.h"
 #include "io/table.h"
 
 namespace birefit {
@@ -63,10 +64,10 @@ bool is_series(const YamlNode& micrographs) {
   return micrographs.is_map() && (micrographs.find("files") || micrographs.find("set_from"));
 }
 
-bool holds_series(const std::string& text) {
+bool holds_series(const std::string& text, const std::vector<std::string>& set) {
   try {
     Problems ignored;
-    const YamlNode tree = parse_yaml(text, "", ignored);
+    const YamlNode tree = parse_config(text, "", set, ignored);
     const YamlNode* micrographs = tree.find("micrographs");
     return micrographs && is_series(*micrographs);
   } catch (const UserError&) {
@@ -74,12 +75,13 @@ bool holds_series(const std::string& text) {
   }
 }
 
-ImageSeries read_series(const fs::path& path, std::string text) {
+ImageSeries read_series(const fs::path& path, std::string text, const std::vector<std::string>& set) {
   ImageSeries series;
   series.path = path;
   series.text = std::move(text);
+  series.set = set;
   ConfigReader reader(path.string(), path.parent_path(), ConfigUse::fit);
-  const YamlNode tree = parse_yaml(series.text, reader.file, reader.problems);
+  const YamlNode tree = parse_config(series.text, reader.file, set, reader.problems);
   const YamlNode* node = tree.find("micrographs");
   if (!node || !is_series(*node)) {
     reader.problems.add(node ? node->where : Where{reader.file}, "is no series: it has no micrographs: {files: ..}",

@@ -13,10 +13,10 @@ namespace birefit {
 /// Is this `micrographs:` a series?
 bool is_series(const YamlNode& micrographs);
 /// The same of a whole config; false for what cannot be read.
-bool holds_series(const std::string& text);
+bool holds_series(const std::string& text, const std::vector<std::string>& set);
 
 /// What the block says, with the images found and the table joined to them. Images are not opened. Throws UserError.
-ImageSeries read_series(const std::filesystem::path& path, std::string text);
+ImageSeries read_series(const std::filesystem::path& path, std::string text, const std::vector<std::string>& set = {});
 
 /// Reads a frame and its image, and throws what is wrong with them.
 void check_frame(const ImageSeries& series, std::size_t frame);

@@ -159,8 +159,8 @@ std::string cells(const ParameterEstimate& p) {
 
 }  // namespace
 
-ImageSeries load_series(const std::filesystem::path& path) {
-  ImageSeries series = read_series(path, read_text(path));
+ImageSeries load_series(const std::filesystem::path& path, const std::vector<std::string>& set) {
+  ImageSeries series = read_series(path, read_text(path), set);
   if (!series.own.empty())
     throw UserError(series.own[0].second, "micrographs.own is of one fit of all images (birefit fit)",
                     "every frame of a series has for itself what shared: [..] does not name: leave own out");
