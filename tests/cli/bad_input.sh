@@ -359,12 +359,12 @@ fi
 
 # ---- command line ----------------------------------------------------------------------------------------------------
 
-for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml --nonsense' 'new teapot' 'new' 'series' ''; do
+for arguments in 'frobnicate' 'fit' 'fit bad.yaml --threads many' 'fit bad.yaml --nonsense' 'new teapot' 'series' ''; do
   checks=$((checks + 1))
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 2 ] && [ -s stderr.txt ] || fail "arguments: $arguments"
 done
-for arguments in '--help' '--version' 'fit --help' 'series --help' 'new droplet' 'new cell' 'new plate' 'new crystal' 'new slab' 'new volume'; do
+for arguments in '--help' '--version' 'fit --help' 'series --help' 'new' 'new droplet' 'new cell' 'new plate' 'new crystal' 'new slab' 'new volume'; do
   checks=$((checks + 1))
   "$birefit" $arguments > stdout.txt 2> stderr.txt
   [ $? -eq 0 ] && [ -s stdout.txt ] || fail "arguments: $arguments"
@@ -382,7 +382,7 @@ for kind in droplet cell plate crystal slab volume; do
 done
 
 checks=$((checks + 1))
-"$birefit" new series | sed 's/0.05 /0.5 /' > bad.yaml
+"$birefit" new series | sed 's/0.05 /0.5 /; s/frames\/\*.png/frames\/*.tif/' > bad.yaml
 "$birefit" explain bad.yaml > stdout.txt 2> stderr.txt && grep -q '32 x 32 pixels' stdout.txt || fail 'new series has a mistake of its own'
 
 echo "$checks checks, $failures failures"

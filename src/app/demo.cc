@@ -1,0 +1,101 @@
+#include "app/demo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iostream>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "app/output.h"
+#include "birefit/config_set.h"
+#include "birefit/error.h"
+#include "birefit/io.h"
+#include "birefit/render.h"
+
+namespace birefit {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kReadCounts = 4, kCountsPerPhoton = 0.5, kTopCode = 65535;
+
+/// Normal numbers, the same on every machine: splitmix64 (Steele, Lea, Flood 2014) through Box and Muller's formula.
+class Noise {
+ public:
+  double operator()() { return std::sqrt(-2 * std::log(uniform())) * std::cos(2 * M_PI * uniform()); }
+
+ private:
+  double uniform() {
+    std::uint64_t z = state_ += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return (static_cast<double>((z ^ (z >> 31)) >> 11) + 0.5) / 9007199254740992.0;
+  }
+
+  std::uint64_t state_ = 7;
+};
+
+/// Intensities of the config with the truth in place of its starts and `more` of `--set`.
+Image intensities(const Kind& kind, const fs::path& config, int width, int height, std::vector<std::string> more) {
+  std::vector<std::string> set = {fmt::format("image_size_px=[{}, {}]", width, height),
+                                  "micrograph.image=", "micrographs=", "calibration=", "signal="};
+  for (const auto& [path, value] : kind.truth) set.push_back(fmt::format("{}={}", path, value));
+  set.insert(set.end(), more.begin(), more.end());
+  const Config loaded = load_config(config, ConfigUse::render, std::nullopt, set);
+  const Theta theta = loaded.job.parameters.values();
+  return render(loaded.scene, plan(loaded.scene, loaded.job.demand, theta), theta).intensity;
+}
+
+void make_picture(const Kind& kind, const DemoPicture& picture, const fs::path& config, Noise& noise) {
+  Image counts(kind.width, kind.height);
+  if (!picture.dark) counts = intensities(kind, config, kind.width, kind.height, picture.set);
+  for (double& value : counts.values()) {
+    const double light = kind.gain * value;
+    value = kind.offset + light + noise() * std::sqrt(kReadCounts * kReadCounts + kCountsPerPhoton * light);
+    value = std::clamp(std::round(value), 0.0, kTopCode) / kTopCode;
+  }
+  const fs::path file = config.parent_path() / picture.file;
+  fs::create_directories(file.parent_path());
+  save_image(counts, file);
+}
+
+/// What the freedericksz config reads: the light at voltages from below the threshold to five times that.
+void make_table(const Kind& kind, const fs::path& config, Noise& noise) {
+  std::string text = "volts,photodiode_v\n";
+  for (int i = 0; i < 48; ++i) {
+    const double volts = 0.5 + 0.1 * i;
+    const std::string at = fmt::format("sample.cell.director.freedericksz.voltage_v={:.1f}", volts);
+    const double light = intensities(kind, config, 1, 1, {at})(0, 0);
+    text += fmt::format("{:.1f},{:.4f}\n", volts, kind.offset + kind.gain * light + 0.01 * kind.gain * noise());
+  }
+  write_file(config.parent_path() / "sweep.csv", text);
+}
+
+}  // namespace
+
+void make_demo(const Kind& kind, const fs::path& folder) {
+  const fs::path config = folder / (kind.name + ".yaml");
+  if (std::error_code ignored; fs::exists(config, ignored))
+    throw UserError({config.string()}, "is there already", "give --demo a folder of its own");
+  OutputFolder made(folder);
+  made.keep();
+  write_file(config, kind.config);
+  for (const auto& [name, content] : kind.files) write_file(folder / name, content);
+  Noise noise;
+  for (const DemoPicture& picture : kind.pictures) make_picture(kind, picture, config, noise);
+  if (kind.config.find("\nsignal:") != std::string::npos) make_table(kind, config, noise);
+
+  if (!kind.truth.empty()) {
+    std::string truth = "name,value\n";
+    for (const auto& [path, value] : kind.truth) truth += fmt::format("{},{}\n", path, value);
+    write_file(folder / "truth.csv", truth);
+    std::cout << "A picture made with what the config does not know (" << (folder / "truth.csv").string() << "):\n";
+    for (const auto& [path, value] : kind.truth) std::cout << fmt::format("  {} = {}\n", path, value);
+  }
+  const fs::path out = folder / (kind.command == "jones" ? "jones.csv" : "out");
+  std::cout << "Run it:\n  birefit " << kind.command << " " << config.string() << " --out " << out.string() << "\n";
+}
+
+}  // namespace birefit
