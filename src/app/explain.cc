@@ -12,8 +12,10 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "app/work.h"
 #include "birefit/config_set.h"
 #include "birefit/io.h"
+#include "core/printable.h"
 #include "samples/waves/wave.h"
 
 namespace birefit {
@@ -28,12 +30,9 @@ struct Arguments {
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
-  for (const char c : text) {
+  for (const char c : printable(text)) {
     if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 0x20)
-      out += fmt::format("\\u{:04x}", static_cast<int>(c));
-    else
-      out += c;
+    out += c;
   }
   return out + "\"";
 }
@@ -83,8 +82,7 @@ double seconds_an_image(const Scene& scene, const RenderPlan& chosen, const Thet
   return best;
 }
 
-int run_explain(const Arguments& arguments) {
-  const Config config = load_config(arguments.config, ConfigUse::plan, std::nullopt, arguments.set);
+int explain(const Arguments& arguments, const Config& config, double memory) {
   const ParameterTable& table = config.job.parameters;
   const Theta theta = table.values();
   const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
@@ -123,11 +121,12 @@ int run_explain(const Arguments& arguments) {
     std::cout << fmt::format(
         "{{\n  \"method\": {},\n  \"physics\": {},\n  \"reasons\": {},\n  \"numerical_error\": {},\n  \"model_error\": "
         "{},\n"
-        "  \"cost_seconds\": {},\n  \"warnings\": {},\n  \"identifiable\": {},\n  \"next\": [{}],\n  \"parameters\": "
+        "  \"cost_seconds\": {},\n  \"memory_bytes\": {:.0f},\n  \"warnings\": {},\n  \"identifiable\": {},\n  "
+        "\"next\": [{}],\n  \"parameters\": "
         "[{}]\n}}\n",
         quoted(chosen.method), quoted(chosen.physics), quoted(chosen.reasons), chosen.numerical_error,
-        chosen.model_error, seconds, quoted(warnings), expected ? (expected->identifiable ? "true" : "false") : "null",
-        next, free);
+        chosen.model_error, seconds, memory, quoted(warnings),
+        expected ? (expected->identifiable ? "true" : "false") : "null", next, free);
     return kExitDone;
   }
   std::cout << fmt::format("Image      {} x {} pixels", config.scene.view.width, config.scene.view.height);
@@ -138,7 +137,8 @@ int run_explain(const Arguments& arguments) {
   std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error,
                            chosen.model_error,
                            chosen.wave ? "RMS over the picture's own RMS" : "intensity, fraction of the incident");
-  std::cout << fmt::format("Cost       {:.2g} s an image on one thread\n", seconds);
+  std::cout << fmt::format("Cost       {:.2g} s an image on one thread\nMemory     about {}\n", seconds,
+                           describe_memory(memory));
   bool any = false;
   for (int i = 0; i < table.size(); ++i) {
     const Parameter& parameter = table[i];
@@ -174,7 +174,7 @@ int run_explain(const Arguments& arguments) {
     std::cout << fmt::format("Next       one more image beside this, for {}:\n", arguments.next);
     for (const Shot& shot : shots) std::cout << fmt::format("           to +- {:.2g}  {}\n", shot.stderr_, shot.words);
   }
-  for (const std::string& warning : warnings) std::cout << "Warning    " << warning << "\n";
+  for (const std::string& warning : warnings) std::cout << "Warning    " << printable(warning) << "\n";
   if (arguments.check) {
     const Image planned = render(config.scene, chosen, theta).intensity, judge = image_by_march(config.scene, theta);
     double difference = 0, size = 0, worst = 0;
@@ -193,6 +193,15 @@ int run_explain(const Arguments& arguments) {
             : "");
   }
   return kExitDone;
+}
+
+int run_explain(const Arguments& arguments) {
+  const Config config = load_config(arguments.config, ConfigUse::plan, std::nullopt, arguments.set);
+  const ParameterTable& table = config.job.parameters;
+  bool fitted = false;
+  for (int i = 0; i < table.size(); ++i) fitted = fitted || table[i].free;
+  const double memory = fitted ? memory_to_fit(config.job) : memory_to_render(config.scene);
+  return do_work(config, memory_to_render(config.scene), [&] { return explain(arguments, config, memory); });
 }
 
 }  // namespace

@@ -10,8 +10,11 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/output.h"
+#include "app/work.h"
 #include "birefit/config_set.h"
 #include "birefit/io.h"
+#include "core/printable.h"
+#include "io/results/write.h"
 
 namespace birefit {
 namespace {
@@ -22,8 +25,7 @@ struct Arguments {
   std::string image;
   std::string out;
   int threads = -1, coverage = 0;
-  bool quiet = false;
-  bool json = false;
+  bool quiet = false, json = false, npy = false;
 };
 
 int run_fit(const Arguments& arguments) {
@@ -51,26 +53,30 @@ int run_fit(const Arguments& arguments) {
   const Interrupt interrupt;
   job.options.interrupted = &interrupt.flag();
   const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
-  if (terminal) job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << line << std::flush; };
-  FitResult result = fit(job);
+  if (terminal)
+    job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << printable(line) << std::flush; };
+  const double memory = memory_to_fit(job);
+  std::vector<std::string> formats = {".tif"};
+  if (arguments.npy) formats.push_back(".npy");
+  FitResult result = do_work(config, memory, [&] { return fit(job); });
   for (std::string& words : describe_rows(config)) result.warnings.push_back(std::move(words));
   if (arguments.coverage > 0 && result.has_answer() && config.signals.empty()) {
-    write_results(out, config, result);  // the audit may take hours
+    write_results(out, config, result, formats);  // the audit may take hours
     folder->keep();
     if (terminal) std::cerr << fmt::format("\r\033[Kfitting {} simulated images", arguments.coverage) << std::flush;
-    result.coverage = measure_coverage(job, result, arguments.coverage);
+    result.coverage = do_work(config, memory, [&] { return measure_coverage(job, result, arguments.coverage); });
   } else if (arguments.coverage > 0) {
     result.warnings.push_back(config.signals.empty() ? "--coverage: this fit has no answer to simulate images at."
                                                      : "--coverage is for images, not for tables of signals.");
   }
   if (terminal) std::cerr << "\r\033[K" << std::flush;
-  write_results(out, config, result);
+  do_work(config, memory, [&] { write_results(out, config, result, formats); });
   folder->keep();
 
   if (arguments.json) {
     std::cout << fit_json(config, result) << "\n";
   } else if (!arguments.quiet) {
-    std::cout << summary(result) << "Report: " << (out / "report.html").string() << "\n";
+    std::cout << summary(result) << "Report: " << printable((out / "report.html").string()) << "\n";
   }
   return result.has_answer() ? kExitDone : kExitNoAnswer;
 }
@@ -90,6 +96,8 @@ Command add_fit_command(CLI::App& app) {
                    "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
       ->check(CLI::Range(1, 100000));
   command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
+  command->add_flag("--npy", arguments->npy,
+                    "also write fitted and residual images for NumPy: fitted.npy, residual.npy");
   command->add_flag("--json", arguments->json, "print fit.json in place of the summary");
   return {command, [arguments] { return run_fit(*arguments); }};
 }

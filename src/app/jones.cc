@@ -11,6 +11,7 @@
 #include "app/output.h"
 #include "birefit/config_set.h"
 #include "birefit/io.h"
+#include "core/printable.h"
 
 namespace birefit {
 namespace {
@@ -61,8 +62,8 @@ int run_jones(const Arguments& arguments) {
     print_warnings(config.job.taken_as_exact);
     print_warnings(chosen.warnings);
     print_warnings(chosen.left_out);
-    std::cout << fmt::format("{}: {} matrices, method {} ({}), numerical error {:.1e}\n", arguments.out, rows.size(),
-                             chosen.method, chosen.physics, chosen.numerical_error);
+    std::cout << fmt::format("{}: {} matrices, method {} ({}), numerical error {:.1e}\n", printable(arguments.out),
+                             rows.size(), chosen.method, chosen.physics, chosen.numerical_error);
   }
   return kExitDone;
 }

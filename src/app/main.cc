@@ -1,16 +1,23 @@
 // The program birefit: command line, exit codes, messages. What a command does is in its own file.
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <new>
+#include <sstream>
+#include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "app/interrupt.h"
 #include "birefit/error.h"
 #include "birefit/render.h"
+#include "core/printable.h"
 
 namespace birefit {
 
@@ -43,21 +50,34 @@ int run(int argc, char** argv) {
     const bool known = argc > 1 && std::any_of(commands.begin(), commands.end(),
                                                [&](const Command& c) { return c.app->get_name() == argv[1]; });
     if (argc > 1 && argv[1][0] != '-' && !known) {
-      std::cerr << "birefit: unknown command " << argv[1]
+      std::cerr << "birefit: unknown command " << printable(argv[1])
                 << "; known: fit, series, render, jones, explain, chart, stress and new\n";
       return kExitUserError;
     }
     // Help and version are "errors" of code 0 to CLI11; all others are the user's.
-    return app.exit(error, std::cout, std::cerr) == 0 ? kExitDone : kExitUserError;
+    std::ostringstream words;
+    const int code = app.exit(error, words, words);
+    (code == 0 ? std::cout : std::cerr) << printable_lines(words.str());
+    return code == 0 ? kExitDone : kExitUserError;
   }
   const auto chosen = std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.app->parsed(); });
   return chosen == commands.end() ? kExitUserError : chosen->run();
+}
+
+/// The work itself does with the threads there are; reading images takes one.
+bool lacks_thread(const std::exception& error) {
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  return system && system->code() == std::errc::resource_unavailable_try_again;
 }
 
 }  // namespace
 }  // namespace birefit
 
 int main(int argc, char** argv) {
+  birefit::catch_signals();
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error of writing, with words
+  // OpenImageIO would make a thread for every core of the machine and fail where a container grants fewer.
+  ::setenv("OPENIMAGEIO_THREADS", "1", 0);
   try {
     const int code = birefit::run(argc, argv);
     // A full disk or a closed pipe behind stdout shows only here.
@@ -69,8 +89,18 @@ int main(int argc, char** argv) {
   } catch (const birefit::UserError& error) {
     std::cerr << error.what() << "\n";
     return birefit::kExitUserError;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "birefit: there is not enough memory for this; give it fewer pixels (roi_px, a crop, binning), or run "
+                 "it where there is more\n";
+    return birefit::kExitUserError;
   } catch (const std::exception& error) {
-    std::cerr << "birefit: internal error (a bug in birefit): " << error.what()
+    if (birefit::lacks_thread(error)) {
+      std::cerr
+          << "birefit: the system grants no thread to read images with; raise the limit (ulimit -u, a container's "
+             "limit of processes)\n";
+      return birefit::kExitUserError;
+    }
+    std::cerr << "birefit: internal error (a bug in birefit): " << birefit::printable_lines(error.what())
               << "\nPlease report it with the config and the image.\n";
     return birefit::kExitInternalError;
   } catch (...) {

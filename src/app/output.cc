@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <fstream>
+#include <cstdlib>
 #include <iostream>
 
 #include <unistd.h>
 
 #include "birefit/error.h"
+#include "core/printable.h"
 
 namespace birefit {
 namespace {
@@ -16,17 +17,14 @@ namespace fs = std::filesystem;
 
 /// Permissions alone do not tell (full disk, read-only mount, root): a file is written and removed.
 bool can_write_in(const fs::path& folder) {
-  const fs::path probe = folder / (".birefit-probe-" + std::to_string(::getpid()));
-  bool written = false;
-  {
-    std::ofstream stream(probe, std::ios::binary);
-    written = static_cast<bool>(stream << "birefit");
-    stream.close();
-    written = written && !stream.fail();
-  }
-  std::error_code ignored;
-  fs::remove(probe, ignored);
-  return written;
+  // mkstemp makes a file that was not there, whatever links others have put there; without its name it is gone with
+  // this program, whatever ends it.
+  std::string probe = (folder / ".birefit-probe-XXXXXX").string();
+  const int descriptor = ::mkstemp(probe.data());
+  if (descriptor < 0) return false;
+  ::unlink(probe.c_str());
+  const bool written = ::write(descriptor, "birefit", 7) == 7;
+  return ::close(descriptor) == 0 && written;
 }
 
 }  // namespace
@@ -80,7 +78,7 @@ void check_output_file(const fs::path& file, const std::vector<std::string>& ext
 }
 
 void print_warnings(const std::vector<std::string>& warnings) {
-  for (const std::string& warning : warnings) std::cerr << "warning: " << warning << "\n";
+  for (const std::string& warning : warnings) std::cerr << "warning: " << printable(warning) << "\n";
 }
 
 }  // namespace birefit

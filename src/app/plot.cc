@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "birefit/error.h"
+#include "birefit/io.h"
 
 namespace birefit {
 namespace {
@@ -35,28 +36,34 @@ int run_gnuplot(std::FILE* input, std::FILE* output) {
   return status;
 }
 
+/// What an open file holds, from its beginning; nothing where it cannot be read.
+std::string content_of(std::FILE* file) {
+  std::string content;
+  std::rewind(file);
+  char buffer[65536];
+  while (const std::size_t count = std::fread(buffer, 1, sizeof buffer, file)) content.append(buffer, count);
+  return std::ferror(file) ? std::string() : content;
+}
+
 }  // namespace
 
 bool draw(const std::string& script, const std::filesystem::path& picture) {
   const auto close = [](std::FILE* file) { std::fclose(file); };
-  // The script goes by way of a file without a name: a pipe that nobody reads would end this program.
-  const std::unique_ptr<std::FILE, decltype(close)> input(std::tmpfile(), close);
-  const std::filesystem::path part = picture.parent_path() / ("." + picture.filename().string() + ".part");
-  std::unique_ptr<std::FILE, decltype(close)> output(std::fopen(part.c_str(), "wb"), close);
+  // Both ways go through files without a name: a pipe that nobody reads would end this program, and whatever ends it
+  // leaves nothing half drawn.
+  const std::unique_ptr<std::FILE, decltype(close)> input(std::tmpfile(), close), output(std::tmpfile(), close);
   bool done = input && output && std::fwrite(script.data(), 1, script.size(), input.get()) == script.size();
   if (done) {
     std::rewind(input.get());
     done = run_gnuplot(input.get(), output.get()) == 0;
   }
-  output.reset();
-  std::error_code failure;
-  if (done)
-    std::filesystem::rename(part, picture, failure);
-  else
-    std::filesystem::remove(part, failure);
-  if (!done || failure)
+  const std::string drawn = done ? content_of(output.get()) : std::string();
+  if (drawn.empty()) {
     std::cerr << "birefit: no picture: gnuplot is not there or failed; the tables are complete (Debian: gnuplot-nox)\n";
-  return done && !failure;
+    return false;
+  }
+  write_file(picture, drawn);
+  return true;
 }
 
 std::string plot_text(const std::string& text) {

@@ -6,8 +6,9 @@
 
 namespace birefit {
 
-/// Draws `picture` by a script that leaves gnuplot's output where it is (no `set output`): no name of a file or folder
-/// is ever part of a script. False (and a message to stderr, and no picture) when gnuplot is not there or fails.
+/// Draws `picture` by a script without `set output`: no name of a file or folder is ever part of a script. False (and a
+/// message to stderr, and no picture) when gnuplot is not there or fails; UserError where the picture cannot be
+/// written.
 bool draw(const std::string& script, const std::filesystem::path& picture);
 /// Text of somebody else's as a string of a script, quotes included: between single quotes, in which gnuplot
 /// substitutes nothing (between double quotes it runs what stands between backticks); control characters, line ends

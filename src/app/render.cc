@@ -2,13 +2,17 @@
 
 #include <iostream>
 #include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "app/commands.h"
 #include "app/output.h"
+#include "app/work.h"
 #include "birefit/config_set.h"
 #include "birefit/io.h"
+#include "core/printable.h"
+#include "io/file.h"
 
 namespace birefit {
 namespace {
@@ -30,24 +34,29 @@ int run_render(const Arguments& arguments) {
     problems.add(error);
   }
   try {
-    check_output_file(arguments.out, {".exr", ".tif", ".tiff", ".png"});
+    check_output_file(arguments.out, {".exr", ".tif", ".tiff", ".npy", ".png"});
   } catch (const UserError& error) {
     problems.add(error);
   }
   problems.throw_if_any();
 
   const Theta theta = config.job.parameters.values();
-  const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
-  const Rendering rendering = render(config.scene, chosen, theta, {}, arguments.threads);
-  save_image(rendering.intensity, arguments.out);
+  const auto [chosen, rendering] = do_work(config, memory_to_render(config.scene), [&] {
+    const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
+    Rendering rendering = render(config.scene, chosen, theta, {}, arguments.threads);
+    const ParameterRef size = config.scene.view.pixel_size_um;
+    const double pixel_size_um = size ? theta[static_cast<std::size_t>(size.index)] : 0;
+    write_file(arguments.out, encode_image(rendering.intensity, arguments.out, pixel_size_um));
+    return std::pair(chosen, std::move(rendering));
+  });
   if (!arguments.quiet) {
     print_warnings(config.job.warnings);
     print_warnings(config.job.taken_as_exact);
     print_warnings(chosen.warnings);
     print_warnings(chosen.left_out);
     std::cout << fmt::format("{}: {} x {} pixels, method {} ({}), numerical error {:.1e}, model error {:.1e}\n",
-                             arguments.out, rendering.intensity.width(), rendering.intensity.height(), chosen.method,
-                             chosen.physics, chosen.numerical_error, chosen.model_error);
+                             printable(arguments.out), rendering.intensity.width(), rendering.intensity.height(),
+                             chosen.method, chosen.physics, chosen.numerical_error, chosen.model_error);
   }
   return kExitDone;
 }
@@ -59,7 +68,8 @@ Command add_render_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   add_set_option(*command, arguments->set);
-  command->add_option("--out", arguments->out, "image to write: .exr, .tif (float) or .png (16 bit)")->required();
+  command->add_option("--out", arguments->out, "image to write: .exr, .tif (float), .npy (double) or .png (16 bit)")
+      ->required();
   add_threads_option(*command, arguments->threads);
   command->add_flag("--quiet", arguments->quiet, "print nothing");
   return {command, [arguments] { return run_render(*arguments); }};

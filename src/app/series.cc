@@ -16,8 +16,11 @@
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/plot.h"
+#include "app/work.h"
 #include "birefit/series.h"
+#include "core/printable.h"
 #include "core/threads.h"
+#include "io/table.h"
 
 namespace birefit {
 namespace {
@@ -41,6 +44,19 @@ void remove_parts(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
     if (entry.path().extension() == ".part" && entry.path().filename().string().starts_with('.'))
       fs::remove(entry.path(), ignored);
+}
+
+/// What an earlier run left in the folder of frames that this series does not have: its fits may be wanted again.
+std::vector<std::string> other_frames(const fs::path& folder, const ImageSeries& series) {
+  std::vector<std::string> others;
+  std::error_code code;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, code)) {
+    const std::string name = entry.path().filename().string();
+    if (std::none_of(series.frames.begin(), series.frames.end(), [&](const SeriesFrame& f) { return f.name == name; }))
+      others.push_back(name);
+  }
+  std::sort(others.begin(), others.end());
+  return others;
 }
 
 /// "diameter (um)" of sample.droplet.diameter_um: the unit is part of every name.
@@ -68,6 +84,12 @@ std::string axis_label(const std::string& path) {
 std::optional<std::size_t> abscissa(const ImageSeries& series) {
   if (series.along) return series.along;
   return series.columns.size() == 1 ? std::optional<std::size_t>(0) : std::nullopt;
+}
+
+/// Where a frame stands along the axis: cells were found to be numbers when they were read.
+double x_of(const ImageSeries& series, const std::optional<std::size_t>& column, std::size_t frame) {
+  if (!column) return static_cast<double>(frame + 1);
+  return parse_number(series.frames[frame].cells[*column].text).value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
 /// A panel for every searched parameter: estimates with 95 % intervals; limits as triangles that point to what is
@@ -100,7 +122,7 @@ std::string script_of(const ImageSeries& series, const SeriesResult& result) {
     double low_x = std::numeric_limits<double>::infinity(), high_x = -low_x;
     for (std::size_t i = 0; i < series.frames.size(); ++i) {
       const auto& fit = shared ? result.alone[i] : result.frames[i];
-      const double x = x_column ? std::stod(series.frames[i].cells[*x_column].text) : static_cast<double>(i + 1);
+      const double x = x_of(series, x_column, i);
       low_x = std::min(low_x, x), high_x = std::max(high_x, x);
       if (!fit) continue;
       for (const ParameterEstimate& p : fit->parameters) {
@@ -170,7 +192,7 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
     for (std::size_t i = 0; i < shared.posterior.names.size(); ++i) {
       const auto at = static_cast<Eigen::Index>(i);
       const double value = shared.posterior.mean[at], error = std::sqrt(shared.posterior.covariance(at, at));
-      const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 12);
+      const int digits = error > 0 ? static_cast<int>(std::clamp(1 - std::floor(std::log10(error)), 0.0, 12.0)) : 6;
       text += fmt::format("  {} = {:.{}f} +/- {:.2g} [95%: {:.{}f} .. {:.{}f}], shared by {} frames\n",
                           shared.posterior.names[i], value, digits, error, value - t * error, digits, value + t * error,
                           digits, shared.fits);
@@ -192,6 +214,18 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
     text += fmt::format("warning ({}): {}\n", count == 1 ? "1 frame" : fmt::format("{} frames", count), warning);
   }
   return text;
+}
+
+/// A frame's fit; nothing, and the frame marked `unreadable`, where its picture is of no use.
+std::optional<FitResult> fit_frame(SeriesFrame& frame, const Config& config) {
+  return do_work(config, memory_to_fit(config.job), [&]() -> std::optional<FitResult> {
+    try {
+      return fit(config.job);
+    } catch (const UserError& error) {
+      frame.unreadable = error.what();
+      return std::nullopt;
+    }
+  });
 }
 
 int run_series(const Arguments& arguments) {
@@ -224,14 +258,14 @@ int run_series(const Arguments& arguments) {
     } else {
       config.job.options.threads = threads;
       config.job.options.interrupted = &interrupt.flag();
-      const std::string at = fmt::format("{} of {}: {}", i + 1, series.frames.size(), series.frames[i].name);
+      const std::string at = fmt::format("{} of {}: {}", i + 1, series.frames.size(), printable(series.frames[i].name));
       if (terminal)
         config.job.options.progress = [&](const std::string& line) {
-          std::cerr << fmt::format("\r\033[K{}: {}", at, line) << std::flush;
+          std::cerr << fmt::format("\r\033[K{}: {}", at, printable(line)) << std::flush;
         };
-      const FitResult result = fit(config.job);
-      if (result.interrupted) return;  // the next run does it whole
-      write_results(place, config, result);
+      const std::optional<FitResult> result = fit_frame(series.frames[i], config);
+      if (!result || result->interrupted) return;  // the next run does it whole
+      write_results(place, config, *result);
       // What is read back is all that later runs will know of it.
       record = load_recorded_fit(place / "fit.json");
       if (!record) throw std::logic_error("fit.json cannot be read back");
@@ -253,14 +287,20 @@ int run_series(const Arguments& arguments) {
   }
   if (terminal) std::cerr << "\r\033[K" << std::flush;
 
-  const SeriesResult result = settle_series(series, std::move(fits));
+  SeriesResult result = settle_series(series, std::move(fits));
+  for (const std::string& name : other_frames(out / "frames", series))
+    result.warnings.push_back("frames/" + name + " is of an earlier run: this series has no such frame.");
   write_file(out / "series.csv", series_csv(series, result));
-  if (const std::string shared = shared_csv(result); !shared.empty()) write_file(out / "shared.csv", shared);
   folder.keep();
+  // What an earlier run left is of other numbers.
+  fs::remove(out / "series.svg", code);
+  fs::remove(out / "shared.csv", code);
+  if (const std::string shared = shared_csv(result); !shared.empty()) write_file(out / "shared.csv", shared);
   if (const std::string script = script_of(series, result); !script.empty()) draw(script, out / "series.svg");
   if (!arguments.quiet) {
     if (kept > 0) std::cout << kept << " frames were up to date\n";
-    std::cout << summary_of(series, result) << "Table: " << (out / "series.csv").string() << "\n";
+    std::cout << printable_lines(summary_of(series, result)) << "Table: " << printable((out / "series.csv").string())
+              << "\n";
   }
   return result.has_answer() ? kExitDone : kExitNoAnswer;
 }

@@ -2,18 +2,20 @@
 
 #include <utility>
 
+#include "core/printable.h"
+
 namespace birefit {
 
 std::string to_string(const Problem& problem) {
   std::string text;
   if (!problem.where.file.empty()) {
-    text += problem.where.file;
+    text += printable(problem.where.file);
     if (problem.where.line > 0) text += ":" + std::to_string(problem.where.line);
     if (problem.where.line > 0 && problem.where.column > 0) text += ":" + std::to_string(problem.where.column);
     text += ": ";
   }
-  text += problem.what;
-  if (!problem.hint.empty()) text += "; " + problem.hint;
+  text += printable(problem.what);
+  if (!problem.hint.empty()) text += "; " + printable(problem.hint);
   return text;
 }
 

@@ -6,6 +6,7 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -47,7 +48,11 @@ class Helpers {
     Job job{&work, helpers, 0};
     {
       const std::lock_guard lock(guard_);
-      while (members_.size() < static_cast<std::size_t>(helpers)) members_.emplace_back([this] { serve(); });
+      try {
+        while (members_.size() < static_cast<std::size_t>(helpers)) members_.emplace_back([this] { serve(); });
+      } catch (const std::system_error&) {
+        // No more are to be had (limits of a container): those there are do the work.
+      }
       jobs_.push_back(&job);
       waiting_jobs_ = static_cast<int>(jobs_.size());
     }
@@ -131,11 +136,33 @@ void parallel_for(int n, int threads, const std::function<void(int)>& body) {
   if (failure) std::rethrow_exception(failure);
 }
 
+/// Where there are not so many threads to be had: std::system_error, and no body was called.
 void run_together(int threads, const std::function<void(int)>& body) {
+  enum class Start { not_yet, all_there, too_few };
+  std::atomic<Start> start{Start::not_yet};
   std::vector<std::thread> others;
-  for (int t = 1; t < threads; ++t) others.emplace_back(body, t);
+  others.reserve(static_cast<std::size_t>(threads));
+  const auto let_go = [&](Start how) {
+    start = how;
+    start.notify_all();
+  };
+  const auto join = [&] {
+    for (std::thread& t : others) t.join();
+  };
+  try {
+    for (int t = 1; t < threads; ++t)
+      others.emplace_back([&, t] {
+        start.wait(Start::not_yet);
+        if (start == Start::all_there) body(t);
+      });
+  } catch (const std::system_error&) {
+    let_go(Start::too_few);
+    join();
+    throw;
+  }
+  let_go(Start::all_there);
   body(0);
-  for (std::thread& t : others) t.join();
+  join();
 }
 
 void Barrier::arrive_and_wait() {

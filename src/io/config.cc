@@ -11,6 +11,8 @@
 #include <fmt/format.h>
 
 #include "birefit/config_set.h"
+#include "birefit/io.h"
+#include "core/printable.h"
 #include "io/config_disc.h"
 #include "io/config_fit.h"
 #include "io/config_items.h"
@@ -320,7 +322,8 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
       const bool replaced = image && !list;
       const std::filesystem::path file = replaced ? *image : reader.resolve(*item.image);
       const Where where = replaced ? Where{file.string()} : item.image_where;
-      micrograph.name = file.filename().string() + (item.page.given() && list ? " (" + item.page.words() + ")" : "");
+      micrograph.name =
+          printable(file.filename().string()) + (item.page.given() && list ? " (" + item.page.words() + ")" : "");
       std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene)
                                               ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
                                               : try_load(reader, settings, file, item.page, where);

@@ -4,10 +4,10 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <fstream>
 
 #include <fmt/format.h>
 
+#include "io/files/whole_file.h"
 #include "io/table.h"
 
 namespace birefit {
@@ -28,7 +28,7 @@ std::string lower_case(std::string text) {
 }
 
 /// More is no config.
-constexpr std::uintmax_t kMaxConfigBytes = 4u << 20;
+constexpr std::uintmax_t kMaxConfigMb = 4;
 
 }  // namespace
 
@@ -38,19 +38,7 @@ std::string read_text(const std::filesystem::path& path) {
   const auto status = std::filesystem::status(path, code);
   if (!std::filesystem::exists(status)) throw UserError(where, "does not exist");
   if (std::filesystem::is_directory(status)) throw UserError(where, "is a folder, expected a config file");
-  if (std::filesystem::is_regular_file(status) && std::filesystem::file_size(path, code) > kMaxConfigBytes)
-    throw UserError(where, "is larger than 4 MB", "is this a config file?");
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw UserError(where, "cannot be read");
-  // A pipe has no size beforehand, so the limit is kept while reading too.
-  std::string text;
-  std::array<char, 65536> buffer;
-  while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
-    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kMaxConfigBytes) throw UserError(where, "is larger than 4 MB", "is this a config file?");
-  }
-  if (stream.bad()) throw UserError(where, "cannot be read to its end");
-  return text;
+  return read_whole(path, kMaxConfigMb, where, "", "is this a config file?");
 }
 
 std::string show(double value) { return fmt::format("{:.10g}", value); }

@@ -105,10 +105,17 @@ ImageSeries read_series(const fs::path& path, std::string text, const std::vecto
   find_frames(reader, asked, series);
 
   std::map<std::string, std::string> file_of;
-  for (const SeriesFrame& frame : series.frames)
+  for (const SeriesFrame& frame : series.frames) {
+    if (frame.name == "." || frame.name == "..") {  // ...tif
+      reader.problems.add(frame.where,
+                          frame.file + " without its extension is " + frame.name + ", no name for a folder",
+                          "its results go to frames/NAME: rename the file");
+      continue;
+    }
     if (const auto [other, fresh] = file_of.emplace(frame.name, frame.file); !fresh)
       reader.problems.add(frame.where, other->second + " and " + frame.file + " are both called " + frame.name,
                           "frames need names of their own: rename one, or narrow files");
+  }
   if (along && reader.problems.empty())
     find_abscissa(reader, *along, place("along"), asked.set_from.value_or("a table (set_from)"), series);
   reader.problems.throw_if_any();

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/printable.h"
 #include "core/robust.h"
 #include "fit/weights/rows.h"
 #include "io/config_micrograph.h"
@@ -183,7 +184,7 @@ std::vector<Row> wanted_rows(ConfigReader& reader, const TextTable& text, const 
     rows.push_back(std::move(row));
   }
   if (reader.problems.all().size() > before) return rows;
-  const std::string name = std::filesystem::path(file).filename().string();
+  const std::string name = printable(std::filesystem::path(file).filename().string());
   if (!left_out.empty()) reader.warnings.push_back(describe_left_out(name, left_out));
   if (rows.size() < 3)
     reader.problems.add(item.file_where, item.file +
@@ -318,7 +319,8 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
   for (const auto& point : curve) largest = std::max(largest, std::abs(point.second));
   NoiseModel noise;  // of the whole table; one pixel cannot tell its own
   noise.read_counts = item.noise ? *item.noise : std::max(noise_of(curve), 1e-6 * largest);
-  SignalTable table{std::filesystem::path(item.file).filename().string(), first, item.columns[0].path, {}, {}};
+  SignalTable table{
+      printable(std::filesystem::path(item.file).filename().string()), first, item.columns[0].path, {}, {}};
   switch (item.quantity) {
     case Quantity::intensity:
     case Quantity::ring_radius_cm:

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <string_view>
 #include <system_error>
@@ -61,6 +62,34 @@ int write_all(int descriptor, std::string_view content) {
   return error;
 }
 
+std::atomic<int> g_writing{0};  ///< calls that have temporary files
+std::atomic<int> g_ending{0};   ///< the signal that is to end the program; 0 = none
+static_assert(std::atomic<int>::is_always_lock_free, "a signal handler may touch nothing else");
+
+void die(int signal) {
+  std::signal(signal, SIG_DFL);
+  ::raise(signal);
+}
+
+/// While one lives there are temporary files, and a signal's end waits for it.
+class Writing {
+ public:
+  Writing() {
+    ++g_writing;
+    if (g_ending == 0) return;
+    leave();
+    for (;;) ::pause();  // others write still: the last of them ends the program
+  }
+  ~Writing() { leave(); }
+  Writing(const Writing&) = delete;
+  Writing& operator=(const Writing&) = delete;
+
+ private:
+  static void leave() {
+    if (--g_writing == 0 && g_ending != 0) die(g_ending);
+  }
+};
+
 /// A file under its temporary name; removed unless renamed.
 class PendingFile {
  public:
@@ -115,17 +144,21 @@ class PendingFile {
 
 }  // namespace
 
-void write_files(const std::vector<FileContent>& files) {
+void write_files(const std::vector<FileContent>& files, const std::vector<fs::path>& outdated) {
+  const Writing writing;
   std::vector<PendingFile> pending;
   pending.reserve(files.size());
   for (const FileContent& file : files) pending.emplace_back(file.path).write(file.content);
+  std::error_code ignored;
+  for (const fs::path& path : outdated) fs::remove(path, ignored);
   for (PendingFile& file : pending) file.rename();
 }
 
-void write_file(const std::filesystem::path& path, const std::string& content) {
-  PendingFile file(path);
-  file.write(content);
-  file.rename();
+void write_file(const std::filesystem::path& path, const std::string& content) { write_files({{path, content}}); }
+
+void end_by_signal(int signal) {
+  g_ending = signal;
+  if (g_writing == 0) die(signal);
 }
 
 }  // namespace birefit

@@ -18,6 +18,7 @@
 
 #include "birefit/io.h"
 #include "io/file.h"
+#include "io/images/npy_image.h"
 #include "io/images/pages.h"
 #include "io/images/raw_photograph.h"
 #include "io/images/signature.h"
@@ -457,7 +458,7 @@ std::string encode(const std::string& format, const OIIO::ImageSpec& spec, const
 
 }  // namespace
 
-std::string encode_image(const Image& image, const fs::path& path) {
+std::string encode_image(const Image& image, const fs::path& path, double pixel_size_um) {
   const std::string extension = lower_case(path.extension().string());
   if (image.empty()) throw std::logic_error("save_image: empty image");
   if (extension == ".png") {
@@ -467,11 +468,20 @@ std::string encode_image(const Image& image, const fs::path& path) {
     });
     return encode("png", OIIO::ImageSpec(image.width(), image.height(), 1, TypeDesc::UINT16), samples);
   }
+  if (extension == ".npy") return encode_npy(image);
   if (extension != ".tif" && extension != ".tiff" && extension != ".exr")
     throw UserError({path.string()}, "has an unknown image extension '" + extension + "'",
-                    "use .tif or .exr (32-bit float) or .png (16-bit, 0 to 1)");
+                    "use .tif or .exr (32-bit float), .npy (64-bit) or .png (16-bit, 0 to 1)");
   OIIO::ImageSpec spec(image.width(), image.height(), 1, TypeDesc::FLOAT);
-  spec.attribute("compression", "zip");
+  // TIFFs unpacked: no two of ImageJ, tifffile and scikit-image read the same packing of floats.
+  spec.attribute("compression", extension == ".exr" ? "zip" : "none");
+  if (pixel_size_um > 0) {
+    constexpr double kMicrometresPerCentimetre = 1e4;
+    const auto pixels_per_cm = static_cast<float>(kMicrometresPerCentimetre / pixel_size_um);
+    spec.attribute("ResolutionUnit", "cm");
+    spec.attribute("XResolution", pixels_per_cm);
+    spec.attribute("YResolution", pixels_per_cm);
+  }
   const std::vector<float> samples(image.values().begin(), image.values().end());
   return encode(extension == ".exr" ? "openexr" : "tiff", spec, samples);
 }

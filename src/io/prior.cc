@@ -1,10 +1,8 @@
 #include "io/prior.h"
 
 #include <cmath>
-#include <fstream>
 
-#include <nlohmann/json.hpp>
-
+#include "io/results/fit_file.h"
 #include "io/yaml.h"
 
 namespace birefit {
@@ -24,18 +22,7 @@ std::optional<double> number_at(const json& object, const char* key) {
 JointPrior load_prior(const std::filesystem::path& path, const std::vector<std::pair<std::string, Where>>& names,
                       const Where& where, std::vector<std::string>& warnings) {
   const std::string file = path.string();
-  std::error_code code;
-  if (!std::filesystem::exists(path, code))
-    throw UserError(where, file + " does not exist", "run the earlier fit first");
-  if (!std::filesystem::is_regular_file(path, code)) throw UserError(where, file + " is not a file");
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw UserError(where, file + " cannot be read");
-  json root;
-  try {
-    root = json::parse(stream);
-  } catch (const json::exception& error) {
-    throw UserError(where, file + " is not valid JSON: " + error.what(), "expected the fit.json of an earlier fit");
-  }
+  const json root = read_fit_file(path, where);
   const auto not_a_fit = [&](const std::string& lacks) {
     return UserError(where, file + " has no " + lacks, "expected the fit.json of an earlier fit");
   };

@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "core/printable.h"
+
 namespace birefit {
 
 /// Decimals that show `error` with two significant digits; may be negative.
@@ -64,7 +66,7 @@ inline std::string short_name(const std::string& name) {
 inline std::string escape_html(const std::string& text) {
   std::string out;
   out.reserve(text.size());
-  for (const char c : text) switch (c) {
+  for (const char c : printable_lines(text)) switch (c) {
       case '&':
         out += "&amp;";
         break;

@@ -4,21 +4,24 @@
 #include <cmath>
 #include <limits>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "birefit/io.h"
-#include "io/file.h"
 #include "io/report_format.h"
+#include "io/results/fit_file.h"
+#include "io/results/provenance.h"
+#include "io/results/write.h"
 
 namespace birefit {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// Of fit.json (docs/fit_json.md): grows when a key goes away or means something else.
+constexpr int kSchema = 1;
 constexpr double kNotableCorrelation = 0.5;
 constexpr std::size_t kListedCorrelations = 12;
 
@@ -103,6 +106,77 @@ Json strips_json(const FitResult& result) {
   return {{"list", strips}, {"trusted_roi_px", result.trusted_px ? Json(*result.trusted_px) : Json(nullptr)}};
 }
 
+Json rivals_json(const Config& config, const FitResult& result) {
+  Json list = Json::array();
+  for (const RivalMinimum& rival : result.rivals) {
+    Json values = Json::object();
+    for (const ParameterEstimate& p : result.parameters)
+      if (const ParameterRef ref = config.job.parameters.find(p.name); ref && ref.index < std::ssize(rival.theta))
+        values[p.name] = number(rival.theta[ref.index]);
+    list.push_back({{"odds", number(rival.odds)},
+                    {"likelihood_ratio", number(rival.likelihood_ratio)},
+                    {"counts", rival.counts},
+                    {"chi_square", number(rival.chi_square)},
+                    {"parameters", values}});
+  }
+  return list;
+}
+
+Json branches_json(const FitResult& result) {
+  Json list = Json::array();
+  for (const BranchResult& branch : result.branches)
+    list.push_back({{"name", branch.name},
+                    {"chi_square", number(branch.chi_square)},
+                    {"parameters", branch.parameters},
+                    {"odds", number(branch.odds)},
+                    {"reported", branch.reported}});
+  return list;
+}
+
+Json directions_json(const FitResult& result) {
+  Json list = Json::array();
+  for (const FisherDirection& direction : result.directions) {
+    Json weights = Json::object();
+    for (const auto& [name, weight] : direction.weights) weights[name] = number(weight);
+    list.push_back({{"words", direction.words},
+                    {"identifiable", direction.identifiable},
+                    {"stderr", number(direction.stderr_)},
+                    {"weights", weights}});
+  }
+  return list;
+}
+
+Json inputs_json(const FitResult& result) {
+  Json list = Json::array();
+  for (const InputEffect& input : result.inputs) {
+    Json shift = Json::object();
+    for (std::size_t j = 0; j < input.shift.size() && j < result.parameters.size(); ++j)
+      shift[result.parameters[j].name] = number(input.shift[j]);
+    list.push_back({{"name", input.name},
+                    {"unit", input.unit},
+                    {"value", number(input.value)},
+                    {"step", number(input.step)},
+                    {"shift", shift}});
+  }
+  return list;
+}
+
+Json coverage_json(const FitResult& result) {
+  const auto& c = result.coverage;
+  if (!c) return nullptr;
+  Json of = Json::object();
+  for (const Coverage::Of& p : c->parameters)
+    of[p.name] = {{"inside68", number(p.inside68)},
+                  {"inside95", number(p.inside95)},
+                  {"spread_over_stderr", number(p.spread)},
+                  {"bias_over_stderr", number(p.bias)}};
+  return {{"draws", c->draws},
+          {"noise", c->of_residuals ? "residuals" : "model"},
+          {"answered", c->answered},
+          {"confidently_wrong", c->wrong},
+          {"parameters", of}};
+}
+
 double residual_fraction(const MicrographResult& m) {
   return m.signal_range > 0 ? m.residual_rms / m.signal_range : std::numeric_limits<double>::quiet_NaN();
 }
@@ -156,44 +230,14 @@ std::string coverage_text(const Coverage& c) {
                             100 * std::sqrt(0.95 * 0.05 / c.answered));
 }
 
-std::string log_text(const Config& config, const FitResult& result) {
-  std::string text =
-      fmt::format("birefit {}\nconfig: {}\n\n{}\n", BIREFIT_VERSION, config.path.string(), summary(result));
-  for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
-    const MicrographResult& m = result.micrographs[i];
-    const bool row =
-        std::none_of(config.signals.begin(), config.signals.end(), [&](const SignalTable& t) { return t.first == i; });
-    if (!config.signals.empty() && row) continue;  // the first row of a table speaks for the others
-    text += fmt::format("\nmicrograph {}\n  {} pixels used, chi-square {:.6g}, residual rms {:.4g}\n", m.name, m.used,
-                        m.chi_square, m.residual_rms);
-    text += fmt::format("  noise: read {:.4g} counts, {:.4g} counts per photon{}{}\n", m.noise.read_counts,
-                        m.noise.counts_per_photon,
-                        m.noise.black_counts != 0 ? fmt::format(" above {:.4g} counts", m.noise.black_counts) : "",
-                        m.noise.estimated ? " (estimated from the image)" : "");
-    text += fmt::format("  method {} ({}), numerical error {:.2g}, model error {:.2g}\n", m.plan.method, m.plan.physics,
-                        m.plan.numerical_error, m.plan.model_error);
-    for (const std::string& reason : m.plan.reasons) text += "    " + reason + "\n";
-  }
-  text += "\nscan\n";
-  for (const ScanTrace& scan : result.scans) {
-    text += "  " + scan.name + "\n";
-    for (std::size_t i = 0; i < std::min(scan.value.size(), scan.chi_square.size()); ++i)
-      text += fmt::format("    {:>14.8g} {:>16.8g}\n", scan.value[i], scan.chi_square[i]);
-  }
-  text += "\niterations\n       chi-square             step\n";
-  for (const Iteration& i : result.iterations)
-    text += fmt::format("  {:>3} {:>16.10g} {:>12.4g}\n", i.number, i.chi_square, i.step);
-  text += fmt::format("\n{} evaluations, {:.3f} s\n\nsolver\n{}\n", result.evaluations, result.seconds,
-                      result.solver_report);
-  return text;
-}
-
 }  // namespace
 
 std::string fit_json(const Config& config, const FitResult& result) {
   Json json;
-  json["version"] = BIREFIT_VERSION;
-  json["config"] = {{"file", config.path.string()}, {"text", config.text}};
+  json["schema"] = kSchema;
+  json["made_by"] = made_by(config);
+  json["run"] = this_run(result.seconds);
+  json["config"] = {{"file", printable(config.path.string())}, {"text", config.text}};
   if (!config.fingerprint.empty()) json["fingerprint"] = config.fingerprint;
   json["has_answer"] = result.has_answer();
   json["verdict"] = result.verdict;
@@ -203,62 +247,14 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["described"] = result.described;
   json["left_over"] = number(result.left_over);
   json["ambiguous"] = result.ambiguous;
-  json["rivals"] = Json::array();
-  for (const RivalMinimum& rival : result.rivals) {
-    Json values = Json::object();
-    for (const ParameterEstimate& p : result.parameters)
-      if (const ParameterRef ref = config.job.parameters.find(p.name); ref && ref.index < std::ssize(rival.theta))
-        values[p.name] = number(rival.theta[ref.index]);
-    json["rivals"].push_back({{"odds", number(rival.odds)},
-                              {"likelihood_ratio", number(rival.likelihood_ratio)},
-                              {"counts", rival.counts},
-                              {"chi_square", number(rival.chi_square)},
-                              {"parameters", values}});
-  }
-  json["branches"] = Json::array();
-  for (const BranchResult& branch : result.branches)
-    json["branches"].push_back({{"name", branch.name},
-                                {"chi_square", number(branch.chi_square)},
-                                {"parameters", branch.parameters},
-                                {"odds", number(branch.odds)},
-                                {"reported", branch.reported}});
+  json["rivals"] = rivals_json(config, result);
+  json["branches"] = branches_json(result);
   json["identifiable"] = result.identifiable;
-  json["directions"] = Json::array();
-  for (const FisherDirection& direction : result.directions) {
-    Json weights = Json::object();
-    for (const auto& [name, weight] : direction.weights) weights[name] = number(weight);
-    json["directions"].push_back({{"words", direction.words},
-                                  {"identifiable", direction.identifiable},
-                                  {"stderr", number(direction.stderr_)},
-                                  {"weights", weights}});
-  }
-  json["inputs"] = Json::array();
-  for (const InputEffect& input : result.inputs) {
-    Json shift = Json::object();
-    for (std::size_t j = 0; j < input.shift.size() && j < result.parameters.size(); ++j)
-      shift[result.parameters[j].name] = number(input.shift[j]);
-    json["inputs"].push_back({{"name", input.name},
-                              {"unit", input.unit},
-                              {"value", number(input.value)},
-                              {"step", number(input.step)},
-                              {"shift", shift}});
-  }
+  json["directions"] = directions_json(result);
+  json["inputs"] = inputs_json(result);
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
-  json["coverage"] = nullptr;
-  if (const auto& c = result.coverage) {
-    Json of = Json::object();
-    for (const Coverage::Of& p : c->parameters)
-      of[p.name] = {{"inside68", number(p.inside68)},
-                    {"inside95", number(p.inside95)},
-                    {"spread_over_stderr", number(p.spread)},
-                    {"bias_over_stderr", number(p.bias)}};
-    json["coverage"] = {{"draws", c->draws},
-                        {"noise", c->of_residuals ? "residuals" : "model"},
-                        {"answered", c->answered},
-                        {"confidently_wrong", c->wrong},
-                        {"parameters", of}};
-  }
+  json["coverage"] = coverage_json(result);
   json["correlation"] = matrix(result.names, result.correlation);
   json["covariance"] = matrix(result.names, result.covariance);
   json["covariance_kind"] = result.covariance_kind;
@@ -306,10 +302,10 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["micrographs"] = std::move(micrographs);
   json["model"] = plan_json(model);
   json["evaluations"] = result.evaluations;
-  json["seconds"] = number(result.seconds);
   if (!result.strips.empty()) json["strips"] = strips_json(result);
   json["warnings"] = result.warnings;
   json["taken_as_exact"] = result.taken_as_exact;
+  json["checksum"] = checksum_of(nlohmann::json(json));
   // File names and configs may hold bytes that are no UTF-8.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -351,44 +347,39 @@ std::string summary(const FitResult& result) {
   if (result.coverage) text += coverage_text(*result.coverage);
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
   for (const std::string& sentence : result.taken_as_exact) text += "taken as exact: " + sentence + "\n";
-  return text;
+  return printable_lines(text);
 }
 
-void write_results(const std::filesystem::path& folder, const Config& config, const FitResult& result) {
-  std::error_code code;
-  std::filesystem::create_directories(folder, code);
-  if (code || !std::filesystem::is_directory(folder, code))
-    throw UserError({folder.string()},
-                    "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
-                    "choose another --out");
-  std::vector<FileContent> files;
-  for (std::size_t k = 0; k < config.signals.size(); ++k) {
-    const SignalTable& table = config.signals[k];
-    std::string text = table.path + ",measured,fitted,residual,sigma\n";
-    for (std::size_t r = 0; r < table.x.size() && table.first + r < result.micrographs.size(); ++r) {
-      const MicrographResult& m = result.micrographs[table.first + r];
-      if (m.fitted.empty()) continue;
-      text += fmt::format("{:.10g},{:.10g},{:.10g},{:.10g},{:.4g}\n", table.x[r], m.fitted(0, 0) + m.residual(0, 0),
-                          m.fitted(0, 0), m.residual(0, 0), m.sigma(0, 0));
-    }
-    files.push_back({folder / ("fitted" + (config.signals.size() > 1 ? "_" + std::to_string(k) : "") + ".csv"), text});
+std::string log_text(const Config& config, const FitResult& result) {
+  std::string text =
+      fmt::format("birefit {}\nconfig: {}\n\n{}\n", BIREFIT_VERSION, printable(config.path.string()), summary(result));
+  for (std::size_t i = 0; i < result.micrographs.size(); ++i) {
+    const MicrographResult& m = result.micrographs[i];
+    const bool row =
+        std::none_of(config.signals.begin(), config.signals.end(), [&](const SignalTable& t) { return t.first == i; });
+    if (!config.signals.empty() && row) continue;  // the first row of a table speaks for the others
+    text += fmt::format("\nmicrograph {}\n  {} pixels used, chi-square {:.6g}, residual rms {:.4g}\n", m.name, m.used,
+                        m.chi_square, m.residual_rms);
+    text += fmt::format("  noise: read {:.4g} counts, {:.4g} counts per photon{}{}\n", m.noise.read_counts,
+                        m.noise.counts_per_photon,
+                        m.noise.black_counts != 0 ? fmt::format(" above {:.4g} counts", m.noise.black_counts) : "",
+                        m.noise.estimated ? " (estimated from the image)" : "");
+    text += fmt::format("  method {} ({}), numerical error {:.2g}, model error {:.2g}\n", m.plan.method, m.plan.physics,
+                        m.plan.numerical_error, m.plan.model_error);
+    for (const std::string& reason : m.plan.reasons) text += "    " + reason + "\n";
   }
-  for (std::size_t i = 0; config.signals.empty() && i < result.micrographs.size(); ++i) {
-    const std::string number = result.micrographs.size() > 1 ? "_" + std::to_string(i) : "";
-    const auto add = [&](const std::string& name, const Image& image) {
-      if (image.empty()) return;
-      const std::filesystem::path path = folder / (name + number + ".tif");
-      files.push_back({path, encode_image(image, path)});
-    };
-    add("fitted", result.micrographs[i].fitted);
-    add("residual", result.micrographs[i].residual);
+  text += "\nscan\n";
+  for (const ScanTrace& scan : result.scans) {
+    text += "  " + scan.name + "\n";
+    for (std::size_t i = 0; i < std::min(scan.value.size(), scan.chi_square.size()); ++i)
+      text += fmt::format("    {:>14.8g} {:>16.8g}\n", scan.value[i], scan.chi_square[i]);
   }
-  files.push_back({folder / "config.yaml", config.text});
-  files.push_back({folder / "log.txt", log_text(config, result)});
-  files.push_back({folder / "report.html", report_html(config, result)});
-  // Last: a script that waits for fit.json finds everything else in place.
-  files.push_back({folder / "fit.json", fit_json(config, result)});
-  write_files(files);
+  text += "\niterations\n       chi-square             step\n";
+  for (const Iteration& i : result.iterations)
+    text += fmt::format("  {:>3} {:>16.10g} {:>12.4g}\n", i.number, i.chi_square, i.step);
+  text += fmt::format("\n{} evaluations, {:.3f} s\n\nsolver\n{}\n", result.evaluations, result.seconds,
+                      result.solver_report);
+  return printable_lines(text);
 }
 
 }  // namespace birefit

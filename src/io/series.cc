@@ -1,60 +1,21 @@
 #include "birefit/series.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
-#include <fstream>
 #include <limits>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "io/config_reader.h"
 #include "io/config_series.h"
+#include "io/files/csv.h"
+#include "io/files/whole_file.h"
+#include "io/results/provenance.h"
 
 namespace birefit {
 namespace {
 
-using nlohmann::json;
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
-
-/// FNV-1a (Fowler, Noll, Vo): tells accidental changes apart, which is all that is asked.
-class Digest {
- public:
-  void add(std::string_view bytes) {
-    add_number(bytes.size());
-    for (const char c : bytes) add_byte(static_cast<unsigned char>(c));
-  }
-  void add(double value) {
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &value, sizeof bits);
-    add_number(bits);
-  }
-  void add_file(const std::filesystem::path& path) {
-    std::ifstream stream(path, std::ios::binary);
-    std::uint64_t size = 0;
-    std::array<char, 65536> buffer;
-    while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
-      for (std::streamsize i = 0; i < stream.gcount(); ++i)
-        add_byte(static_cast<unsigned char>(buffer[static_cast<std::size_t>(i)]));
-      size += static_cast<std::uint64_t>(stream.gcount());
-    }
-    add_number(size);
-  }
-  std::string text() const { return fmt::format("{:016x}", state_); }
-
- private:
-  void add_number(std::uint64_t number) {
-    for (int i = 0; i < 8; ++i) add_byte(static_cast<unsigned char>(number >> (8 * i)));
-  }
-  void add_byte(unsigned char byte) { state_ = (state_ ^ byte) * 1099511628211u; }
-  std::uint64_t state_ = 14695981039346656037u;
-};
-
-/// JSON's null is what has no value.
-double number(const json& value) { return value.is_null() ? kNotKnown : value.get<double>(); }
 
 Posterior posterior_of(const FitResult& fit) {
   Posterior all{fit.names, Eigen::VectorXd::Constant(std::ssize(fit.names), kNotKnown), fit.covariance,
@@ -135,14 +96,6 @@ std::string reason_of(const UserError& error) {
 }
 
 std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.10g}", value) : std::string(); }
-
-/// Text as a field of CSV (RFC 4180).
-std::string field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
 
 /// value, stderr, low95, high95; of a limit only the side that is known.
 std::string cells(const ParameterEstimate& p) {
@@ -227,72 +180,20 @@ void start_from(Config& frame, const FitResult& neighbour) {
 }
 
 std::string fingerprint_of(const Config& frame) {
-  Digest digest;
-  digest.add(BIREFIT_VERSION);
-  digest.add(frame.text);
+  // Lengths before texts: no two lists of facts make the same one.
+  std::string facts;
+  const auto add = [&](const std::string& text) { facts += fmt::format("{}:{}", text.size(), text); };
+  nlohmann::ordered_json made = made_by(frame);
+  for (nlohmann::ordered_json& file : made["files"]) file.erase("file");  // the same wherever it lies
+  add(made.dump());
+  add(frame.text);
   const ParameterTable& table = frame.job.parameters;  // the row's numbers and the starts are in it
   for (int i = 0; i < table.size(); ++i) {
-    digest.add(table[i].name);
+    add(table[i].name);
     for (const double number : {table[i].value, table[i].lower, table[i].upper, table[i].free ? 1.0 : 0.0})
-      digest.add(number);
+      add(fmt::format("{}", number));
   }
-  for (const std::filesystem::path& file : frame.inputs) {
-    digest.add(file.string());
-    digest.add_file(file);
-  }
-  return digest.text();
-}
-
-std::optional<RecordedFit> load_recorded_fit(const std::filesystem::path& fit_json) {
-  std::ifstream stream(fit_json, std::ios::binary);
-  if (!stream) return std::nullopt;
-  try {
-    const json root = json::parse(stream);
-    RecordedFit record;
-    record.fingerprint = root.at("fingerprint");
-    FitResult& fit = record.result;
-    fit.converged = root.at("converged");
-    fit.interrupted = root.at("interrupted");
-    fit.ambiguous = root.at("ambiguous");
-    fit.identifiable = root.at("identifiable");
-    fit.pinned = root.at("pinned");
-    fit.described = root.at("described");
-    fit.verdict = root.at("verdict");
-    fit.interval_degrees_of_freedom = root.at("interval_degrees_of_freedom").is_null()
-                                          ? std::numeric_limits<double>::infinity()
-                                          : root.at("interval_degrees_of_freedom").get<double>();
-    fit.chi_square = number(root.at("chi_square"));
-    fit.reduced_chi_square = number(root.at("reduced_chi_square"));
-    fit.degrees_of_freedom = root.at("degrees_of_freedom");
-    fit.warnings = root.at("warnings");
-    fit.names = root.at("covariance").at("names");
-    const json& matrix = root.at("covariance").at("matrix");
-    const auto n = static_cast<Eigen::Index>(fit.names.size());
-    fit.covariance.resize(n, n);
-    for (std::size_t i = 0; i < fit.names.size(); ++i)
-      for (std::size_t j = 0; j < fit.names.size(); ++j)
-        fit.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = number(matrix.at(i).at(j));
-    for (const std::string& name : fit.names) {
-      const json& entry = root.at("parameters").at(name);
-      ParameterEstimate p;
-      p.name = name;
-      p.unit = entry.at("unit");
-      p.value = number(entry.at("value"));
-      p.stderr_ = number(entry.at("stderr"));
-      p.interval95_low = number(entry.at("interval_95").at(0));
-      p.interval95_high = number(entry.at("interval_95").at(1));
-      p.at_bound = entry.at("at_bound");
-      p.linear = entry.at("linear");
-      if (!entry.at("limit").is_null()) {
-        p.limit = entry.at("limit").at("side");
-        p.limit_value = number(entry.at("limit").at("value"));
-      }
-      fit.parameters.push_back(std::move(p));
-    }
-    return record;
-  } catch (const json::exception&) {
-    return std::nullopt;
-  }
+  return sha256(facts).substr(0, 16);
 }
 
 std::string verdict_word(const FitResult& result) {
@@ -372,15 +273,15 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
   const bool pages = std::any_of(series.frames.begin(), series.frames.end(),
                                  [](const SeriesFrame& frame) { return frame.page.has_value(); });
   std::string text = pages ? "file,page" : "file";
-  for (const ImageSeries::Column& column : series.columns) text += "," + field(column.name);
+  for (const ImageSeries::Column& column : series.columns) text += "," + csv_field(column.name);
   for (const std::string& name : names) text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", name);
   text += ",reduced_chi_square,verdict,reason\n";
   for (std::size_t i = 0; i < series.frames.size(); ++i) {
     const auto& fit = result.frames[i];
     const SeriesFrame& frame = series.frames[i];
-    text += field(frame.file);
+    text += csv_field(frame.file);
     if (pages) text += frame.page ? fmt::format(",{}", *frame.page) : ",";
-    for (const SeriesFrame::Cell& given : frame.cells) text += "," + field(given.text);
+    for (const SeriesFrame::Cell& given : frame.cells) text += "," + csv_field(given.text);
     for (const std::string& name : names) {
       const ParameterEstimate* estimate = nullptr;
       if (fit)
@@ -390,9 +291,9 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
     }
     if (fit)
       text += fmt::format(",{},{},{}\n", cell(fit->reduced_chi_square), verdict_word(*fit),
-                          fit->has_answer() ? "" : field(fit->verdict));
+                          fit->has_answer() ? "" : csv_field(fit->verdict));
     else
-      text += frame.unreadable.empty() ? ",,not done,\n" : ",,unreadable," + field(frame.unreadable) + "\n";
+      text += frame.unreadable.empty() ? ",,not done,\n" : ",,unreadable," + csv_field(frame.unreadable) + "\n";
   }
   return text;
 }

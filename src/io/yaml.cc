@@ -9,29 +9,18 @@
 #include <cctype>
 #include <sstream>
 
+#include "core/printable.h"
+
 namespace birefit {
 namespace {
 
 /// Throws at the first byte that is no UTF-8 text. yaml-cpp would guess an encoding or replace such bytes silently.
 void check_text(const std::string& text, const std::string& file) {
   int line = 1, column = 1;
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   for (std::size_t i = 0; i < text.size();) {
-    const unsigned char first = byte(i);
-    int length = 0;
-    if (first < 0x80)
-      length = 1;
-    else if (first >= 0xC2 && first < 0xE0)
-      length = 2;
-    else if (first >= 0xE0 && first < 0xF0)
-      length = 3;
-    else if (first >= 0xF0 && first < 0xF5)
-      length = 4;
-    bool good = length > 0 && i + length <= text.size();
-    for (int k = 1; good && k < length; ++k) good = (byte(i + k) & 0xC0) == 0x80;
-    if (good && length == 3) good = !(first == 0xE0 && byte(i + 1) < 0xA0) && !(first == 0xED && byte(i + 1) >= 0xA0);
-    if (good && length == 4) good = !(first == 0xF0 && byte(i + 1) < 0x90) && !(first == 0xF4 && byte(i + 1) >= 0x90);
-    if (!good) throw UserError({file, line, column}, "is not UTF-8 text", "is this a config file?");
+    const int length = utf8_length(text, i);
+    const auto first = static_cast<unsigned char>(text[i]);
+    if (length == 0) throw UserError({file, line, column}, "is not UTF-8 text", "is this a config file?");
     if (first < 0x20 && first != '\t' && first != '\n' && first != '\r')
       throw UserError({file, line, column}, "is not a text file (a control character)", "is this a config file?");
     if (first == '\n') {
@@ -40,7 +29,7 @@ void check_text(const std::string& text, const std::string& file) {
     } else {
       ++column;
     }
-    i += length;
+    i += static_cast<std::size_t>(length);
   }
 }
 
@@ -375,10 +364,13 @@ int edit_distance(const std::string& a, const std::string& b) {
 }
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
-  if (word.size() > 100) return {};
+  // The distance takes the product of the lengths, and no word of a config is as long as this.
+  constexpr std::size_t kLongest = 100;
+  if (word.size() > kLongest) return {};
   std::string best;
   int best_distance = 1 << 20;
   for (const std::string& candidate : known) {
+    if (candidate.size() > kLongest) continue;
     int distance = edit_distance(word, candidate);
     // A forgotten or wrong unit ("diameter", "diameter_nm" for diameter_um) is far in letters but near in meaning.
     const std::string stem = candidate.substr(0, candidate.rfind('_'));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <system_error>
 
 #include "core/threads.h"
 #include "transport/method.h"
@@ -266,6 +267,13 @@ class Propagation {
   }
 
   std::vector<WaveField> run(int threads) {
+    while (!runs_with(threads)) threads /= 2;
+    return scattered();
+  }
+
+ private:
+  /// False, and nothing was done, where there are not so many threads to be had.
+  bool runs_with(int threads) try {
     Barrier barrier(threads);
     run_together(threads, [&](int t) {
       const Crew crew{barrier, t, threads};
@@ -280,10 +288,12 @@ class Propagation {
       }
       crew.each(2 * kFields, [&](int job) { fft_->inverse(fields_[static_cast<std::size_t>(job / 2)].a[job % 2]); });
     });
-    return scattered();
+    return true;
+  } catch (const std::system_error&) {
+    if (threads <= 1) throw;
+    return false;
   }
 
- private:
   /// By pieces of a row, one pack of points each: [row][piece][quantity][value or derivative].
   using Table = std::vector<double, AlignedAllocator<double>>;
   struct Field {

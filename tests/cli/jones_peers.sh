@@ -4,7 +4,9 @@
 set -uo pipefail
 program=$1 source=$2
 table=$source/tests/data/peers/stacks/stacks_layered.csv
-rm -rf work && mkdir work
+here=$(mktemp -d)
+trap 'rm -rf "$here"' EXIT
+cd "$here" && mkdir work
 # a = (cos30 cos25, cos30 sin25, sin30)
 printf 'depth_um,ax,ay,az,n_o,n_e\n9,0.78488556712,0.36599815077,0.5,1.52,1.74\n' > work/plate.csv
 

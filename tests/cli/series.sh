@@ -3,30 +3,15 @@
 # usage: series.sh BIREFIT SOURCE_DIR
 set -u
 birefit=$(realpath "$1")
+source_dir=$(realpath "$2")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
 failures=0
 fail() { echo "FAIL $1"; failures=$((failures + 1)); }
 
-# A crystal of half-wave voltage 1500 V between crossed polarizers, its field 40 % stronger at one electrode and weaker at the
-# other: sin^2(pi/2 V/1500 (1 + 0.4 t)), 8 bit, gain 200, offset 20, noise 3.
-expose() { # FILE VOLTS SEED
-  {
-    # TIFF, 48 x 48, one strip behind the header
-    printf 'II*\0\10\0\0\0\11\0\0\1\4\0\1\0\0\0\60\0\0\0\1\1\4\0\1\0\0\0\60\0\0\0\2\1\3\0\1\0\0\0\10\0\0\0\3\1\3\0\1\0\0\0\1\0\0\0'
-    printf '\6\1\3\0\1\0\0\0\1\0\0\0\21\1\4\0\1\0\0\0\172\0\0\0\25\1\3\0\1\0\0\0\1\0\0\0\26\1\4\0\1\0\0\0\60\0\0\0\27\1\4\0\1\0\0\0\0\11\0\0\0\0\0\0'
-    printf "$(awk -v volts="$2" -v seed="$3" 'BEGIN {
-      srand(seed)
-      for (y = 0; y < 48; ++y) for (x = 0; x < 48; ++x) {
-        s = sin(1.5707963268 * volts / 1500 * (1 + 0.4 * (2 * (y + 0.5) / 48 - 1)))
-        noise = -6
-        for (k = 0; k < 12; ++k) noise += rand()
-        printf "\\%03o", int(20.5 + 200 * s * s + 3 * noise)
-      }
-    }')"
-  } > "$1"
-}
+. "$source_dir/tests/support/crystal_frames.sh"
+
 mkdir frames
 echo 'file,time_s,sample.crystal.bias_v' > frames.csv
 for i in 1 2 3 4 5 6 7 8 9 10; do

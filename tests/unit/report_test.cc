@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 #include <regex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@
 #include "birefit/io.h"
 #include "io/report_chart.h"
 #include "io/report_format.h"
+#include "io/results/write.h"
 #include "pictures.h"
 
 namespace birefit {
@@ -128,14 +130,62 @@ json parsed(const Case& c) { return json::parse(fit_json(c.config, c.result)); }
 
 // ---- fit.json -------------------------------------------------------------------------------------------------------
 
+/// Keys of fit.json's own, not those that are names of parameters.
+void collect_keys(const json& node, bool names, std::set<std::string>& keys) {
+  if (node.is_array())
+    for (const json& item : node) collect_keys(item, false, keys);
+  if (!node.is_object()) return;
+  for (const auto& [key, value] : node.items()) {
+    if (!names) keys.insert(key);
+    collect_keys(value, !names && (key == "parameters" || key == "weights" || key == "shift"), keys);
+  }
+}
+
+TEST(FitJson, EveryKeyIsInItsDocument) {
+  Case c = make_case(2);
+  FitResult& r = c.result;
+  c.config.fingerprint = "0123456789abcdef";
+  c.config.job.prior = JointPrior{};
+  r.rivals.push_back({});
+  r.branches.push_back({});
+  r.directions.push_back({});
+  r.inputs.push_back({});
+  r.strips.push_back({});
+  r.coverage = Coverage{};
+  r.coverage->parameters.push_back({});
+  r.frame_scatter = JointPrior::FrameScatter{};
+  r.parameters[0].limit = "upper";
+  r.parameters[0].prior_sd = 1;
+  std::set<std::string> keys;
+  collect_keys(parsed(c), false, keys);
+  EXPECT_GT(keys.size(), 100u);
+  std::ifstream file(BIREFIT_SOURCE_DIR "/docs/fit_json.md");
+  const std::string document(std::istreambuf_iterator<char>(file), {});
+  for (const std::string& key : keys) EXPECT_THAT(document, HasSubstr("`" + key + "`"));
+}
+
+TEST(FitJson, TwoRunsDifferInWhatIsOfTheRunAlone) {
+  Case c = make_case();
+  json first = parsed(c);
+  c.result.seconds = 77;
+  json second = parsed(c);
+  EXPECT_EQ(second["run"]["seconds"], 77);
+  EXPECT_NE(first, second);
+  first.erase("run"), second.erase("run");
+  EXPECT_EQ(first, second);
+  EXPECT_EQ(first["schema"], 1);
+  EXPECT_EQ(first["made_by"]["files"][0]["file"], "jobs/drop.yaml");
+  EXPECT_EQ(first["made_by"]["files"][0]["sha256"].get<std::string>().size(), 64u);
+}
+
 TEST(FitJson, HasTheKeysOthersDependOn) {
   const json j = parsed(make_case());
-  for (const char* key : {"version",       "config",       "converged",          "ambiguous",
+  for (const char* key : {"schema",        "config",       "converged",          "ambiguous",
                           "rivals",        "identifiable", "directions",         "parameters",
                           "correlation",   "covariance",   "covariance_kind",    "interval_degrees_of_freedom",
                           "frame_scatter", "chi_square",   "reduced_chi_square", "degrees_of_freedom",
                           "residual_rms",  "pixels",       "micrographs",        "model",
-                          "evaluations",   "seconds",      "warnings",           "verdict",
+                          "evaluations",   "made_by",      "warnings",           "verdict",
                           "interrupted"})
     EXPECT_TRUE(j.contains(key)) << key;
   const json& p = j["parameters"]["sample.droplet.diameter_um"];
@@ -377,6 +427,27 @@ TEST_F(WriteResults, NumbersTheImagesOfSeveralMicrographs) {
   EXPECT_FALSE(fs::exists(folder_ / "fitted.tif"));
 }
 
+TEST_F(WriteResults, PicturesOfAnEarlierFitGoAway) {
+  write_results(folder_, make_case(2).config, make_case(2).result, {".tif", ".npy"});
+  EXPECT_TRUE(fs::exists(folder_ / "residual_1.npy"));
+  std::ofstream(folder_ / "fitted_by_me.tif") << "x";
+  const Case c = make_case();
+  write_results(folder_, c.config, c.result);
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder_)) names.push_back(entry.path().filename());
+  EXPECT_THAT(names, testing::UnorderedElementsAre("fit.json", "report.html", "fitted.tif", "residual.tif",
+                                                   "config.yaml", "log.txt", "fitted_by_me.tif"));
+  EXPECT_EQ(load_image({folder_ / "fitted.tif", {}, "", {}}).pixel_size_um, 0.2);
+}
+
+TEST_F(WriteResults, WhatIsNoFitKeepsItsFiles) {
+  fs::create_directories(folder_);
+  std::ofstream(folder_ / "fitted_7.tif") << "somebody's";
+  const Case c = make_case();
+  write_results(folder_, c.config, c.result);
+  EXPECT_TRUE(fs::exists(folder_ / "fitted_7.tif"));
+}
+
 TEST_F(WriteResults, RefusesAFolderThatIsAFile) {
   std::ofstream(folder_) << "x";
   const Case c = make_case();
@@ -393,7 +464,7 @@ TEST_F(WriteResults, AFailedRunLeavesTheEarlierResultsUntouched) {
   next.result.seconds = 99;
   EXPECT_THROW(write_results(folder_, next.config, next.result), UserError);
   std::ifstream file(folder_ / "fit.json");
-  EXPECT_EQ(json::parse(file)["seconds"], 0.5);
+  EXPECT_EQ(json::parse(file)["run"]["seconds"], 0.5);
   for (const auto& entry : fs::directory_iterator(folder_))
     EXPECT_NE(entry.path().extension(), ".part") << entry.path();
 }

@@ -1,0 +1,85 @@
+#include "io/results/write.h"
+
+#include <algorithm>
+#include <regex>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "io/file.h"
+
+namespace birefit {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string table_csv(const SignalTable& table, const FitResult& result) {
+  std::string text = table.path + ",measured,fitted,residual,sigma\n";
+  for (std::size_t r = 0; r < table.x.size() && table.first + r < result.micrographs.size(); ++r) {
+    const MicrographResult& m = result.micrographs[table.first + r];
+    if (m.fitted.empty()) continue;
+    text += fmt::format("{:.10g},{:.10g},{:.10g},{:.10g},{:.4g}\n", table.x[r], m.fitted(0, 0) + m.residual(0, 0),
+                        m.fitted(0, 0), m.residual(0, 0), m.sigma(0, 0));
+  }
+  return text;
+}
+
+/// Pictures and tables of an earlier fit that `files` do not replace. Only beside a fit.json: elsewhere files of these
+/// names are somebody else's.
+std::vector<fs::path> left_by_earlier_fit(const fs::path& folder, const std::vector<FileContent>& files) {
+  std::vector<fs::path> left;
+  std::error_code code;
+  if (!fs::exists(folder / "fit.json", code)) return left;
+  static const std::regex kOurs(R"((fitted|residual)(_[0-9]+)?\.(tif|npy|csv))");
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, code))
+    if (std::regex_match(entry.path().filename().string(), kOurs) &&
+        std::none_of(files.begin(), files.end(),
+                     [&](const FileContent& file) { return file.path.filename() == entry.path().filename(); }))
+      left.push_back(entry.path());
+  return left;
+}
+
+}  // namespace
+
+void write_results(const fs::path& folder, const Config& config, const FitResult& result,
+                   const std::vector<std::string>& picture_formats) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code || !fs::is_directory(folder, code))
+    throw UserError({folder.string()},
+                    "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
+                    "choose another --out");
+  std::vector<FileContent> files;
+  for (std::size_t k = 0; k < config.signals.size(); ++k)
+    files.push_back({folder / ("fitted" + (config.signals.size() > 1 ? "_" + std::to_string(k) : "") + ".csv"),
+                     table_csv(config.signals[k], result)});
+  for (std::size_t i = 0; config.signals.empty() && i < result.micrographs.size(); ++i) {
+    const std::string number = result.micrographs.size() > 1 ? "_" + std::to_string(i) : "";
+    const Picture* measured = picture_at(config.job.measurements, i);
+    const ParameterRef size = measured ? measured->scene.view.pixel_size_um : ParameterRef{};
+    const double pixel_size_um = !size                                   ? 0
+                                 : size.index < std::ssize(result.theta) ? result.theta[size.index]
+                                                                         : config.job.parameters[size].value;
+    const auto add = [&](const std::string& name, const Image& image) {
+      if (image.empty()) return;
+      for (const std::string& format : picture_formats) {
+        const fs::path path = folder / (name + number + format);
+        files.push_back({path, encode_image(image, path, pixel_size_um)});
+      }
+    };
+    add("fitted", result.micrographs[i].fitted);
+    add("residual", result.micrographs[i].residual);
+  }
+  files.push_back({folder / "config.yaml", config.text});
+  files.push_back({folder / "log.txt", log_text(config, result)});
+  files.push_back({folder / "report.html", report_html(config, result)});
+  // Last: a script that waits for fit.json finds everything else in place.
+  files.push_back({folder / "fit.json", fit_json(config, result)});
+  write_files(files, left_by_earlier_fit(folder, files));
+}
+
+void write_results(const fs::path& folder, const Config& config, const FitResult& result) {
+  write_results(folder, config, result, {".tif"});
+}
+
+}  // namespace birefit
