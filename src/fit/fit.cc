@@ -33,6 +33,7 @@ Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool bea
   const Eigen::VectorXd sd = covariances.with_misfit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   foretell_curved_rays(task, optimum, sd, left_out);
   foretell_waves(task, optimum, sd, left_out);
+  pay_for_discrepancy(task, optimum, covariances);
   FitResult result = report(task, optimum, minima, std::move(rivals), left_out, std::move(covariances), beaten);
   return {std::move(result), left_out.change_by_curved_rays, left_out.change_by_waves};
 }

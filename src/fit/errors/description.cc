@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "fit/errors/report.h"
+#include "fit/errors/verdict.h"
 #include "fit/problem/constant.h"
 
 namespace birefit::estimation {
@@ -13,11 +16,40 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
   const double rows = static_cast<double>(optimum.problem->pixel_rows()), reduced = std::max(1.0, chi_square / rows);
   // More than half: measured images of crystals with an uneven field leave up to 0.37 and return the right voltage, a
   // bipolar droplet taken for a radial one leaves 0.77 and returns a birefringence 6 standard errors off.
-  constexpr double kMisfit = 2, kMostLeft = 0.5;
+  constexpr double kMisfit = 2;
   result.left_over = *constant > rows ? (chi_square - rows) / (*constant - rows) : 0;
-  result.described = !(reduced > kMisfit && result.left_over > kMostLeft);
+  result.described = !(reduced > kMisfit && result.left_over > kMostLeftOver);
   const double by_chance = 25 + 2 * task.unknowns.size() + 2 * std::log(std::max(1, places));
   return (*constant - chi_square) / reduced > by_chance;
+}
+
+std::string judge_discrepancy(const Task& task, const Optimum& optimum, FitResult& result) {
+  constexpr double kMostOfContrast = 0.03, kMostOfValue = 0.1, kMostOfBounds = 0.25;
+  const LeastSquares& problem = *optimum.problem;
+  const PixelSet& set = problem.pixels(0);
+  const Eigen::ArrayXd sigma = set.sigma.array(), residual = problem.noise_whitened_residual(0).array() * sigma;
+  const auto [low, high] = problem.intensity_range(0);
+  const double contrast = std::abs(task.gain_of(0, optimum.theta)) * (high - low),
+               missed = std::sqrt(std::max(0.0, (residual.square() - sigma.square()).mean()));
+  if (missed > kMostOfContrast * contrast) {
+    result.described = false;
+    return fmt::format(
+        "Not described: the model misses {:.2g} % of the image's contrast, where 3 % is the most that its "
+        "values could be trusted with.",
+        100 * missed / contrast);
+  }
+  for (const ParameterEstimate& p : result.parameters) {
+    const double half = 0.5 * (p.interval95_high - p.interval95_low);
+    if (p.linear || !p.limit.empty() || !std::isfinite(half)) continue;
+    const bool may_be_zero = p.lower <= 0 && p.upper >= 0;
+    const double most = may_be_zero || p.unit == "deg" || p.unit == "px" ? kMostOfBounds * (p.upper - p.lower)
+                                                                         : kMostOfValue * std::abs(p.value);
+    if (!(half > most)) continue;
+    result.described = false;
+    return fmt::format("Not described: what the model leaves over could move {} by {:.2g}{}.", p.name, half,
+                       p.unit.empty() ? "" : " " + p.unit);
+  }
+  return {};
 }
 
 }  // namespace birefit::estimation

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "fit/errors/discrepancy.h"
 #include "fit/errors/verdict.h"
 
 namespace birefit::estimation {
@@ -54,6 +55,7 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
   if (covariances.along > 1)
     words += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters",
                          covariances.along);
+  if (covariances.discrepancy) words += ", and what a discrepancy of the size that is left over could do";
   const Eigen::MatrixXd& propagation = left_out.propagation;
   if (!propagation.isZero(0))
     words += ", and the error of wave propagation" + std::string(propagation.cols() > 1 ? " and of sampling" : "") +
@@ -108,6 +110,15 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
   return covariances;
 }
 
+void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances) {
+  const Eigen::VectorXd sd = sd_of_discrepancy(task, optimum);
+  if (sd.size() == 0) return;
+  covariances.discrepancy = true;
+  Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
+  const Eigen::VectorXd wider = sd.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMax(1);
+  covariance = wider.asDiagonal() * covariance * wider.asDiagonal();
+}
+
 FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
                  Covariances covariances, bool beaten) {
   FitResult result;
@@ -149,6 +160,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   weigh_inputs(task, optimum, covariances.of_noise, result);
   const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
   if (!signal) result.identifiable = false;
+  std::string misfit;
+  if (covariances.discrepancy && result.described) misfit = judge_discrepancy(task, optimum, result);
   report_micrographs(task, optimum, result);
   collect_warnings(task, optimum, result);
   compare_strips(task, optimum, result);
@@ -157,7 +170,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.evaluations = optimum.evaluations + optimum.problem->evaluations();
   // Since then, too: profiles and warnings may be half done.
   if (task.interrupted()) result.interrupted = true, result.converged = false;
-  result.verdict = verdict(result, signal);
+  result.verdict = (misfit.empty() ? "" : misfit + " ") + verdict(result, signal);
   return result;
 }
 

@@ -10,13 +10,17 @@ namespace birefit::estimation {
 
 /// What the standard errors are made of.
 struct Covariances {
-  Eigen::MatrixXd factor;  ///< triangular, of all whitened rows
-  Inverse of_noise;        ///< by the weights alone
-  Inverse with_misfit;     ///< and what propagation errs by, and what the residual holds along the parameters
-  double along = 1;        ///< largest factor on a standard error by the latter
+  Eigen::MatrixXd factor;    ///< triangular, of all whitened rows
+  Inverse of_noise;          ///< by the weights alone
+  Inverse with_misfit;       ///< and what propagation errs by, and what the residual holds along the parameters
+  double along = 1;          ///< largest factor on a standard error by the latter
+  bool discrepancy = false;  ///< what a smooth discrepancy of the size that is left over could do is in them
 };
 /// `propagation`: LeftOut::propagation.
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);
+/// Adds what a discrepancy could do. After what better models would change is foretold: that is judged in units of the
+/// errors without it.
+void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances);
 
 /// Everything that is to be said of a fit. `beaten`: another branch has won, so that this one was not finished.
 FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
@@ -34,6 +38,9 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
 /// A model that is better than that and yet leaves most of what there is to see is not the sample's, whatever its
 /// parameters' errors: result.described.
 bool judge_description(const Task& task, const Optimum& optimum, double chi_square, int places, FitResult& result);
+/// Where a discrepancy is left over: values that it leaves next to unknown, or a model that misses more than 3 % of the
+/// contrast, are no answer. Says why in a sentence, with result.described = false; else nothing.
+std::string judge_discrepancy(const Task& task, const Optimum& optimum, FitResult& result);
 void report_micrographs(const Task& task, const Optimum& optimum, FitResult& result);
 /// Where strips of a bar, plate or disc that the model does not describe tell different things: result.strips, a
 /// warning, and a region where frames scatter far less than elsewhere and chi-square is below its median.

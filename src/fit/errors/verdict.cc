@@ -165,7 +165,7 @@ void say_state(const FitResult& result, bool signal, bool rows, Sentences& sente
             ? "The table shows no signal of the model: a constant explains it as well, so that the values mean nothing."
             : "The image shows no signal of the model: a constant image explains it as well, so that the values mean "
               "nothing.");
-  else if (!result.described)
+  else if (!result.described && result.left_over > kMostLeftOver)
     sentences.push_back(
         fmt::format("The model is not that of the {}: it leaves {:.0f} % of what there is to see unexplained, so that "
                     "the values mean little.",
@@ -252,7 +252,7 @@ void say_inputs(const FitResult& result, bool signal, Sentences& sentences) {
   std::vector<std::string> inputs;
   for (const InputEffect& input : result.inputs) {
     int most = -1;
-    double weight = 1;  // standard errors
+    double weight = 0.5;  // standard errors
     for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
       const ParameterEstimate& p = result.parameters[j];
       const double here = p.stderr_ > 0 ? std::abs(input.shift[static_cast<std::size_t>(j)]) / p.stderr_ : 0;

@@ -11,6 +11,9 @@ namespace birefit::estimation {
 void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns& unknowns,
                            const Eigen::MatrixXd& factor, const Inverse& inverse);
 
+/// Share of what there is to see that a model may leave unexplained, whatever its errors say (judge_description).
+inline constexpr double kMostLeftOver = 0.5;
+
 /// The paragraph, from everything else in the result. `signal` = false: a constant image explains the data as well.
 std::string verdict(const FitResult& result, bool signal);
 

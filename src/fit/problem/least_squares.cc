@@ -484,6 +484,16 @@ Eigen::MatrixXd LeastSquares::full_rows(const Tile& tile) const {
   return rows;
 }
 
+void LeastSquares::for_noise_whitened_rows(
+    int micrograph,
+    const std::function<void(Eigen::Index, const Eigen::MatrixXd&, const Eigen::VectorXd&)>& what) const {
+  const Frame& frame = frames_[micrograph];
+  for (const Tile& tile : tiles_)
+    if (tile.micrograph == micrograph)
+      what(tile.begin, full_rows(tile) / frame.shape_factor,
+           residual_.segment(frame.begin + tile.begin, tile.count) / frame.shape_factor);
+}
+
 Eigen::MatrixXd LeastSquares::factor(bool with_priors) const {
   return factor_of(unknowns_.size(), [&](const Tile& tile) -> Eigen::MatrixXd {
     if (tile.micrograph < 0 && !with_priors) return Eigen::MatrixXd::Zero(1, unknowns_.size());

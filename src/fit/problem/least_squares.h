@@ -77,6 +77,12 @@ class LeastSquares {
   const PixelSet& pixels(int micrograph) const { return frames_[micrograph].set; }
   /// Whitened residual of one micrograph without its misfit weights, in the pixels' order.
   Eigen::VectorXd noise_whitened_residual(int micrograph) const;
+  /// what(first, rows, residual) for some thousand pixels of one micrograph at a time, from its pixel `first` on: the
+  /// whitened rows [d/d searched, d/d linear] and the whitened residual, both without its misfit weights. Only where
+  /// its mean has the weight of all else (Misfit::mean_follows_shape).
+  void for_noise_whitened_rows(
+      int micrograph,
+      const std::function<void(Eigen::Index, const Eigen::MatrixXd&, const Eigen::VectorXd&)>& what) const;
   /// Triangular factor of all whitened rows [d/d searched, d/d linear], priors included (`with_priors`).
   Eigen::MatrixXd factor(bool with_priors = true) const;
   /// Gradient of the objective with respect to every unknown.

@@ -1,0 +1,21 @@
+#pragma once
+// What a residual that noise does not explain could have done to the parameters.
+
+#include <Eigen/Dense>
+
+#include "fit/search/optimum.h"
+
+namespace birefit::estimation {
+
+/// The model is not quite the picture's: a smooth discrepancy is left, and what of it lies along a parameter's own
+/// pattern shows in no residual. Its size is read off the residual beside, in groups of patterns of like kind, each
+/// with a variance of its own by the highest likelihood (empirical Bayes; D. J. C. MacKay, Neural Comput. 4, 415
+/// (1992)); what a discrepancy of that size does to the parameters is their covariance. A second opinion: the picture
+/// without one of its sectors or rings at a time (M. H. Quenouille, Biometrika 43, 353 (1956)). The larger of the two
+/// counts, times 1.5, which is measured, not derived (docs/methods.md, "Nearly the model").
+///
+/// Standard deviations of all unknowns, searched first; empty where nothing is left over, or where the job is not one
+/// picture of a droplet or shell.
+Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum);
+
+}  // namespace birefit::estimation
