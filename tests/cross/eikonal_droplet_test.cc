@@ -391,11 +391,11 @@ TEST(EikonalDroplet, StraightChordsFittedToCurvedRaysGiveFourPercentTooLittleAtA
   for (double diameter_um : {9.3, 30.0}) {
     const ParameterEstimate chord = fitted(diameter_um, Rays::straight), curved = fitted(diameter_um, Rays::eikonal);
     EXPECT_NEAR(chord.value / 0.22 - 1, -0.04, 0.012) << diameter_um;
-    // The residual gives away a part of it only: the error bar holds it because the fit compares with curved rays, and
-    // little else.
+    // What lies along the birefringence shows in no residual: the error bar holds it because the fit compares with
+    // curved rays, and pays for a discrepancy of the size that is left over.
     EXPECT_LT(chord.interval95_low, 0.22) << diameter_um;
     EXPECT_GT(chord.interval95_high, 0.22) << diameter_um;
-    EXPECT_NEAR(chord.stderr_, std::abs(chord.value - 0.22), 0.1 * chord.stderr_) << diameter_um;
+    EXPECT_GT(chord.stderr_, 0.9 * std::abs(chord.value - 0.22)) << diameter_um;
     EXPECT_LT(std::abs(curved.value - 0.22), 4 * curved.stderr_) << diameter_um;
   }
 }
