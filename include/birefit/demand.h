@@ -21,7 +21,7 @@ enum class Rays { straight, eikonal };
 
 struct Demand {
   Ceiling ceiling = Ceiling::one_way;
-  Rays rays = Rays::straight;         ///< without meaning under Ceiling::wave
+  Rays rays = Rays::straight;        ///< without meaning under Ceiling::wave
   double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold; (0, 0.1]
   std::string method = "auto";       ///< or a transport method's name
 };

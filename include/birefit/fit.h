@@ -176,8 +176,10 @@ struct FitResult {
   bool interrupted = false;
   bool ambiguous = false;
   bool identifiable = true;
-  bool pinned = false;    ///< at a bound that is no physical limit
-  bool described = true;  ///< false: the model leaves more than half of what the images show beyond their noise
+  bool pinned = false;  ///< at a bound that is no physical limit
+  /// false: the model leaves more than half of what the images show beyond their noise; or, of one picture of a droplet
+  /// or shell, misses so much that its values are worth little (docs/methods.md, "Nearly the model")
+  bool described = true;
   /// that share: 0 a perfect model, 1 no better than a constant image (below 0 by chance; 0 too where there is nothing
   /// to compare with)
   double left_over = 0;

@@ -46,9 +46,12 @@ enum class ConfigUse {
   plan,
 };
 
-/// Reads a config (docs/configuration.md). `image` replaces the single micrograph's file.
+/// Reads a config (docs/configuration.md). `image` replaces the single micrograph's file. Each item of `set`,
+/// "path=value", sets or replaces a value (the same, "Command line and files"); Config::text is then the config that
+/// this makes, less the file's comments.
 Config load_config(const std::filesystem::path& path, ConfigUse use,
-                   const std::optional<std::filesystem::path>& image = std::nullopt);
+                   const std::optional<std::filesystem::path>& image = std::nullopt,
+                   const std::vector<std::string>& set = {});
 
 // ---- images ---------------------------------------------------------------------------------------------------------
 
@@ -108,8 +111,11 @@ DiscGuess find_disc(const Image& values, const Mask& mask);
 
 // ---- results --------------------------------------------------------------------------------------------------------
 
-/// fit.json, report.html, fitted.tif, residual.tif, config.yaml, log.txt in `folder` (docs/configuration.md).
-void write_results(const std::filesystem::path& folder, const Config& config, const FitResult& result);
+/// fit.json, report.html, config.yaml, log.txt and, in each of these formats (".tif", ".npy"), fitted and residual
+/// pictures in `folder` (docs/configuration.md). Pictures of an earlier fit there that this one does not replace go
+/// away.
+void write_results(const std::filesystem::path& folder, const Config& config, const FitResult& result,
+                   const std::vector<std::string>& picture_formats = {".tif"});
 std::string fit_json(const Config& config, const FitResult& result);
 std::string report_html(const Config& config, const FitResult& result);
 /// The short human summary for stdout.

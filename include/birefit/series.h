@@ -52,7 +52,7 @@ struct ImageSeries {
 
 /// Reads and checks a series completely, every image of it; throws UserError with every mistake found. Frames whose own
 /// image is missing, damaged or of no use are marked `unreadable`; at least one is not. `set`:
-/// config_set.h.
+/// load_config.
 ImageSeries load_series(const std::filesystem::path& path, const std::vector<std::string>& set = {});
 
 /// The config of one frame, as if it were alone: it can be fitted. Throws FrameError where its image is of no use.

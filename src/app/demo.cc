@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "app/output.h"
-#include "birefit/config_set.h"
 #include "birefit/error.h"
 #include "birefit/io.h"
 #include "birefit/render.h"

@@ -13,7 +13,6 @@
 
 #include "app/commands.h"
 #include "app/work.h"
-#include "birefit/config_set.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "samples/waves/wave.h"

@@ -11,10 +11,8 @@
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/work.h"
-#include "birefit/config_set.h"
 #include "birefit/io.h"
 #include "core/printable.h"
-#include "io/results/write.h"
 
 namespace birefit {
 namespace {

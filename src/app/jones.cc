@@ -9,7 +9,6 @@
 
 #include "app/commands.h"
 #include "app/output.h"
-#include "birefit/config_set.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 

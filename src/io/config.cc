@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 
-#include "birefit/config_set.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "io/config_disc.h"
@@ -440,11 +439,6 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
     }
   }
   return load(path, text, set, use, image);
-}
-
-Config load_config(const std::filesystem::path& path, ConfigUse use,
-                   const std::optional<std::filesystem::path>& image) {
-  return load_config(path, use, image, {});
 }
 
 Config load_frame(const ImageSeries& series, std::size_t frame) {

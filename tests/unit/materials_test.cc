@@ -344,8 +344,7 @@ TEST_F(RealRefractiveIndex, EveryFileIsRead) {
   const std::string one = file("main/CaCO3/Ghosh-o.yml");
   if (one.empty()) GTEST_SKIP() << testing::kRealDataMissing;
   int read = 0;
-  for (const auto& entry :
-       fs::recursive_directory_iterator(fs::path(one).parent_path().parent_path().parent_path())) {
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(one).parent_path().parent_path().parent_path())) {
     if (entry.path().extension() != ".yml" || entry.path().filename() == "about.yml") continue;
     const std::string said = mistakes("{file: \"" + entry.path().string() + "\"}", 589.3);
     EXPECT_TRUE(said.empty() || said.find("where the indices of this scene are known") != std::string::npos) << said;

@@ -19,7 +19,6 @@
 #include "birefit/io.h"
 #include "io/report_chart.h"
 #include "io/report_format.h"
-#include "io/results/write.h"
 #include "pictures.h"
 
 namespace birefit {

@@ -23,7 +23,7 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
   return (*constant - chi_square) / reduced > by_chance;
 }
 
-std::string judge_discrepancy(const Task& task, const Optimum& optimum, FitResult& result) {
+std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {
   constexpr double kMostOfContrast = 0.03, kMostOfValue = 0.1, kMostOfBounds = 0.25;
   const LeastSquares& problem = *optimum.problem;
   const PixelSet& set = problem.pixels(0);
@@ -38,13 +38,16 @@ std::string judge_discrepancy(const Task& task, const Optimum& optimum, FitResul
         "values could be trusted with.",
         100 * missed / contrast);
   }
-  for (const ParameterEstimate& p : result.parameters) {
+  for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    const ParameterEstimate& p = result.parameters[j];
     const double half = 0.5 * (p.interval95_high - p.interval95_low);
     if (p.linear || !p.limit.empty() || !std::isfinite(half)) continue;
     const bool may_be_zero = p.lower <= 0 && p.upper >= 0;
     const double most = may_be_zero || p.unit == "deg" || p.unit == "px" ? kMostOfBounds * (p.upper - p.lower)
                                                                          : kMostOfValue * std::abs(p.value);
-    if (!(half > most)) continue;
+    const auto at = static_cast<Eigen::Index>(j);
+    const bool noise_alone = 2 * std::sqrt(of_noise.covariance(at, at)) > most;
+    if (!(half > most) || noise_alone) continue;
     result.described = false;
     return fmt::format("Not described: what the model leaves over could move {} by {:.2g}{}.", p.name, half,
                        p.unit.empty() ? "" : " " + p.unit);

@@ -161,7 +161,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
   if (!signal) result.identifiable = false;
   std::string misfit;
-  if (covariances.discrepancy && result.described) misfit = judge_discrepancy(task, optimum, result);
+  if (covariances.discrepancy && result.described)
+    misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
   report_micrographs(task, optimum, result);
   collect_warnings(task, optimum, result);
   compare_strips(task, optimum, result);

@@ -14,7 +14,7 @@ struct Covariances {
   Inverse of_noise;          ///< by the weights alone
   Inverse with_misfit;       ///< and what propagation errs by, and what the residual holds along the parameters
   double along = 1;          ///< largest factor on a standard error by the latter
-  bool discrepancy = false;  ///< what a smooth discrepancy of the size that is left over could do is in them
+  bool discrepancy = false;  ///< one is left over, and what one of its size could do is in `with_misfit`
 };
 /// `propagation`: LeftOut::propagation.
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);
@@ -38,9 +38,10 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
 /// A model that is better than that and yet leaves most of what there is to see is not the sample's, whatever its
 /// parameters' errors: result.described.
 bool judge_description(const Task& task, const Optimum& optimum, double chi_square, int places, FitResult& result);
-/// Where a discrepancy is left over: values that it leaves next to unknown, or a model that misses more than 3 % of the
-/// contrast, are no answer. Says why in a sentence, with result.described = false; else nothing.
-std::string judge_discrepancy(const Task& task, const Optimum& optimum, FitResult& result);
+/// Where a discrepancy is left over: a model that misses more than 3 % of the contrast is no answer, nor are values
+/// that it, and not noise alone, leaves next to unknown. Says why in a sentence, with result.described = false; else
+/// nothing.
+std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result);
 void report_micrographs(const Task& task, const Optimum& optimum, FitResult& result);
 /// Where strips of a bar, plate or disc that the model does not describe tell different things: result.strips, a
 /// warning, and a region where frames scatter far less than elsewhere and chi-square is below its median.

@@ -78,8 +78,4 @@ void write_results(const fs::path& folder, const Config& config, const FitResult
   write_files(files, left_by_earlier_fit(folder, files));
 }
 
-void write_results(const fs::path& folder, const Config& config, const FitResult& result) {
-  write_results(folder, config, result, {".tif"});
-}
-
 }  // namespace birefit
