@@ -9,7 +9,7 @@
 
 #include "birefit/error.h"
 #include "birefit/render.h"
-#include "instrument/beam.h"
+#include "instrument/exposure.h"
 #include "medium/validity.h"
 #include "rays/eikonal.h"
 #include "samples/kind.h"
@@ -67,10 +67,11 @@ Image picture_of(const Scene& scene, const RenderPlan& plan, const Theta& theta)
   return render(scene, plan, theta, {}, 1).intensity;
 }
 
-Symmetry symmetry_of(const SampleKind& kind, const Scene& scene, const RenderPlan& plan, const Values<double>& value) {
+Symmetry symmetry_of(const SampleKind& kind, const Scene& scene, const RenderPlan& plan, const Values<double>& value,
+                     const BeamMaker& light) {
   if (plan.wave || !kind.symmetric || !kind.symmetric(scene)) return Symmetry::none;
   if (!on_middle_row(scene, value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1)))) return Symmetry::none;
-  return make_pixel_model<double>(scene, plan, value)->symmetry();
+  return make_image<double>(scene, plan, value, light)->symmetry();
 }
 
 /// What the literature's birefringence is off by.
@@ -93,18 +94,21 @@ RenderPlan plan(const Scene& scene, const Demand& demand, const Theta& theta, co
   check_validity(scene, theta);
   const Values<double> value(theta, {});
   const SampleKind& kind = kind_of(scene, observable);
+  const Exposure exposure = exposure_of(scene.microscope);
+  const BeamMaker& light = exposure.directions.front();
   const Planning planning{scene,
                           demand,
                           value,
                           observable,
+                          light,
                           [&](const RenderPlan& trial, const std::vector<std::array<int, 2>>& pixels) {
                             return render_pixels(scene, trial, theta, pixels, {}, 1).intensity;
                           },
                           picture_of};
   RenderPlan result;
   if (demand.ceiling == Ceiling::wave) {
-    result =
-        has_series(scene) && demand.method != "split_step" ? plan_series(scene, demand, value) : plan_wave(planning);
+    result = has_series(scene) && demand.method != "split_step" ? plan_series(scene, demand, value, light)
+                                                                : plan_wave(planning);
     note_illumination(scene, value, largest_phase(scene, theta), result);
   } else {
     result = kind.plan(planning);
@@ -112,7 +116,7 @@ RenderPlan plan(const Scene& scene, const Demand& demand, const Theta& theta, co
   result.observable = observable;
   note_material(scene, theta, result);
   if (kind.note) kind.note(scene, value, result);
-  const Symmetry symmetry = symmetry_of(kind, scene, result, value);
+  const Symmetry symmetry = symmetry_of(kind, scene, result, value, light);
   if (symmetry == Symmetry::half_turn)
     result.reasons.push_back("half a turn about the viewing axis leaves the picture as it is: half of it is computed");
   if (symmetry == Symmetry::mirror)
@@ -134,11 +138,11 @@ bool outgrown(const RenderPlan& now, const RenderPlan& before) {
 }
 
 Image image_by_march(const Scene& scene, const Theta& theta, int threads) {
-  return marched_picture(scene, theta, threads);
+  return marched_picture(scene, exposure_of(scene.microscope).directions.front(), theta, threads);
 }
 
 double march_error(const Scene& scene, const Theta& theta, int threads) {
-  return march_error_on_twin(scene, theta, threads, picture_of);
+  return march_error_on_twin(scene, exposure_of(scene.microscope).directions.front(), theta, threads, picture_of);
 }
 
 bool has_curved_rays(const Scene& scene) { return rays_stay_meridional(scene.sample); }

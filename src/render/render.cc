@@ -10,7 +10,7 @@
 
 #include "core/threads.h"
 #include "render/band.h"
-#include "render/render_scalar.h"
+#include "render/exposed.h"
 #include "samples/kind.h"
 #include "samples/pixels/edge_pixels.h"
 #include "samples/pixels/sampling.h"
@@ -97,7 +97,7 @@ template <class S>
 class BandPainter {
  public:
   /// `model`: after tabulate(). `images`: the intensity's and its derivatives', as many as are wanted.
-  BandPainter(const PixelModel<S>& model, const RenderPlan& plan, int width, int height,
+  BandPainter(const SampleImage<S>& model, const RenderPlan& plan, int width, int height,
               const std::vector<Image*>& images)
       : model_(model),
         plan_(plan),
@@ -191,11 +191,14 @@ class BandPainter {
         store(v, out, kPlanes, 0, kStep);
       };
       if (plan_.fringe_means) {
-        const FringePoint<S> v = model_.fringe(column, row);
+        FringePoint<S> v;
+        model_.fringe(column, row, &v);
         put(v.amplitude, 0), put(v.phase, 1), put(v.mean, 2);
         if (!in_phase_) put(v.quadrature, 3);
       } else {
-        put(model_.intensity(column, row), 0);
+        S v;
+        model_.light(column, row, &v);
+        put(v, 0);
       }
     }
   }
@@ -279,7 +282,8 @@ class BandPainter {
   }
   void add_passing(int row) const {
     for (int c0 = 0; c0 < w_; c0 += kStep) {
-      const S v = model_.passing(columns_from(c0), P(static_cast<double>(row)));
+      S v;
+      model_.passing(columns_from(c0), P(static_cast<double>(row)), &v);
       for (int p = 0; p < planes_; ++p) {
         const P* light = &plain_of_plane(v, p);
         double* out = images_[static_cast<std::size_t>(p)]->row(row) + c0;
@@ -298,7 +302,7 @@ class BandPainter {
     }
   }
 
-  const PixelModel<S>& model_;
+  const SampleImage<S>& model_;
   const RenderPlan& plan_;
   SampleRings rings_;
   const std::vector<Image*>& images_;
@@ -314,11 +318,11 @@ class BandPainter {
 /// The intensity and its derivatives by `active`, at most as many as S carries, into `images`; they are made where
 /// missing or of another size.
 template <class S>
-void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active,
-                   int threads, const std::vector<Image*>& images) {
+void render_planes(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
+                   const std::vector<int>& active, int threads, const std::vector<Image*>& images) {
   const Values<S> value(theta, active);
-  const std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
-  model->tabulate(PixelModel<S>::Wanted::picture, threads);
+  const std::unique_ptr<SampleImage<S>> model = make_image<S>(scene, plan, value, light);
+  model->tabulate(SampleImage<S>::Wanted::picture, threads);
   const int w = scene.view.width, h = scene.view.height;
   parallel_for(static_cast<int>(images.size()), threads, [&](int p) {
     Image& image = *images[static_cast<std::size_t>(p)];
@@ -331,12 +335,12 @@ void render_planes(const Scene& scene, const RenderPlan& plan, const Theta& thet
 }
 
 template <class S>
-void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
+void render_list(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
                  const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active, int threads,
                  PixelRendering& out, int first_column) {
   const Values<S> value(theta, active);
-  const std::unique_ptr<PixelModel<S>> model = make_pixel_model<S>(scene, plan, value);
-  model->tabulate(PixelModel<S>::Wanted::points, threads);
+  const std::unique_ptr<SampleImage<S>> model = make_image<S>(scene, plan, value, light);
+  model->tabulate(SampleImage<S>::Wanted::points, threads);
   const int n = static_cast<int>(pixels.size());
   constexpr int kStep = kLanesOf<S>;
   // All lanes take as many samples as the one that needs most: pixels that need as many go together, the dearest first.
@@ -355,6 +359,11 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   std::partial_sum(place.begin(), place.end(), place.begin());
   std::vector<std::size_t> order(pixels.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[place[static_cast<std::size_t>(255 - samples[i])]++] = i;
+  const auto passing_at = [&](const PlainOf<S>& column, const PlainOf<S>& row) {
+    S v;
+    model->passing(column, row, &v);
+    return v;
+  };
   const auto put = [&](std::size_t pixel, const S& v, int k) {
     out.intensity(static_cast<Eigen::Index>(pixel)) = lane(plain(v), k);
     if constexpr (ScalarTraits<S>::derivatives > 0)
@@ -367,7 +376,7 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   parallel_for(edges, threads, [&](int i) {
     const std::size_t pixel = order[static_cast<std::size_t>(i)];
     S v = mean_over_cut_pixel(*model, plan, pixels[pixel][0], pixels[pixel][1]);
-    if (model->has_passing_light()) v = v + model->passing(PlainOf<S>(pixels[pixel][0]), PlainOf<S>(pixels[pixel][1]));
+    if (model->has_passing_light()) v = v + passing_at(PlainOf<S>(pixels[pixel][0]), PlainOf<S>(pixels[pixel][1]));
     put(pixel, v, 0);
   });
   const int together = std::clamp(groups / 64, 1, 16);
@@ -387,12 +396,12 @@ void render_list(const Scene& scene, const RenderPlan& plan, const Theta& theta,
       if (most == 1 && plan.fringe_means) {
         FringePoint<S> p[3][3];
         for (int j = 0; j < 3; ++j)
-          for (int i = 0; i < 3; ++i) p[j][i] = model->fringe(column + PlainOf<S>(i - 1.0), row + PlainOf<S>(j - 1.0));
+          for (int i = 0; i < 3; ++i) model->fringe(column + PlainOf<S>(i - 1.0), row + PlainOf<S>(j - 1.0), &p[j][i]);
         v = model->in_phase() ? fringe_mean<false>(p) : fringe_mean<true>(p);
       } else {
         v = mean_over_pixels(*model, column, row, std::max(most, 2));  // the point value alone is no pixel mean
       }
-      if (model->has_passing_light()) v = v + model->passing(column, row);
+      if (model->has_passing_light()) v = v + passing_at(column, row);
       for (int k = 0; k < std::min(kStep, n - edges - g * kStep); ++k) put(at[static_cast<std::size_t>(k)], v, k);
     }
   });
@@ -429,22 +438,85 @@ void in_chunks(const std::vector<int>& active, std::size_t most, const Body& bod
   }
 }
 
-}  // namespace
-
-void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
-            Rendering& into) {
-  if (plan.wave) return render_wave(scene, *plan.wave, theta, active, threads, into);
+/// What light of one direction brings.
+void render_direction(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
+                      const std::vector<int>& active, int threads, Rendering& into) {
+  if (plan.wave) return render_wave(scene, *plan.wave, light, theta, active, threads, into);
   into.derivatives.resize(active.size());
   if (active.empty()) {
-    render_planes<Pack>(scene, plan, theta, {}, threads, {&into.intensity});
+    render_planes<Pack>(scene, plan, light, theta, {}, threads, {&into.intensity});
     return;
   }
   in_chunks(active, derivatives_of_picture(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
     std::vector<Image*> images{&into.intensity};
     for (std::size_t j = 0; j < chunk.size(); ++j)
       images.push_back(&into.derivatives[static_cast<std::size_t>(first) + j]);
-    render_planes<S>(scene, plan, theta, chunk, threads, images);
+    render_planes<S>(scene, plan, light, theta, chunk, threads, images);
   });
+}
+/// The same at chosen pixels.
+void render_direction(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
+                      const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active, int threads,
+                      PixelRendering& into) {
+  into.intensity.resize(static_cast<long>(pixels.size()));
+  into.derivatives.resize(static_cast<long>(pixels.size()), static_cast<long>(active.size()));
+  if (pixels.empty()) return;
+  if (plan.wave) {  // there is no part of such a picture
+    Rendering all;
+    render_wave(scene, *plan.wave, light, theta, active, threads, all);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const auto [column, row] = pixels[i];
+      into.intensity[static_cast<long>(i)] = all.intensity(column, row);
+      for (std::size_t j = 0; j < active.size(); ++j)
+        into.derivatives(static_cast<long>(i), static_cast<long>(j)) = all.derivatives[j](column, row);
+    }
+    return;
+  }
+  if (active.empty())
+    render_list<Pack>(scene, plan, light, theta, pixels, {}, threads, into, 0);
+  else
+    in_chunks(active, derivatives_at_once(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
+      render_list<S>(scene, plan, light, theta, pixels, chunk, threads, into, first);
+    });
+}
+
+/// sum = kept * sum + share * part.
+void mix(Image& sum, double kept, const Image& part, double share) {
+  for (std::size_t i = 0; i < sum.size(); ++i) sum.values()[i] = kept * sum.values()[i] + share * part.values()[i];
+}
+void mix(Rendering& sum, double kept, const Rendering& part, double share) {
+  mix(sum.intensity, kept, part.intensity, share);
+  for (std::size_t j = 0; j < sum.derivatives.size(); ++j) mix(sum.derivatives[j], kept, part.derivatives[j], share);
+}
+void mix(PixelRendering& sum, double kept, const PixelRendering& part, double share) {
+  sum.intensity = kept * sum.intensity + share * part.intensity;
+  sum.derivatives = kept * sum.derivatives + share * part.derivatives;
+}
+
+/// The one loop over directions: of_one(light, result) for each of them, and their sum by weight. Of a single one
+/// `into` holds what it brings, bit for bit.
+template <class Result, class OfOne>
+void sum_over_directions(const Exposure& exposure, Result& into, const OfOne& of_one) {
+  of_one(exposure.directions.front(), into);
+  for (std::size_t k = 1; k < exposure.directions.size(); ++k) {
+    Result part;
+    of_one(exposure.directions[k], part);
+    mix(into, k == 1 ? exposure.weights.front() : 1.0, part, exposure.weights[k]);
+  }
+}
+
+}  // namespace
+
+void render(const Scene& scene, const RenderPlan& plan, const Exposure& exposure, const Theta& theta,
+            const std::vector<int>& active, int threads, Rendering& into) {
+  sum_over_directions(exposure, into, [&](const BeamMaker& light, Rendering& one) {
+    render_direction(scene, plan, light, theta, active, threads, one);
+  });
+}
+
+void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
+            Rendering& into) {
+  render(scene, plan, exposure_of(scene.microscope), theta, active, threads, into);
 }
 
 Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active,
@@ -454,11 +526,29 @@ Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta,
   return r;
 }
 
+PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Exposure& exposure, const Theta& theta,
+                             const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
+                             int threads) {
+  PixelRendering out;
+  sum_over_directions(exposure, out, [&](const BeamMaker& light, PixelRendering& one) {
+    render_direction(scene, plan, light, theta, pixels, active, threads, one);
+  });
+  return out;
+}
+
+PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
+                             const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
+                             int threads) {
+  return render_pixels(scene, plan, exposure_of(scene.microscope), theta, pixels, active, threads);
+}
+
 Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   if (plan.wave) throw std::logic_error("wave optics has no rays to take one at a time");
-  Image image;
-  render_planes<double>(scene, plan, theta, {}, 1, {&image});
-  return image;
+  Rendering r;
+  sum_over_directions(exposure_of(scene.microscope), r, [&](const BeamMaker& light, Rendering& one) {
+    render_planes<double>(scene, plan, light, theta, {}, 1, {&one.intensity});
+  });
+  return std::move(r.intensity);
 }
 
 bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::vector<std::array<int, 2>>& pixels) {
@@ -490,32 +580,6 @@ bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::v
   }
   constexpr double kReading = 0.05;  // of a ray's time, a pixel
   return count * rays > tables + all * (left * (plan.fringe_means ? 1 : rays) + kReading);
-}
-
-PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
-                             const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
-                             int threads) {
-  PixelRendering out;
-  out.intensity.resize(static_cast<long>(pixels.size()));
-  out.derivatives.resize(static_cast<long>(pixels.size()), static_cast<long>(active.size()));
-  if (pixels.empty()) return out;
-  if (plan.wave) {  // there is no part of such a picture
-    const Rendering all = render(scene, plan, theta, active, threads);
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const auto [column, row] = pixels[i];
-      out.intensity[static_cast<long>(i)] = all.intensity(column, row);
-      for (std::size_t j = 0; j < active.size(); ++j)
-        out.derivatives(static_cast<long>(i), static_cast<long>(j)) = all.derivatives[j](column, row);
-    }
-    return out;
-  }
-  if (active.empty())
-    render_list<Pack>(scene, plan, theta, pixels, {}, threads, out, 0);
-  else
-    in_chunks(active, derivatives_at_once(plan), [&]<class S>(const std::vector<int>& chunk, int first) {
-      render_list<S>(scene, plan, theta, pixels, chunk, threads, out, first);
-    });
-  return out;
 }
 
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta) {

@@ -1,5 +1,5 @@
 #pragma once
-// What the image assembly needs of a scene: the intensity at points of the image, for any scalar.
+// What the image assembly needs of a sample: its light at points of the image, for any scalar.
 
 #include <array>
 #include <cmath>
@@ -11,12 +11,13 @@
 
 #include "birefit/plan.h"
 #include "core/scalar.h"
-#include "instrument/beam.h"
 #include "medium/surround.h"
 #include "samples/fringe.h"
 #include "scene/values.h"
 
 namespace birefit {
+
+class BeamMaker;  // instrument/exposure.h
 
 /// Compiled for pictures that are read from a table and no others (transport/method.h).
 template <class S>
@@ -33,14 +34,16 @@ struct EdgeCircle {
 
 struct FringeScratch;
 
-/// Intensity at image points (pixel units; docs/conventions.md), one a lane.
+/// A sample in light of one direction, at image points (pixel units; docs/conventions.md), one a lane. Light is written
+/// in place, out[channel], of which there is one: to return it as a value costs more than to compute it.
 template <class S>
-class PixelModel {
+class SampleImage {
  public:
-  virtual ~PixelModel() = default;
-  virtual S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const = 0;
-  /// The parts of intensity() as smooth functions; only with plan.fringe_means.
-  virtual FringePoint<S> fringe(const PlainOf<S>&, const PlainOf<S>&) const {
+  virtual ~SampleImage() = default;
+  /// As a fraction of what comes in.
+  virtual void light(const PlainOf<S>& column, const PlainOf<S>& row, S* out) const = 0;
+  /// The parts of light() as smooth functions; only with plan.fringe_means.
+  virtual void fringe(const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/, FringePoint<S>* /*out*/) const {
     throw std::logic_error("no fringes here");
   }
   /// The same of up to `count` columns of a row from `column` on, read from a table (FringeTable::run); 0 where there
@@ -54,8 +57,8 @@ class PixelModel {
   virtual FringeTraits fringe_traits() const { return {}; }
   /// FringePoint::quadrature is zero everywhere.
   virtual bool in_phase() const { return false; }
-  /// Lines along which the slope of intensity() has no bound on one side, like a root's (edge_pixels.h). The first, if
-  /// there is any, is the rim of all light that intensity() knows; a second one a core's edge, where it is continuous.
+  /// Lines along which the slope of light() has no bound on one side, like a root's (edge_pixels.h). The first, if
+  /// there is any, is the rim of all that light() knows; a second one a core's edge, where it is continuous.
   virtual int edges() const { return 0; }
   /// Positive on the side of that slope, negative on the other, and all but linear across a few pixels of the line,
   /// where it does not end (at a rim). Of a line that is no circle: about the distance, in pixels.
@@ -73,9 +76,9 @@ class PixelModel {
   virtual std::optional<EdgeCircle> circle(int /*edge*/) const { return {}; }
   /// beyond_edge() of the rim with its derivatives.
   virtual S rim(const PlainOf<S>& column, const PlainOf<S>& row) const { return S(beyond_edge(0, column, row)); }
-  /// The mean over a pixel of the light that goes past the sample, which intensity() leaves out.
+  /// The mean over a pixel of the light that goes past the sample, which light() leaves out.
   virtual bool has_passing_light() const { return false; }
-  virtual S passing(const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/) const { return S(0.0); }
+  virtual void passing(const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/, S* out) const { out[0] = S(0.0); }
   /// Of the picture and every derivative.
   virtual Symmetry symmetry() const { return Symmetry::none; }
   enum class Wanted { points, picture };
@@ -97,14 +100,6 @@ bool centred(const Scene& scene, const S& center_x_px, const S& center_y_px) {
 template <class S>
 bool mirrored(const S& x, const S& y, const S& z) {
   return stays_at(y, 0.0) || (stays_at(x, 0.0) && stays_at(z, 0.0));
-}
-
-/// Of a sample that looks the same from all sides of the viewing axis; twisted, it is not its mirror image.
-template <class S>
-Symmetry round_symmetry(const Scene& scene, const Values<S>& value, const Line<S>& light, bool twisted) {
-  const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
-  if (centred(scene, center_x, center_y)) return Symmetry::half_turn;
-  return !twisted && on_middle_row(scene, center_y) && light.mirrored() ? Symmetry::mirror : Symmetry::none;
 }
 
 }  // namespace birefit

@@ -28,8 +28,9 @@ struct SampleKind {
 /// The first kind of kinds.def that it is.
 const SampleKind& kind_of(const Scene& scene, const Observable& observable = {});
 
-/// What is seen of the scene, `plan` of the same scene; by a scalar for tables only where the plan has tables.
+/// What is seen of the scene in the light of one direction, `plan` of the same scene; by a scalar for tables only where
+/// the plan has tables. The maker must outlive the image.
 template <class S>
-std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

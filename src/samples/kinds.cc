@@ -31,7 +31,7 @@ bool has_cone(const Scene& scene) { return cone_half_angle(scene).has_value(); }
 
 const SampleKind& kind_of(const Scene& scene, const Observable& observable) {
   static const SampleKind kinds[] = {
-#define BIREFIT_KIND(name, is, plan, pilots, phases, note, jones, symmetric, passes_axis, model, tables) \
+#define BIREFIT_KIND(name, is, plan, pilots, phases, note, jones, symmetric, passes_axis, image, tables) \
   {#name, is, plan, pilots, phases, note, jones, symmetric, passes_axis},
 #include "samples/kinds.def"
 #undef BIREFIT_KIND
@@ -42,18 +42,20 @@ const SampleKind& kind_of(const Scene& scene, const Observable& observable) {
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_pixel_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-#define BIREFIT_KIND(name, is, plan_of, pilots, phases, note, jones, symmetric, passes_axis, model, tables) \
+std::unique_ptr<SampleImage<S>> make_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                           const BeamMaker& light) {
+#define BIREFIT_KIND(name, is, plan_of, pilots, phases, note, jones, symmetric, passes_axis, image, tables) \
   if (is(scene, plan.observable)) {                                                                         \
-    if constexpr (tables || !kForTablesOnly<S>) return model<S>(scene, plan, value);                        \
+    if constexpr (tables || !kForTablesOnly<S>) return image<S>(scene, plan, value, light);                 \
     throw std::logic_error("no table serves this scene");                                                   \
   }
 #include "samples/kinds.def"
 #undef BIREFIT_KIND
   throw std::logic_error("a sample of no kind");
 }
-#define BIREFIT_INSTANTIATE(S) \
-  template std::unique_ptr<PixelModel<S>> make_pixel_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                              \
+  template std::unique_ptr<SampleImage<S>> make_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                         const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

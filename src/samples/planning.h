@@ -21,6 +21,7 @@ struct Planning {
   const Demand& demand;
   const Values<double>& value;
   const Observable& observable;
+  const BeamMaker& light;  ///< of one direction: what of it planners see stands for all
   /// The means over a few pixels (column, row) by a plan, as the picture will have them: render_pixels().
   std::function<Eigen::VectorXd(const RenderPlan&, const std::vector<std::array<int, 2>>&)> means_at;
   RenderPicture picture;

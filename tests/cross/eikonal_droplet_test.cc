@@ -15,6 +15,7 @@
 #include "birefit/fit.h"
 #include "independent_droplet.h"
 #include "independent_rays.h"
+#include "instrument/exposure.h"
 #include "medium/families/axial_equilibrium.h"
 #include "rays/eikonal.h"
 #include "reference_table.h"
@@ -512,8 +513,9 @@ TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
         const Theta theta = s.b.table.values();
         const RenderPlan chosen = plan(s.scene, s.demand, theta);
         const Values<double> value(theta, {});
-        const auto model = make_pixel_model<double>(s.scene, chosen, value);
-        model->tabulate(PixelModel<double>::Wanted::picture, 1);
+        const Exposure exposure = exposure_of(s.scene.microscope);
+        const auto model = make_image<double>(s.scene, chosen, value, exposure.directions.front());
+        model->tabulate(SampleImage<double>::Wanted::picture, 1);
         const DropletOptics<double> o = droplet_optics(s.scene, value);
         const EikonalFan<double> fan_p(o, true, na), fan_s(o, false, na);
         const double between = std::cos(analyzer_deg * std::numbers::pi / 180), px = value(s.scene.view.pixel_size_um);
@@ -532,8 +534,10 @@ TEST(EikonalDroplet, PicturesAreTheRaysAtEveryPoint) {
                                   (rho > o.radius_um ? between * between : 0);
           const double column = 47.2 + rho * c / px, row = 48.1 - rho * n / px;
           // a pixel's mean; pixels that the rim meets are left out
-          const double beside_it = model->has_passing_light() ? model->passing(column, row) : 0;
-          worst = std::max(worst, std::abs(model->intensity(column, row) + beside_it - expected));
+          double light, beside_it = 0;
+          model->light(column, row, &light);
+          if (model->has_passing_light()) model->passing(column, row, &beside_it);
+          worst = std::max(worst, std::abs(light + beside_it - expected));
         }
         EXPECT_LT(worst, allowed);
         EXPECT_LT(worst, 3 * chosen.numerical_error);  // which knows 64 places a part

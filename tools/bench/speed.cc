@@ -23,7 +23,7 @@
 #include "independent_droplet.h"
 #include "medium/families/axial_equilibrium.h"
 #include "medium/families/radial.h"
-#include "render/render_scalar.h"
+#include "render/exposed.h"
 #include "samples/sphere/droplet.h"
 #include "study/frames.h"
 #include "transport/one_way.h"

@@ -3,15 +3,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "transport/method.h"
+#include "instrument/exposure.h"
 
 namespace birefit {
 namespace {
 
 template <class S>
-class CrystalModel final : public PixelModel<S> {
+class BarImage final : public SampleImage<S> {
  public:
-  CrystalModel(const Scene& scene, const Values<S>& value) : along_y_(std::get<Crystal>(scene.sample).field_along_y) {
+  BarImage(const Scene& scene, const Values<S>& value, const BeamMaker& maker)
+      : along_y_(std::get<Crystal>(scene.sample).field_along_y) {
     const Crystal& crystal = std::get<Crystal>(scene.sample);
     const S across = value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0);
     phase_ = std::numbers::pi * across / value(crystal.half_wave_voltage_v);
@@ -21,7 +22,7 @@ class CrystalModel final : public PixelModel<S> {
     high_ = value.get(crystal.electrode_high_px, size - 0.5);
     // A retarder cos(delta/2) + i sin(delta/2) sz in the frame of the induced axis. Between linear states this is Born
     // & Wolf 15.4.2, I = cos^2(A - P) - sin 2(A - f) sin 2(P - f) sin^2(delta/2), f the induced axis.
-    const Line<S> light(scene.microscope, value);
+    const Line<S> light = maker.in(value).line;
     S sin_twice, cos_twice;
     sin_cos(2.0 * (value.radians(crystal.slow_axis_deg) + value.radians(scene.view.rotation_deg)), sin_twice,
             cos_twice);
@@ -31,7 +32,7 @@ class CrystalModel final : public PixelModel<S> {
     turning_ = 2.0 * form.wz;
     linear_ = light.linear();
   }
-  S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const override {
+  void light(const PlainOf<S>& column, const PlainOf<S>& row, S* out) const override {
     S field(1.0);
     if (!legendre_.empty()) {
       const S t = 2.0 * (S(along_y_ ? row : column) - low_) / (high_ - low_) - 1.0;
@@ -46,11 +47,12 @@ class CrystalModel final : public PixelModel<S> {
     }
     if (linear_) {
       const S s = sin(0.5 * phase_ * field);
-      return bright_ + modulation_ * s * s;
+      out[0] = bright_ + modulation_ * s * s;
+      return;
     }
     S s, c;
     sin_cos(0.5 * phase_ * field, s, c);
-    return bright_ + (modulation_ * s + turning_ * c) * s;
+    out[0] = bright_ + (modulation_ * s + turning_ * c) * s;
   }
 
  private:
@@ -86,11 +88,13 @@ std::vector<double> bar_phases(const Scene& scene, const Values<double>& value) 
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_crystal_model(const Scene& scene, const RenderPlan&, const Values<S>& value) {
-  return std::make_unique<CrystalModel<S>>(scene, value);
+std::unique_ptr<SampleImage<S>> make_bar_image(const Scene& scene, const RenderPlan&, const Values<S>& value,
+                                               const BeamMaker& light) {
+  return std::make_unique<BarImage<S>>(scene, value, light);
 }
-#define BIREFIT_INSTANTIATE(S) \
-  template std::unique_ptr<PixelModel<S>> make_crystal_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                  \
+  template std::unique_ptr<SampleImage<S>> make_bar_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                             const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

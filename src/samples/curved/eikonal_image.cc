@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "instrument/exposure.h"
+
 namespace birefit {
 
 template <class S>
-EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                              const BeamMaker& light)
     : optics_(droplet_optics(scene, value)),
       fan_p_(optics_, true, optics_.objective_na),
       fan_s_(optics_, false, optics_.objective_na),
-      light_(Line<S>(scene.microscope, value)),
+      light_(light.in(value).line),
       view_(scene, value, light_),
       aplanatic_(scene.microscope.aplanatic),
       symmetry_(round_symmetry(scene, value, light_.line(), false)),
@@ -101,7 +104,7 @@ double EikonalImage<S>::table_error(std::size_t which, int panels) const {
 }
 
 template <class S>
-void EikonalImage<S>::tabulate(typename PixelModel<S>::Wanted, int threads) {
+void EikonalImage<S>::tabulate(typename SampleImage<S>::Wanted, int threads) {
   // The planner's parts had other fringes, in a fit: by values alone, so that derivatives change nothing.
   constexpr int kMost = 64;
   for (std::size_t k = 0; k < parts_.size(); ++k) do
@@ -125,10 +128,11 @@ void EikonalImage<S>::share_at(const Part& part, const P& rho_um, P& share, P& s
 }
 
 template <class S>
-S EikonalImage<S>::intensity(const P& column, const P& row) const {
+void EikonalImage<S>::light(const P& column, const P& row, S* out) const {
   constexpr bool kSlopes = ScalarTraits<S>::derivatives > 0;
   const auto place = view_.at(column, row);
-  S result(P(0.0));
+  S& result = out[0];
+  result = S(P(0.0));
   const auto basis = RoundView<S>::basis(place);
   [[maybe_unused]] std::array<P, RoundView<S>::kMostTerms> turned;
   if constexpr (kSlopes) turned = RoundView<S>::turned(place);
@@ -160,16 +164,17 @@ S EikonalImage<S>::intensity(const P& column, const P& row) const {
     }
   }
   if constexpr (kSlopes) view_.add_moves_and_turns(place, by_rho, by_angle, result);
-  return result;
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_eikonal_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<EikonalImage<S>>(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_eikonal_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                   const BeamMaker& light) {
+  return std::make_unique<EikonalImage<S>>(scene, plan, value, light);
 }
-#define BIREFIT_INSTANTIATE(S)    \
-  template class EikonalImage<S>; \
-  template std::unique_ptr<PixelModel<S>> make_eikonal_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                      \
+  template class EikonalImage<S>;                                                                                   \
+  template std::unique_ptr<SampleImage<S>> make_eikonal_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                                 const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

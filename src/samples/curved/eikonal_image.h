@@ -15,15 +15,17 @@ namespace birefit {
 /// the end / half the way); the ends move with the parameters, and so do the tables. A jump is drawn over a quarter of
 /// a pixel, so that pixels know how it moves; over less, where the next end is closer.
 template <class S>
-class EikonalImage final : public PixelModel<S> {
+class EikonalImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
-  EikonalImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value);
-  void tabulate(PixelModel<S>::Wanted, int threads) override;
-  S intensity(const P& column, const P& row) const override;
+  EikonalImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light);
+  void tabulate(SampleImage<S>::Wanted, int threads) override;
+  void light(const P& column, const P& row, S* out) const override;
   Symmetry symmetry() const override { return symmetry_; }
   bool has_passing_light() const override { return !passing_.dark(); }
-  S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
+  void passing(const P& column, const P& row, S* out) const override {
+    out[0] = passing_.mean(view_, view_.at(column, row));
+  }
 
   // For the planner.
   std::vector<double> ends_um() const;  ///< from the axis outwards
@@ -66,6 +68,6 @@ class EikonalImage final : public PixelModel<S> {
 };
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_eikonal_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_eikonal_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

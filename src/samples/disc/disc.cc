@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "transport/method.h"
+#include "instrument/exposure.h"
 
 namespace birefit {
 
@@ -65,9 +65,9 @@ S lost_share(const S& u, const S& contrast) {
 }
 
 template <class S>
-class DiscModel final : public PixelModel<S> {
+class DiscImage final : public SampleImage<S> {
  public:
-  DiscModel(const Scene& scene, const Values<S>& value)
+  DiscImage(const Scene& scene, const Values<S>& value, const BeamMaker& maker)
       : optics_(scene, value),
         coloured_(scene.microscope.bandwidth_nm),
         spread_(value.get(scene.microscope.bandwidth_nm, 0.0) /
@@ -75,13 +75,13 @@ class DiscModel final : public PixelModel<S> {
     const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
     const S load =
         value.radians(disc.load_azimuth_deg, 90) + value.radians(scene.view.rotation_deg) - 0.5 * std::numbers::pi;
-    const Line<S> light(scene.microscope, value);
+    const Line<S> light = maker.in(value).line;
     S sin_twice, cos_twice;
     sin_cos(2.0 * load, sin_twice, cos_twice);
     form_ = light.form().in_frame(cos_twice, sin_twice);
     linear_ = light.linear();
   }
-  S intensity(const PlainOf<S>& column, const PlainOf<S>& row) const override {
+  void light(const PlainOf<S>& column, const PlainOf<S>& row, S* out) const override {
     S x, y;
     optics_.place(S(column), S(row), x, y);
     StressPair<S> pair = optics_.phases(x, y);
@@ -101,14 +101,15 @@ class DiscModel final : public PixelModel<S> {
       cos_sinc = contrast * cos_sinc;
       cos_cos = 1.0 - d_sq * sinc_sinc;
     }
-    S light = form_.ww * cos_cos + (pair.normal * (form_.zz * pair.normal + 2.0 * (form_.xz * pair.shear)) +
-                                    form_.xx * (pair.shear * pair.shear)) *
-                                       sinc_sinc;
+    S& light = out[0];
+    light = form_.ww * cos_cos + (pair.normal * (form_.zz * pair.normal + 2.0 * (form_.xz * pair.shear)) +
+                                  form_.xx * (pair.shear * pair.shear)) *
+                                     sinc_sinc;
     if (!linear_) light = light + 2.0 * (form_.wz * pair.normal + form_.wx * pair.shear) * cos_sinc;
-    if (optics_.illumination.empty()) return light;
+    if (optics_.illumination.empty()) return;
     const S east = (column - optics_.center_x_px) * optics_.px_per_radius_inverse,
             north = (optics_.center_y_px - row) * optics_.px_per_radius_inverse;
-    return light * plane_polynomial<S>(optics_.illumination, east, north);
+    light = light * plane_polynomial<S>(optics_.illumination, east, north);
   }
 
  private:
@@ -121,12 +122,14 @@ class DiscModel final : public PixelModel<S> {
 }  // namespace
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_disc_model(const Scene& scene, const RenderPlan&, const Values<S>& value) {
-  return std::make_unique<DiscModel<S>>(scene, value);
+std::unique_ptr<SampleImage<S>> make_disc_image(const Scene& scene, const RenderPlan&, const Values<S>& value,
+                                                const BeamMaker& light) {
+  return std::make_unique<DiscImage<S>>(scene, value, light);
 }
-#define BIREFIT_INSTANTIATE(S)   \
-  template struct DiscOptics<S>; \
-  template std::unique_ptr<PixelModel<S>> make_disc_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                   \
+  template struct DiscOptics<S>;                                                                                 \
+  template std::unique_ptr<SampleImage<S>> make_disc_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                              const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

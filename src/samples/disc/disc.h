@@ -59,6 +59,6 @@ RenderPlan plan_disc(const Planning&);
 /// Retardances at a few places (rad), by both components of the stress.
 std::vector<double> disc_phases(const Scene&, const Values<double>&);
 template <class S>
-std::unique_ptr<PixelModel<S>> make_disc_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_disc_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

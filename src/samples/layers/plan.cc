@@ -111,15 +111,16 @@ bool plan_fringe_means(const Planning& planning, const PlanarOptics<double>& o, 
 
 /// Squares of the picture whose fringes are smooth enough to be interpolated from 144 rays each; of the sizes tried,
 /// from the whole picture on, the one with the fewest rays.
-void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
+void plan_fringe_blocks(const Planning& planning, RenderPlan& plan) {
+  const Scene& scene = planning.scene;
   const int w = scene.view.width, h = scene.view.height;
   // Less than 1e-9 the powers of a phase of some hundred radians do not hold.
   constexpr double kLeast = 1e-9;
   if (plan.demand.intensity_accuracy < 10 * kLeast) return;
   const double target = std::max(kSquaresShare * plan.demand.intensity_accuracy, kLeast);
   constexpr int kColumns = 8, kRims = 2 * FringeBlocks::kRim;
-  const Values<Pack> lanes = value.template as<Pack>();
-  const std::unique_ptr<PixelModel<Pack>> model = make_planar_model(scene, plan, lanes);
+  const Values<Pack> lanes = planning.value.as<Pack>();
+  const std::unique_ptr<SampleImage<Pack>> model = make_planar_image(scene, plan, lanes, planning.light);
   double fewest = 0.5 * w * h;
   for (int parts = 1;; parts *= 2) {
     constexpr int kWhole = 8;  // lanes do not cross from square to square
@@ -130,7 +131,11 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
     if (least >= fewest) break;
     const FringeTable<Pack> table(blocks, std::vector<std::uint8_t>(static_cast<std::size_t>(blocks.count()), 1),
                                   kGivenUp * plan.demand.intensity_accuracy, 0, {},
-                                  [&](const Pack& column, const Pack& row) { return model->fringe(column, row); });
+                                  [&](const Pack& column, const Pack& row) {
+                                    FringePoint<Pack> point;
+                                    model->fringe(column, row, &point);
+                                    return point;
+                                  });
     std::vector<std::uint8_t> smooth(static_cast<std::size_t>(blocks.count()), 0);
     parallel_for(blocks.count(), 0, [&](int b) {
       const double left = (b % blocks.columns) * size - FringeBlocks::kRim,
@@ -142,7 +147,8 @@ void plan_fringe_blocks(const Scene& scene, const Values<double>& value, RenderP
           for (int k = 0; k < kLanes; ++k)
             column[k] = left + size * (0.01 + 0.98 * std::min(first + k, kColumns - 1) / (kColumns - 1.0));
           const double row = top + down * size;
-          const FringePoint<Pack> exact = model->fringe(Pack::load_aligned(column), Pack(row));
+          FringePoint<Pack> exact;
+          model->fringe(Pack::load_aligned(column), Pack(row), &exact);
           for (int k = 0; k < kLanes; ++k) {
             FringePoint<double> read;
             if (!table.read(column[k], row, scratch, read)) return;
@@ -402,7 +408,7 @@ void plan_cone_pixels(const Planning& planning, const PlanarOptics<double>& o, R
   plan.reasons.push_back(fmt::format("the phase changes by up to {:.2g} rad a pixel", fastest));
   if ((plan.method == "diagonal" || plan.method == "modal") && plan_fringe_means(planning, o, plan)) {
     plan.reasons.push_back("pixel means of the fringes in closed form, from one ray a pixel");
-    plan_fringe_blocks(scene, value, plan);
+    plan_fringe_blocks(planning, plan);
   } else {
     sample_by_radius(plan, cx, cy, bins, [&](double r) {
       const double f = std::min(23.999, r / bins * 24);

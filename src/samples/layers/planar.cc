@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "instrument/exposure.h"
 #include "medium/build.h"
 #include "medium/references.h"
 #include "samples/image.h"
@@ -109,17 +110,18 @@ bool axes_all(const Column<S>& column, const Mesh& mesh, const Holds& holds) {
 }
 
 template <class S>
-class PlanarModel final : public PixelModel<S> {
+class PlanarImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
-  PlanarModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+  PlanarImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& maker)
       : scene_(scene),
         value_(value),
+        maker_(maker),
         accuracy_(plan.demand.intensity_accuracy),
         optics_(planar_optics(scene, value, continuity_of(plan.demand))),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.column->breaks) : plan.mesh),
-        light_(scene.microscope, value),
+        light_(maker.in(value).line),
         coupling_(plan.method == "modal"),
         has_fringes_(plan.fringe_means),
         blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
@@ -127,14 +129,9 @@ class PlanarModel final : public PixelModel<S> {
         left_to_rays_(std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) != plan.fringe_blocks.end()) {
     if (cone_half_angle(scene)) cone_.emplace(scene, value);
     if (!cone_) {
-      S tx(0.0), ty(0.0);
-      if (!scene.microscope.directions.empty()) {
-        const Direction& d = scene.microscope.directions.front();
-        const double t = std::tan(d.theta_deg * std::numbers::pi / 180), a = d.azimuth_deg * std::numbers::pi / 180;
-        tx = S(t * std::cos(a));
-        ty = S(t * std::sin(a));
-      }
-      constant_ = light_.of(planar_jones(optics_, method_, mesh_, tx, ty));
+      const Direction d = maker.in(value).direction;
+      const double t = std::tan(d.theta_deg * std::numbers::pi / 180), a = d.azimuth_deg * std::numbers::pi / 180;
+      constant_ = light_.of(planar_jones(optics_, method_, mesh_, S(t * std::cos(a)), S(t * std::sin(a))));
     }
     const bool straight = cone_ && cone_->from_front();
     if (straight && centred(scene, cone_->center_x, cone_->center_y) &&
@@ -151,14 +148,17 @@ class PlanarModel final : public PixelModel<S> {
         if ((b / blocks_.columns) * blocks_.block_px > scene.view.height / 2 + 2 * FringeBlocks::kRim)
           tabulated_blocks_[static_cast<std::size_t>(b)] = 0;
   }
-  S intensity(const P& column, const P& row) const override {
-    if (!cone_) return constant_;
+  void light(const P& column, const P& row, S* out) const override {
+    if (!cone_) {
+      out[0] = constant_;
+      return;
+    }
     const auto t = cone_->at(column, row);
-    return light_.of(planar_jones(optics(), method_, mesh_, t.x, t.y));
+    out[0] = light_.of(planar_jones(optics(), method_, mesh_, t.x, t.y));
   }
-  FringePoint<S> fringe(const P& column, const P& row) const override {
+  void fringe(const P& column, const P& row, FringePoint<S>* out) const override {
     const auto t = cone_->at(column, row);
-    return planar_fringe(optics(), coupling_, mesh_, optics_.k0, Raise<S, S>(), light_, t.x, t.y);
+    out[0] = planar_fringe(optics(), coupling_, mesh_, optics_.k0, Raise<S, S>(), light_, t.x, t.y);
   }
   int fringe_run(int column, double row, int count, FringeScratch& scratch, double* const* out) const override {
     return table_.run(column, row, count, !in_phase(), scratch, out);
@@ -173,8 +173,8 @@ class PlanarModel final : public PixelModel<S> {
     return light_.linear() && !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h;
   }
   Symmetry symmetry() const override { return symmetry_; }
-  void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
-    if (wanted != PixelModel<S>::Wanted::picture || tabulated_blocks_.empty()) return;
+  void tabulate(SampleImage<S>::Wanted wanted, int threads) override {
+    if (wanted != SampleImage<S>::Wanted::picture || tabulated_blocks_.empty()) return;
     // Where the cone's middle lies and how wide it is carries fringes along and changes none. Seen from the side a
     // wider cone carries them by other ways than straight away from the middle: its derivative is left to rays.
     const ParameterRef half_angle = scene_.view.camera ? ParameterRef{} : *cone_half_angle(scene_);
@@ -269,7 +269,7 @@ class PlanarModel final : public PixelModel<S> {
       for (std::size_t j = 0; j < inside.size(); ++j)
         raise.to[j] =
             static_cast<std::size_t>(std::find(changing.begin(), changing.end(), inside[j]) - changing.begin());
-    const Line<R> light(scene_.microscope, value);
+    const Line<R> light = maker_.in(value).line;
     const R k0 = wavenumber_per_um(scene_, value);
     std::optional<PlanarOptics<T>> own;
     const PlanarOptics<T>& optics = [&]() -> const PlanarOptics<T>& {
@@ -298,6 +298,7 @@ class PlanarModel final : public PixelModel<S> {
   }
   const Scene& scene_;
   Values<S> value_;
+  const BeamMaker& maker_;
   double accuracy_;  ///< of the intensity, demanded
   PlanarOptics<S> optics_;
   const TransportMethod<S>& method_;
@@ -319,11 +320,13 @@ class PlanarModel final : public PixelModel<S> {
 }  // namespace
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_planar_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<PlanarModel<S>>(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_planar_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                  const BeamMaker& light) {
+  return std::make_unique<PlanarImage<S>>(scene, plan, value, light);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                     \
-  template std::unique_ptr<PixelModel<S>> make_planar_model<S>(const Scene&, const RenderPlan&, const Values<S>&); \
+  template std::unique_ptr<SampleImage<S>> make_planar_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                                const BeamMaker&);                                 \
   template PlanarOptics<S> planar_optics<S>(const Scene&, const Values<S>&, Continuity);                           \
   template Mat2<S> planar_jones<S>(const PlanarOptics<S>&, const TransportMethod<S>&, const Mesh&, const S&, const S&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)

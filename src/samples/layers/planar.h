@@ -1,6 +1,7 @@
 #pragma once
 // One direction of light through a plane-parallel sample.
 
+#include "instrument/beam.h"
 #include "samples/image.h"
 #include "transport/method.h"
 
@@ -31,6 +32,6 @@ FringePoint<R> planar_fringe(const PlanarOptics<S>& optics, bool coupling, const
                              const Raise<S, R>& raise, const Line<R>& light, const S& tx, const S& ty);
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_planar_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_planar_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

@@ -25,15 +25,15 @@ S path_um(const Column<S>& column, int steps) {
 }
 
 template <class S>
-class RetardanceModel final : public PixelModel<S> {
+class RetardanceImage final : public SampleImage<S> {
  public:
-  RetardanceModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+  RetardanceImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
     value_ = path_um(*planar_optics(scene, value).column, plan.steps);
     if (plan.observable.quantity == Quantity::retardance_waves) value_ = value_ / wavelength_um(scene, value);
     if (plan.observable.quantity == Quantity::birefringence)
       value_ = value_ / value(std::get<Cell>(scene.sample).thickness_um);
   }
-  S intensity(const PlainOf<S>&, const PlainOf<S>&) const override { return value_; }
+  void light(const PlainOf<S>&, const PlainOf<S>&, S* out) const override { out[0] = value_; }
 
  private:
   S value_;
@@ -66,12 +66,13 @@ RenderPlan plan_retardance(const Planning& planning) {
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_retardance_model(const Scene& scene, const RenderPlan& plan,
-                                                     const Values<S>& value) {
-  return std::make_unique<RetardanceModel<S>>(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_retardance_image(const Scene& scene, const RenderPlan& plan,
+                                                      const Values<S>& value, const BeamMaker&) {
+  return std::make_unique<RetardanceImage<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S) \
-  template std::unique_ptr<PixelModel<S>> make_retardance_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                         \
+  template std::unique_ptr<SampleImage<S>> make_retardance_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                                    const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

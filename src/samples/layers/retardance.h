@@ -9,6 +9,7 @@ namespace birefit {
 /// one number.
 RenderPlan plan_retardance(const Planning&);
 template <class S>
-std::unique_ptr<PixelModel<S>> make_retardance_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_retardance_image(const Scene&, const RenderPlan&, const Values<S>&,
+                                                      const BeamMaker&);
 
 }  // namespace birefit

@@ -12,10 +12,10 @@ namespace birefit {
 namespace {
 
 template <class S>
-class RingModel final : public PixelModel<S> {
+class RingImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
-  RingModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+  RingImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
       : numbers_(plan.observable.ring_numbers), n_host_(host_index<S>(scene, value)) {
     const Plate& plate = std::get<Plate>(scene.sample);
     const Indices<S> n = material_indices<S>(scene.material, value, wavelength_um(scene, value));
@@ -26,7 +26,7 @@ class RingModel final : public PixelModel<S> {
     offset_ = value.get(plate.ring_offset, 0.0);
     path_per_order_ = wavelength_um(scene, value) / thickness_um_;
   }
-  S intensity(const P& column, const P&) const override {
+  void light(const P& column, const P&, S* out) const override {
     P number(0.0);
     if constexpr (std::is_same_v<P, Pack>) {
       alignas(64) double n[kLanes];
@@ -36,7 +36,7 @@ class RingModel final : public PixelModel<S> {
       number = number_at(column);
     }
     const S k = ring_kappa_squared<S>(n_o_, n_e_, S((S(number) + offset_) * path_per_order_));
-    return 1e-4 * ring_radius<S>(n_o_, k, n_host_, thickness_um_, distance_um_);  // um to cm
+    out[0] = 1e-4 * ring_radius<S>(n_o_, k, n_host_, thickness_um_, distance_um_);  // um to cm
   }
 
  private:
@@ -69,11 +69,13 @@ void refuse_ring_jones(const Scene&, const RenderPlan&, const Values<double>&, J
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_ring_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<RingModel<S>>(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_rings_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                 const BeamMaker&) {
+  return std::make_unique<RingImage<S>>(scene, plan, value);
 }
-#define BIREFIT_INSTANTIATE(S) \
-  template std::unique_ptr<PixelModel<S>> make_ring_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                    \
+  template std::unique_ptr<SampleImage<S>> make_rings_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                               const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -35,6 +35,6 @@ std::vector<double> ring_phases(const Scene&, const Values<double>&);
 /// Throws UserError: radii come of no matrix.
 void refuse_ring_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);
 template <class S>
-std::unique_ptr<PixelModel<S>> make_ring_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_rings_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

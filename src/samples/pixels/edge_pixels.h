@@ -1,8 +1,8 @@
 #pragma once
-// Pixels at lines along which light has a slope without bound on one side (PixelModel::edges): a sphere's rim, a core's
-// edge. At a distance u from such a line a ray's way through the sphere, and with it the light, is a smooth function of
-// t = sqrt(u), in which fringes are evenly spaced however they crowd in u. A pixel is cut along its edges, and each
-// part takes Gauss points in t.
+// Pixels at lines along which light has a slope without bound on one side (SampleImage::edges): a sphere's rim, a
+// core's edge. At a distance u from such a line a ray's way through the sphere, and with it the light, is a smooth
+// function of t = sqrt(u), in which fringes are evenly spaced however they crowd in u. A pixel is cut along its edges,
+// and each part takes Gauss points in t.
 
 #include <algorithm>
 #include <array>
@@ -28,7 +28,7 @@ template <class S>
 class EdgePixel {
  public:
   using P = PlainOf<S>;
-  EdgePixel(const PixelModel<S>& model, double column, double row) : model_(model), column_(column), row_(row) {
+  EdgePixel(const SampleImage<S>& model, double column, double row) : model_(model), column_(column), row_(row) {
     look();
   }
 
@@ -278,15 +278,15 @@ class EdgePixel {
       const P s = load_lanes<P>(at.data()), q = load_lanes<P>(beside.data()), inside = s + P(sign * kInside);
       const P slope = (beyond(0, s + P(sign * kApart), q) - beyond(0, s - P(sign * kApart), q)) * P(0.5 / kApart);
       const P x = P(column_) + (across_x_ ? s : q), y = P(row_) + (across_x_ ? q : s);
-      const P light =
-          plain(across_x_ ? model_.intensity(P(column_) + inside, y) : model_.intensity(x, P(row_) + inside));
-      const P per = load_lanes<P>(weight.data()) * light * inverse(slope);
+      S light;
+      model_.light(across_x_ ? P(column_) + inside : x, across_x_ ? y : P(row_) + inside, &light);
+      const P per = load_lanes<P>(weight.data()) * plain(light) * inverse(slope);
       const S moving = model_.rim(x, y);
       for (std::size_t j = 0; j < moving.d.size(); ++j) sum.d[j] = sum.d[j] + P(sum_of_lanes(per * moving.d[j]));
     }
   }
 
-  const PixelModel<S>& model_;
+  const SampleImage<S>& model_;
   double column_, row_;
   bool across_x_ = true, dark_ = false;
   std::array<Edge, kMostEdges> edge_{};
@@ -301,7 +301,7 @@ class RingPixel {
  public:
   using P = PlainOf<S>;
   /// `circles`: the rim, and a core's edge, where there is one.
-  RingPixel(const PixelModel<S>& model, const std::array<EdgeCircle, 2>& circles, int count, double column, double row)
+  RingPixel(const SampleImage<S>& model, const std::array<EdgeCircle, 2>& circles, int count, double column, double row)
       : model_(model),
         column_(column),
         row_(row),
@@ -480,22 +480,23 @@ class RingPixel {
     const P inside(1 - 1e-9);
     for (std::size_t i = 0; i < at_rim.size; i += kStep) {
       const P dx = load_lanes<P>(&at_rim.x[i]), dy = load_lanes<P>(&at_rim.y[i]), x = P(column_) + dx, y = P(row_) + dy;
-      const P light =
-          plain(model_.intensity(P(column_ - x_) + inside * (dx + P(x_)), P(row_ - y_) + inside * (dy + P(y_))));
-      const P per = load_lanes<P>(&at_rim.w[i]) * light * P(0.5 * rim_);  // rim() grows by 2 / radius a pixel inwards
+      S light;
+      model_.light(P(column_ - x_) + inside * (dx + P(x_)), P(row_ - y_) + inside * (dy + P(y_)), &light);
+      const P per =
+          load_lanes<P>(&at_rim.w[i]) * plain(light) * P(0.5 * rim_);  // rim() grows by 2 / radius a pixel inwards
       const S moving = model_.rim(x, y);
       for (std::size_t j = 0; j < moving.d.size(); ++j) sum.d[j] = sum.d[j] + P(sum_of_lanes(per * moving.d[j]));
     }
   }
 
-  const PixelModel<S>& model_;
+  const SampleImage<S>& model_;
   double column_, row_, x_, y_, rim_, core_, around_;
   std::array<std::array<double, 2>, 4> defects_;
   std::size_t defect_count_ = 0;
 };
 
 template <class S>
-S mean_over_edge_pixel(const PixelModel<S>& model, double column, double row, int n) {
+S mean_over_edge_pixel(const SampleImage<S>& model, double column, double row, int n) {
   std::array<EdgeCircle, 2> circles;
   int count = 0;
   for (int e = 0; e < model.edges(); ++e)
@@ -508,7 +509,7 @@ S mean_over_edge_pixel(const PixelModel<S>& model, double column, double row, in
 
 /// By its distance from the edges, or from a defect.
 template <class S>
-bool is_edge_pixel(const PixelModel<S>& model, double column, double row) {
+bool is_edge_pixel(const SampleImage<S>& model, double column, double row) {
   for (int e = 0; e < model.edges(); ++e) {
     const auto circle = model.circle(e);
     const double beyond = circle ? circle->radius - std::hypot(column - circle->column, row - circle->row)
@@ -518,14 +519,14 @@ bool is_edge_pixel(const PixelModel<S>& model, double column, double row) {
   return false;
 }
 template <class S>
-bool is_defect_pixel(const PixelModel<S>& model, double column, double row) {
+bool is_defect_pixel(const SampleImage<S>& model, double column, double row) {
   for (const auto& [x, y] : model.defects())
     if (std::hypot(column - x, row - y) < kDefectWithin) return true;
   return false;
 }
 /// The mean as a picture takes it.
 template <class S>
-S mean_over_cut_pixel(const PixelModel<S>& model, const RenderPlan& plan, double column, double row) {
+S mean_over_cut_pixel(const SampleImage<S>& model, const RenderPlan& plan, double column, double row) {
   return mean_over_edge_pixel(model, column, row,
                               is_defect_pixel(model, column, row) ? plan.defect_points : plan.edge_points);
 }
@@ -535,7 +536,7 @@ class EdgeMarks {
  public:
   /// Looks at `rows` rows from first_row on and `columns` columns from first_column on.
   template <class S>
-  void look(const PixelModel<S>& model, int first_row, int rows, int first_column, int columns) {
+  void look(const SampleImage<S>& model, int first_row, int rows, int first_column, int columns) {
     first_row_ = first_row, first_column_ = first_column, columns_ = columns;
     circles_.clear(), marked_.clear();
     for (const auto& [column, row] : model.defects()) circles_.push_back({{column, row, 0}, kDefectWithin, 1});

@@ -77,25 +77,26 @@ struct WeightedPoints {
 
 /// The weighted sum of the light at points, counted from (column, row); their number must be a multiple of the lanes.
 template <class S>
-S sum_over(const PixelModel<S>& model, double column, double row, const WeightedPoints& points) {
+S sum_over(const SampleImage<S>& model, double column, double row, const WeightedPoints& points) {
   using P = PlainOf<S>;
-  S sum(0.0);
-  for (std::size_t i = 0; i < points.size; i += static_cast<std::size_t>(kLanesOf<S>))
-    sum = sum + S(load_lanes<P>(&points.w[i])) *
-                    model.intensity(P(column) + load_lanes<P>(&points.x[i]), P(row) + load_lanes<P>(&points.y[i]));
+  S sum(0.0), light;
+  for (std::size_t i = 0; i < points.size; i += static_cast<std::size_t>(kLanesOf<S>)) {
+    model.light(P(column) + load_lanes<P>(&points.x[i]), P(row) + load_lanes<P>(&points.y[i]), &light);
+    sum = sum + S(load_lanes<P>(&points.w[i])) * light;
+  }
   return over_lanes(sum);
 }
 
 /// Of a pixel in each lane, by n x n Gauss points.
 template <class S>
-S mean_over_pixels(const PixelModel<S>& model, const PlainOf<S>& column, const PlainOf<S>& row, int n) {
+S mean_over_pixels(const SampleImage<S>& model, const PlainOf<S>& column, const PlainOf<S>& row, int n) {
   const PixelRule& rule = rule_of(n);
-  S sum(0.0);
+  S sum(0.0), light;
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const std::size_t a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
-      sum =
-          sum + (rule.w[a] * rule.w[b]) * model.intensity(column + PlainOf<S>(rule.x[a]), row + PlainOf<S>(rule.x[b]));
+      model.light(column + PlainOf<S>(rule.x[a]), row + PlainOf<S>(rule.x[b]), &light);
+      sum = sum + (rule.w[a] * rule.w[b]) * light;
     }
   return sum;
 }
@@ -122,7 +123,7 @@ inline const WeightedPoints& points_of_pixel(int n) {
 
 /// Of one pixel, its points side by side: neighbours, which read the same parts of tables. n as in is_tried().
 template <class S>
-S mean_over_one_pixel(const PixelModel<S>& model, double column, double row, int n) {
+S mean_over_one_pixel(const SampleImage<S>& model, double column, double row, int n) {
   return sum_over(model, column, row, points_of_pixel(n));
 }
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "instrument/exposure.h"
 #include "samples/pixels/sampling.h"
 #include "samples/sphere/ball_core.h"
 #include "samples/tables/radial_table.h"
@@ -165,10 +166,10 @@ class BallRaysIn final : public BallRays<R> {
  public:
   using P = PlainOf<R>;
   BallRaysIn(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const Values<R>& all,
-             const Directions<S, R>& up, bool places)
+             const BeamMaker& light, const Directions<S, R>& up, bool places)
       : optics_(ball_optics(scene, value, continuity_of(plan.demand))),
         medium_(in_radii(droplet_optics(scene, all))),
-        light_(scene.microscope, all),
+        light_(light.in(all).line),
         rim_(rim_table(optics_.sphere)),
         method_(transport_method<S>(plan.method)),
         aplanatic_(scene.microscope.aplanatic),
@@ -247,10 +248,11 @@ std::vector<R> ways(const BallOptics<R>& o, const RimTable& rim) {
 /// the disc moves.
 template <class R>
 std::unique_ptr<BallRays<R>> ball_rays(const Scene& scene, const RenderPlan& plan, const Values<R>& value,
-                                       const BallOptics<R>& optics, const RimTable& rim, [[maybe_unused]] bool places) {
+                                       const BeamMaker& light, const BallOptics<R>& optics, const RimTable& rim,
+                                       [[maybe_unused]] bool places) {
   const auto in = [&]<class S>(const std::vector<int>& active,
                                const Directions<S, R>& up) -> std::unique_ptr<BallRays<R>> {
-    return std::make_unique<BallRaysIn<S, R>>(scene, plan, Values<S>(value.theta(), active), value, up, places);
+    return std::make_unique<BallRaysIn<S, R>>(scene, plan, Values<S>(value.theta(), active), value, light, up, places);
   };
   constexpr std::size_t n = static_cast<std::size_t>(ScalarTraits<R>::derivatives);
   if constexpr (n > 0) {
@@ -297,16 +299,16 @@ std::unique_ptr<BallRays<R>> ball_rays(const Scene& scene, const RenderPlan& pla
 }
 
 template <class S>
-class BallImage final : public PixelModel<S> {
+class BallImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
   /// core_apart: a shell's core is a disc of its own, beside which the wall's light is continued.
-  BallImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, bool core_apart)
+  BallImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light, bool core_apart)
       : scene_(scene),
         plan_(plan),
         optics_(ball_optics(scene, value, continuity_of(plan.demand))),
         rim_(rim_table(optics_.sphere)),
-        light_(scene.microscope, value),
+        light_(light.in(value).line),
         view_(scene, value),
         edge_um_(optics_.sphere.radius_um * rim_edge(rim_, optics_.sphere)),
         inverse_edge_(inverse(edge_um_)),
@@ -348,8 +350,8 @@ class BallImage final : public PixelModel<S> {
     if constexpr (ScalarTraits<S>::derivatives > 0)
       for (const S* x : std::initializer_list<const S*>{&center_x, &center_y, &pixel_um, &optics_.sphere.radius_um})
         for (const P& d : x->d) moves = moves || lane(d, 0) != 0;
-    rays_of_table_ = ball_rays(scene, plan, value, optics_, rim_, false);
-    rays_ = ball_rays(scene, plan, value, optics_, rim_, moves);
+    rays_of_table_ = ball_rays(scene, plan, value, light, optics_, rim_, false);
+    rays_ = ball_rays(scene, plan, value, light, optics_, rim_, moves);
     // A field along an axis in the image plane is turned into itself.
     const auto turned = [](const auto& field) {
       if constexpr (requires { field.axis; })
@@ -369,11 +371,11 @@ class BallImage final : public PixelModel<S> {
       symmetry_ = Symmetry::mirror;
   }
   Symmetry symmetry() const override { return symmetry_; }
-  S intensity(const P& column, const P& row) const override {
+  void light(const P& column, const P& row, S* out) const override {
     const auto place = view_.at(column, row);
     const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
-    if (birefit::none(inside)) return S(0.0);
-    return select(inside, through(place, inside), S(0.0));
+    out[0] = S(0.0);
+    if (!birefit::none(inside)) out[0] = select(inside, through(place, inside), S(0.0));
   }
   int edges() const override { return shell_in(optics_) ? 2 : 1; }
   P beyond_edge(int edge, const P& column, const P& row) const override {
@@ -398,7 +400,9 @@ class BallImage final : public PixelModel<S> {
     return view_.within(column, row, inverse_edge_, by_inverse_edge_);
   }
   bool has_passing_light() const override { return !passing_.dark(); }
-  S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
+  void passing(const P& column, const P& row, S* out) const override {
+    out[0] = passing_.mean(view_, view_.at(column, row));
+  }
   Mesh mesh(int steps) const { return ball_mesh(optics_, steps); }
   double edge_um() const { return lane(plain(edge_um_), 0); }
   /// Light at a place of a PolarTable.
@@ -406,8 +410,8 @@ class BallImage final : public PixelModel<S> {
     return square.of_core ? rays_of_table_->in_core(v, cos_azimuth, sin_azimuth, mesh)
                           : rays_of_table_->at_fraction(v, cos_azimuth, sin_azimuth, mesh, core_apart_);
   }
-  void tabulate(PixelModel<S>::Wanted wanted, int threads) override {
-    if (wanted != PixelModel<S>::Wanted::picture) return;
+  void tabulate(SampleImage<S>::Wanted wanted, int threads) override {
+    if (wanted != SampleImage<S>::Wanted::picture) return;
     std::vector<DiscSquare> squares = plan_.disc;
     if (!core_apart_)  // it was when the picture was planned
       for (DiscSquare& q : squares) q.smooth = q.smooth && !q.of_core;
@@ -790,12 +794,13 @@ constexpr double kWorth = 0.4;
 
 }  // namespace
 
-void plan_disc_squares(const Scene& scene, const Values<double>& value, double target, RenderPlan& plan) {
+void plan_disc_squares(const Scene& scene, const Values<double>& value, const BeamMaker& light, double target,
+                       RenderPlan& plan) {
   const DropletOptics<double> sphere = droplet_optics(scene, value);
   const RimTable rim = rim_table(sphere);
   const PointsOfSquares points_of(scene, plan, value, rim);
   const bool core_apart = points_of.core_apart();
-  const BallImage<Pack> image(scene, plan, value.as<Pack>(), core_apart);
+  const BallImage<Pack> image(scene, plan, value.as<Pack>(), light, core_apart);
   const StepsOfSquare steps_of(scene, plan, value);
   constexpr int kRays = PolarTable<Pack>::kRays;
 
@@ -889,19 +894,21 @@ bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSqu
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_ball_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
+std::unique_ptr<SampleImage<S>> make_ball_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                const BeamMaker& light) {
   // A fit may have moved the core since.
   const bool core_apart =
       std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; }) && [&] {
         const BallOptics<double> o = ball_optics(scene, value.template as<double>());
         return core_has_disc(o, rim_table(o.sphere));
       }();
-  return std::make_unique<BallImage<S>>(scene, plan, value, core_apart);
+  return std::make_unique<BallImage<S>>(scene, plan, value, light, core_apart);
 }
-#define BIREFIT_INSTANTIATE(S)                                                                   \
-  template Mat2<S> ball_jones<S>(const BallOptics<S>&, const DropletRay<S>&, const S&, const S&, \
-                                 const TransportMethod<S>&, const Mesh&);                        \
-  template std::unique_ptr<PixelModel<S>> make_ball_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                   \
+  template Mat2<S> ball_jones<S>(const BallOptics<S>&, const DropletRay<S>&, const S&, const S&,                 \
+                                 const TransportMethod<S>&, const Mesh&);                                        \
+  template std::unique_ptr<SampleImage<S>> make_ball_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                              const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

@@ -14,7 +14,7 @@ Mat2<S> ball_jones(const BallOptics<S>&, const DropletRay<S>&, const S& cos_azim
 
 /// Divides the disc into squares with their own steps, and finds those that are smooth: interpolated to `target` of the
 /// incident intensity. To be called with method and samples planned; sets the error, too.
-void plan_disc_squares(const Scene&, const Values<double>&, double target, RenderPlan& plan);
+void plan_disc_squares(const Scene&, const Values<double>&, const BeamMaker&, double target, RenderPlan& plan);
 /// Mesh steps of a plan's rays by place.
 class StepsByPlace {
  public:
@@ -30,6 +30,6 @@ class StepsByPlace {
 bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before);
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_ball_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_ball_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "instrument/exposure.h"
 #include "medium/build.h"
 #include "samples/image.h"
 #include "samples/sphere/droplet.h"
@@ -49,13 +50,14 @@ constexpr double kCentre = 1.0 / 64;
 }  // namespace
 
 template <class S>
-DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                              const BeamMaker& light)
     : optics_(droplet_optics(scene, value, continuity_of(plan.demand))),
       rim_(rim_table(optics_)),
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       aplanatic_(scene.microscope.aplanatic),
-      light_(Line<S>(scene.microscope, value)),
+      light_(light.in(value).line),
       view_(scene, value, light_),
       edge_um_(optics_.radius_um * rim_edge(rim_, optics_)),
       inverse_edge_(inverse(edge_um_)),
@@ -80,7 +82,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
 }
 
 template <class S>
-void DropletImage<S>::tabulate(PixelModel<S>::Wanted, int threads) {
+void DropletImage<S>::tabulate(SampleImage<S>::Wanted, int threads) {
   if (rest_panels_ == 0) return;
   const auto part = [&](Part which, int panels) {
     return RadialTable<S>(panels, number_of_terms(), threads, [&](const P& v, S* out) { terms(which, S(v), out); });
@@ -206,22 +208,26 @@ S DropletImage<S>::read(const P& rho_um, const typename RoundView<S>::Place& pla
 }
 
 template <class S>
-S DropletImage<S>::intensity(const P& column, const P& row) const {
+void DropletImage<S>::light(const P& column, const P& row, S* out) const {
   const auto place = view_.at(column, row);
   const auto inside = place.rho_um < plain(edge_um_) * P(1 - 1e-12);
-  if (birefit::none(inside)) return S(P(0.0));
+  if (birefit::none(inside)) {
+    out[0] = S(P(0.0));
+    return;
+  }
   const P rho_um = select(inside, place.rho_um, plain(edge_um_) * P(0.5));
-  const S light = rest_panels_ == 0 ? traced(rho_um, place) : read(rho_um, place);
-  return select(inside, light, S(0.0));
+  out[0] = select(inside, rest_panels_ == 0 ? traced(rho_um, place) : read(rho_um, place), S(0.0));
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<DropletImage<S>>(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_droplet_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                   const BeamMaker& light) {
+  return std::make_unique<DropletImage<S>>(scene, plan, value, light);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                      \
   template class DropletImage<S>;                                                                                   \
-  template std::unique_ptr<PixelModel<S>> make_droplet_model<S>(const Scene&, const RenderPlan&, const Values<S>&); \
+  template std::unique_ptr<SampleImage<S>> make_droplet_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                                 const BeamMaker&);                                 \
   template Su2<S> droplet_retarder<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,     \
                                       const Mesh&);                                                                 \
   template Mat2<S> droplet_jones<S>(const DropletOptics<S>&, const DropletRay<S>&, const TransportMethod<S>&,       \

@@ -47,12 +47,12 @@ auto with_droplet_column(const DropletOptics<S>& o, const DropletRay<S>& r, cons
 
 /// The image of a droplet that is symmetric about the viewing axis.
 template <class S>
-class DropletImage final : public PixelModel<S> {
+class DropletImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
-  DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value);
-  void tabulate(PixelModel<S>::Wanted, int threads) override;
-  S intensity(const P& column, const P& row) const override;
+  DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light);
+  void tabulate(SampleImage<S>::Wanted, int threads) override;
+  void light(const P& column, const P& row, S* out) const override;
   Symmetry symmetry() const override { return symmetry_; }
   int edges() const override { return shell_ && lane(plain(core_um_), 0) > 0 ? 2 : 1; }
   P beyond_edge(int edge, const P& column, const P& row) const override {
@@ -65,7 +65,9 @@ class DropletImage final : public PixelModel<S> {
     return view_.within(column, row, inverse_edge_, by_inverse_edge_);
   }
   bool has_passing_light() const override { return !passing_.dark(); }
-  S passing(const P& column, const P& row) const override { return passing_.mean(view_, view_.at(column, row)); }
+  void passing(const P& column, const P& row, S* out) const override {
+    out[0] = passing_.mean(view_, view_.at(column, row));
+  }
   /// The image is sum_k basis_k(azimuth) f_k(radius). Tables hold the f_k in two parts, each over v in [0, 1]: the
   /// centre, where they change over a hundredth of the radius, and the rest, smooth up to the rim; of a shell what is
   /// seen through the core, up to the kink at its edge, and what is seen beside it.
@@ -107,6 +109,6 @@ class DropletImage final : public PixelModel<S> {
 };
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_droplet_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_droplet_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

@@ -11,18 +11,20 @@
 namespace birefit {
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_sphere_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  if (plan.series_reach_um > 0) return make_series_model(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_sphere_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                  const BeamMaker& light) {
+  if (plan.series_reach_um > 0) return make_series_image(scene, plan, value, light);
   if (looks_round(std::get<Droplet>(scene.sample)))
-    return plan.demand.rays == Rays::eikonal ? make_eikonal_model(scene, plan, value)
-                                             : make_droplet_model(scene, plan, value);
+    return plan.demand.rays == Rays::eikonal ? make_eikonal_image(scene, plan, value, light)
+                                             : make_droplet_image(scene, plan, value, light);
   if constexpr (kForTablesOnly<S>)
     throw std::logic_error("a ray a point takes fewer derivatives at once");
   else
-    return make_ball_model(scene, plan, value);
+    return make_ball_image(scene, plan, value, light);
 }
-#define BIREFIT_INSTANTIATE(S) \
-  template std::unique_ptr<PixelModel<S>> make_sphere_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                     \
+  template std::unique_ptr<SampleImage<S>> make_sphere_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                                const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

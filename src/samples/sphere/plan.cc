@@ -41,8 +41,9 @@ double droplet_phase(const DropletOptics<double>& o, double psi) {
 }
 
 /// One ray a radius instead of one a point, when that is fewer rays. plan.samples says how many those are.
-void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
+void plan_radial_table(const Planning& planning, RenderPlan& plan) {
   using Image = DropletImage<Pack>;
+  const Scene& scene = planning.scene;
   // A director from elements has small kinks between them, which no polynomial follows to more than this.
   const double share =
       std::holds_alternative<AxialDirector>(std::get<Droplet>(scene.sample).director) ? 10 * kTableShare : kTableShare;
@@ -51,9 +52,9 @@ void plan_radial_table(const Scene& scene, const Values<double>& value, RenderPl
   const double disc_px = std::numbers::pi * square(static_cast<double>(plan.samples.size()) * plan.sampling_bin_px);
   const double points = points_within(plan.samples, plan.sampling_bin_px).back() *
                         std::min(1.0, scene.view.width * static_cast<double>(scene.view.height) / disc_px);
-  const Values<Pack> lanes = value.template as<Pack>();
+  const Values<Pack> lanes = planning.value.as<Pack>();
   const bool shell = std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
-  Image image(scene, plan, lanes);
+  Image image(scene, plan, lanes, planning.light);
   if (!image.can_tabulate()) {
     plan.reasons.push_back(
         "retardance has a kink where rays touch the core, too close to the rim for a table over the radius: one ray a "
@@ -160,17 +161,18 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
                     turned * 180 / kPi));
 }
 
-std::unique_ptr<PixelModel<Pack>> straight_image(const Scene& scene, const RenderPlan& plan,
-                                                 const Values<Pack>& value) {
-  if (looks_round(std::get<Droplet>(scene.sample))) return make_droplet_model(scene, plan, value);
-  return make_ball_model(scene, plan, value);
+std::unique_ptr<SampleImage<Pack>> straight_image(const Scene& scene, const RenderPlan& plan, const Values<Pack>& value,
+                                                  const BeamMaker& light) {
+  if (looks_round(std::get<Droplet>(scene.sample))) return make_droplet_image(scene, plan, value, light);
+  return make_ball_image(scene, plan, value, light);
 }
 
 /// measure_points() of a droplet whose rays are planned.
-void measure_points_of(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
-  const std::unique_ptr<PixelModel<Pack>> model = straight_image(scene, plan, value.as<Pack>());
-  model->tabulate(PixelModel<Pack>::Wanted::picture, 0);
-  measure_points(scene, *model, plan);
+void measure_points_of(const Planning& planning, RenderPlan& plan) {
+  const std::unique_ptr<SampleImage<Pack>> model =
+      straight_image(planning.scene, plan, planning.value.as<Pack>(), planning.light);
+  model->tabulate(SampleImage<Pack>::Wanted::picture, 0);
+  measure_points(planning.scene, *model, plan);
 }
 
 RenderPlan plan_ball(const Planning& planning) {
@@ -225,11 +227,12 @@ RenderPlan plan_ball(const Planning& planning) {
                        plan.demand.intensity_accuracy);
   });
   if (plan.demand.method == "auto")
-    plan_disc_squares(scene, value, std::max(kSquaresShare * plan.demand.intensity_accuracy, 1e-10), plan);
+    plan_disc_squares(scene, value, planning.light, std::max(kSquaresShare * plan.demand.intensity_accuracy, 1e-10),
+                      plan);
   else
     plan.reasons.push_back("the droplet does not look the same from all sides of the viewing axis: one ray a point");
   plan.samples.push_back(1);  // outside
-  measure_points_of(scene, value, plan);
+  measure_points_of(planning, plan);
   note_rays(scene, value, o.sphere, plan);
   note_illumination(scene, value, largest_phase, plan);
   return plan;
@@ -282,7 +285,7 @@ RenderPlan plan_curved(const Planning& planning) {
   RenderPlan plan = planning.start();
   plan.method = "eikonal";
   const DropletOptics<double> o = droplet_optics(scene, value);
-  EikonalImage<Pack> image(scene, plan, value.template as<Pack>());
+  EikonalImage<Pack> image(scene, plan, value.template as<Pack>(), planning.light);
   plan.reasons.push_back(o.axial
                              ? fmt::format("each mode on its own curved ray, {} of the extraordinary one integrated",
                                            image.integrated_rays())
@@ -410,8 +413,8 @@ RenderPlan plan_sphere(const Planning& planning) {
       "terms");
 
   sample_round(scene, value, o, rim.rho_max() * o.radius_um, {}, plan);
-  plan_radial_table(scene, value, plan);
-  measure_points_of(scene, value, plan);
+  plan_radial_table(planning, plan);
+  measure_points_of(planning, plan);
   return plan;
 }
 

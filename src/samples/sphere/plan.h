@@ -19,6 +19,6 @@ Pilots sphere_pilots(const Scene&, const Demand&, const Values<double>&);
 void add_sphere_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);
 /// The picture by the exact series, each mode on its own curved ray, or straight rays, as planned.
 template <class S>
-std::unique_ptr<PixelModel<S>> make_sphere_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_sphere_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 }  // namespace birefit

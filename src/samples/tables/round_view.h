@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/scalar.h"
+#include "instrument/beam.h"
 #include "samples/image.h"
 
 namespace birefit {
@@ -191,6 +192,14 @@ class RoundView : public CentredView<S> {
   P sin_sum_, cos_sum_;
   Sensitivity<S> by_sum_;
 };
+
+/// Of a sample that looks the same from all sides of the viewing axis; twisted, it is not its mirror image.
+template <class S>
+Symmetry round_symmetry(const Scene& scene, const Values<S>& value, const Line<S>& light, bool twisted) {
+  const S center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px);
+  if (centred(scene, center_x, center_y)) return Symmetry::half_turn;
+  return !twisted && on_middle_row(scene, center_y) && light.mirrored() ? Symmetry::mirror : Symmetry::none;
+}
 
 /// The part of a unit square about (x, y) that lies within a circle of `radius` about the origin, and its derivatives
 /// by these three.

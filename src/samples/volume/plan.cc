@@ -20,8 +20,8 @@ constexpr int kReference = 10;  ///< what they are measured against
 
 /// plan.samples by distance from the box's middle: in each of a few rings the fewest points whose means hold `target`
 /// on a few pixels. Returns the largest error left.
-double plan_pixel_means(const Scene& scene, const Values<double>& value, const VolumeOptics<double>& o, double target,
-                        RenderPlan& plan) {
+double plan_pixel_means(const Planning& planning, const VolumeOptics<double>& o, double target, RenderPlan& plan) {
+  const Scene& scene = planning.scene;
   const VolumeGrid& grid = *o.grid;
   const double w = scene.view.width, h = scene.view.height;
   const double box = 0.5 * std::hypot((grid.nx - 1) / o.nodes_per_px_x, (grid.ny - 1) / o.nodes_per_px_y);
@@ -32,8 +32,8 @@ double plan_pixel_means(const Scene& scene, const Values<double>& value, const V
     throw UserError(Where{}, "the volume is more than 200000 pixels across",
                     "check the spacing, scale and pixel_size_um");
   const double near_edge = 0.5 * std::min((grid.nx - 1) / o.nodes_per_px_x, (grid.ny - 1) / o.nodes_per_px_y);
-  const Values<Pack> lanes = value.as<Pack>();
-  const auto model = make_volume_model<Pack>(scene, plan, lanes);
+  const Values<Pack> lanes = planning.value.as<Pack>();
+  const auto model = make_volume_image<Pack>(scene, plan, lanes, planning.light);
   const auto within = [&](double column, double row) {
     double x, y;
     o.place(column, row, x, y);
@@ -159,7 +159,7 @@ RenderPlan plan_volume(const Planning& planning) {
                   plan.demand.intensity_accuracy));
   if (effort.error > 0.5 * plan.demand.intensity_accuracy)
     plan.warnings.push_back(fmt::format("The {} method errs by {:.1e} here.", plan.method, effort.error));
-  const double left = plan_pixel_means(scene, value, o, 0.5 * plan.demand.intensity_accuracy, plan);
+  const double left = plan_pixel_means(planning, o, 0.5 * plan.demand.intensity_accuracy, plan);
   plan.numerical_error = effort.error + left;
   const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
   plan.reasons.push_back(

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "instrument/exposure.h"
 #include "medium/build.h"
 #include "medium/counting_column.h"
 #include "medium/families/volume.h"
@@ -79,21 +80,21 @@ int volume_samples(const VolumeOptics<double>& o, const TransportMethod<double>&
 namespace {
 
 template <class S>
-class VolumeModel final : public PixelModel<S> {
+class VolumeImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
-  VolumeModel(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+  VolumeImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light)
       : optics_(scene, value, continuity_of(plan.demand)),
         method_(transport_method<S>(plan.method)),
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.breaks) : plan.mesh),
-        light_(scene.microscope, value) {}
-  S intensity(const P& column, const P& row) const override {
+        light_(light.in(value).line) {}
+  void light(const P& column, const P& row, S* out) const override {
     S x, y;
     optics_.place(S(column), S(row), x, y);
     const P right(optics_.grid->nx - 1.0), top(optics_.grid->ny - 1.0);
     const auto beside = plain(x) < P(0.0) || plain(y) < P(0.0) || plain(x) > right || plain(y) > top;
     const S inside_x = select(beside, S(0.0), x), inside_y = select(beside, S(0.0), y);
-    return select(beside, light_.open(), light_.of(volume_retarder(optics_, inside_x, inside_y, method_, mesh_)));
+    out[0] = select(beside, light_.open(), light_.of(volume_retarder(optics_, inside_x, inside_y, method_, mesh_)));
   }
 
  private:
@@ -106,14 +107,16 @@ class VolumeModel final : public PixelModel<S> {
 }  // namespace
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_volume_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<VolumeModel<S>>(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_volume_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                  const BeamMaker& light) {
+  return std::make_unique<VolumeImage<S>>(scene, plan, value, light);
 }
-#define BIREFIT_INSTANTIATE(S)                                                                              \
-  template struct VolumeOptics<S>;                                                                          \
-  template Su2<S> volume_retarder<S>(const VolumeOptics<S>&, const S&, const S&, const TransportMethod<S>&, \
-                                     const Mesh&);                                                          \
-  template std::unique_ptr<PixelModel<S>> make_volume_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                     \
+  template struct VolumeOptics<S>;                                                                                 \
+  template Su2<S> volume_retarder<S>(const VolumeOptics<S>&, const S&, const S&, const TransportMethod<S>&,        \
+                                     const Mesh&);                                                                 \
+  template std::unique_ptr<SampleImage<S>> make_volume_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                                const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

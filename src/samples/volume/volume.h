@@ -55,7 +55,7 @@ Pilots volume_pilots(const Scene&, const Demand&, const Values<double>&);
 std::vector<double> volume_phases_of(const Scene&, const Values<double>&);
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_volume_model(const Scene&, const RenderPlan&, const Values<S>&);
+std::unique_ptr<SampleImage<S>> make_volume_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
 void add_volume_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);
 

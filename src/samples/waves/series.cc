@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "instrument/exposure.h"
 #include "medium/build.h"
 #include "samples/pixels/pixel_mean.h"
 #include "samples/sphere/droplet.h"
@@ -33,18 +34,18 @@ struct SingleOf<Dual<Pack, N>> {
 };
 
 template <class S>
-class SeriesImage final : public PixelModel<S> {
+class SeriesImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
   using Single = typename SingleOf<S>::Type;
-  SeriesImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value)
+  SeriesImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light)
       : optics_(droplet_optics(scene, value)),
         reach_um_(plan.series_reach_um),
         panels_(plan.radial_panels),
         na_(value(scene.microscope.objective_na)),
         pupil_(scene.microscope.aplanatic ? Pupil::aplanatic : Pupil::focal_plane),
         focus_um_(value.get(scene.microscope.focus_um, 0.0)),
-        light_(Line<S>(scene.microscope, value)),
+        light_(light.in(value).line),
         view_(scene, value, light_) {
     symmetry_ = round_symmetry(scene, value, light_.line(), false);
     RadialBall<Single> ball;
@@ -57,7 +58,7 @@ class SeriesImage final : public PixelModel<S> {
     series_ = radial_series(ball);
   }
 
-  void tabulate(typename PixelModel<S>::Wanted, int threads) override {
+  void tabulate(typename SampleImage<S>::Wanted, int threads) override {
     const RadialImage<Single> image = radial_image();
     table_ = RadialTable<S>(panels_, light_.functions(true), threads,
                             [&](const P& v, S* out) { terms(image, v * P(reach_um_), out); });
@@ -65,18 +66,17 @@ class SeriesImage final : public PixelModel<S> {
 
   Symmetry symmetry() const override { return symmetry_; }
 
-  S intensity(const P& column, const P& row) const override {
+  void light(const P& column, const P& row, S* out) const override {
     const auto place = view_.at(column, row);
     const auto basis = RoundView<S>::basis(place);
     const P v = place.rho_um * P(1 / reach_um_);
     if constexpr (ScalarTraits<S>::derivatives == 0) {
-      return table_.sum(light_.functions(true), v, basis.data());
+      out[0] = table_.sum(light_.functions(true), v, basis.data());
     } else {
       typename RadialTable<S>::Slopes slopes;
       const auto turned = RoundView<S>::turned(place);
-      S light = table_.sum(light_.functions(true), v, basis.data(), turned.data(), &slopes);
-      view_.add_moves_and_turns(place, slopes.by_v * P(1 / reach_um_), slopes.turned, light);
-      return light;
+      out[0] = table_.sum(light_.functions(true), v, basis.data(), turned.data(), &slopes);
+      view_.add_moves_and_turns(place, slopes.by_v * P(1 / reach_um_), slopes.turned, out[0]);
     }
   }
 
@@ -155,7 +155,7 @@ bool has_series(const Scene& scene) {
   return shell && !shell->offset_um[0];
 }
 
-RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<double>& value) {
+RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<double>& value, const BeamMaker& light) {
   const DropletOptics<double> o = droplet_optics(scene, value);
   check_objective(scene, value, o.n_host);
   const double na = value(scene.microscope.objective_na), px = value(scene.view.pixel_size_um);
@@ -184,8 +184,8 @@ RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<do
   double error = 0;
   for (plan.radial_panels = std::max(2, static_cast<int>(finest / 8));;
        plan.radial_panels += std::max(1, plan.radial_panels / 4)) {
-    SeriesImage<double> image(scene, plan, value);
-    image.tabulate(PixelModel<double>::Wanted::picture, 1);
+    SeriesImage<double> image(scene, plan, value, light);
+    image.tabulate(SampleImage<double>::Wanted::picture, 1);
     error = image.table_error();
     if (error <= target || plan.radial_panels > finest) break;
   }
@@ -197,8 +197,8 @@ RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<do
                                o.radius_um + 1 + std::abs(value.get(scene.microscope.focus_um, 0.0)) * na / o.n_host) /
                       px;
   const Values<Pack> lanes = value.as<Pack>();
-  SeriesImage<Pack> image(scene, plan, lanes);
-  image.tabulate(PixelModel<Pack>::Wanted::picture, 1);
+  SeriesImage<Pack> image(scene, plan, lanes, light);
+  image.tabulate(SampleImage<Pack>::Wanted::picture, 1);
   constexpr int kPixels = 96;
   double left = 0;
   plan.samples = {1};
@@ -239,11 +239,13 @@ double series_ripple_period(const Scene& scene, const Values<double>& value, int
 }
 
 template <class S>
-std::unique_ptr<PixelModel<S>> make_series_model(const Scene& scene, const RenderPlan& plan, const Values<S>& value) {
-  return std::make_unique<SeriesImage<S>>(scene, plan, value);
+std::unique_ptr<SampleImage<S>> make_series_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
+                                                  const BeamMaker& light) {
+  return std::make_unique<SeriesImage<S>>(scene, plan, value, light);
 }
-#define BIREFIT_INSTANTIATE(S) \
-  template std::unique_ptr<PixelModel<S>> make_series_model<S>(const Scene&, const RenderPlan&, const Values<S>&);
+#define BIREFIT_INSTANTIATE(S)                                                                                     \
+  template std::unique_ptr<SampleImage<S>> make_series_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
+                                                                const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 
 }  // namespace birefit

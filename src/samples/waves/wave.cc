@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "birefit/volume.h"
+#include "instrument/exposure.h"
 #include "medium/build.h"
 #include "medium/references.h"
 #include "samples/sphere/ball.h"
@@ -206,7 +207,8 @@ namespace {
 /// picture_error of a model of the radial twin's last scene, all lengths of which are `scale` times the scene's; in a
 /// view of its own.
 template <class Model>
-double error_on_twin(RadialTwin twin, double scale, const RenderPicture& picture, const Model& model) {
+double error_on_twin(RadialTwin twin, const BeamMaker& light, double scale, const RenderPicture& picture,
+                     const Model& model) {
   const auto resize = [&](ParameterRef& length, double from) { length.index = add_constant(twin.theta, scale * from); };
   for (Scene& scene : twin.scenes) {
     const Theta before = twin.theta;
@@ -240,7 +242,7 @@ double error_on_twin(RadialTwin twin, double scale, const RenderPicture& picture
   Demand demand = RadialTwin::demand(0, {});
   demand.intensity_accuracy = 1e-8;  // nearly dark pictures, too
   return picture_error(model(twin.scenes.back(), twin.theta),
-                       picture(exact, plan_series(exact, demand, Values<double>(twin.theta, {})), twin.theta));
+                       picture(exact, plan_series(exact, demand, Values<double>(twin.theta, {}), light), twin.theta));
 }
 
 std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {
@@ -261,13 +263,15 @@ std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<doub
 }
 
 /// picture_error of propagation on the radial twin; where that takes longer than half a second, on a smaller one.
-double propagation_error_on_twin(const RadialTwin& of, double seconds, const RenderPicture& picture) {
-  return error_on_twin(of, std::min(1.0, std::cbrt(0.5 / seconds)), picture, [](const Scene& twin, const Theta& theta) {
-    const Values<double> values(theta, {});
-    Rendering rendering;
-    render_wave(twin, *plan_grids(twin, values, wave_object(twin, values)), theta, {}, 1, rendering);
-    return rendering.intensity;
-  });
+double propagation_error_on_twin(const RadialTwin& of, const BeamMaker& light, double seconds,
+                                 const RenderPicture& picture) {
+  return error_on_twin(
+      of, light, std::min(1.0, std::cbrt(0.5 / seconds)), picture, [&](const Scene& twin, const Theta& theta) {
+        const Values<double> values(theta, {});
+        Rendering rendering;
+        render_wave(twin, *plan_grids(twin, values, wave_object(twin, values)), light, theta, {}, 1, rendering);
+        return rendering.intensity;
+      });
 }
 
 }  // namespace
@@ -289,7 +293,7 @@ RenderPlan plan_wave(const Planning& planning) {
   plan.reasons.push_back(fmt::format(
       "one-way wave optics on {} x {} points {:.3g} um apart, {} slabs of {:.3g} um, {} layers of the medium each",
       g.nx, g.ny, g.step_um, g.slabs, (g.exit_um - g.entry_um) / g.slabs, g.layers));
-  const int sent = Line<double>(scene.microscope, value).in().count;  // fields, one after the other
+  const int sent = planning.light.in(value).line.in().count;  // fields, one after the other
   plan.cost_seconds = sent * static_cast<double>(g.nx) * g.ny * g.slabs * 1.4e-7;
   // Above all that was measured on bright pictures of radial balls and shells (birefit chart,
   // tests/cross/split_step_test.cc): it grows with the contrast, with the square of the aperture, and where light must
@@ -312,7 +316,7 @@ RenderPlan plan_wave(const Planning& planning) {
     return plan;
   }
   // A picture may be nearly dark, and what is left out is not: then the twin knows.
-  const double on_twin = propagation_error_on_twin(*twin, plan.cost_seconds, planning.picture);
+  const double on_twin = propagation_error_on_twin(*twin, planning.light, plan.cost_seconds, planning.picture);
   const double more = std::max(1.0, 1.5 * on_twin / (plan.numerical_error + plan.model_error));
   plan.numerical_error *= more;
   plan.model_error *= more;
@@ -339,8 +343,8 @@ using SentFields = std::vector<std::vector<WaveField>>;
 
 /// The light of one field that comes in and one that is let through, in images of their own; they add up.
 template <class S>
-void picture(const Scene& scene, const WaveGrid& grid, const WaveImaging& imaging, const Values<S>& value,
-             const SentFields& fields, int threads, const std::vector<Image*>& images) {
+void picture(const Scene& scene, const Line<S>& line, const WaveGrid& grid, const WaveImaging& imaging,
+             const Values<S>& value, const SentFields& fields, int threads, const std::vector<Image*>& images) {
   WaveMicroscope<S> m;
   m.objective_na = value(scene.microscope.objective_na);
   m.aplanatic = scene.microscope.aplanatic;
@@ -348,7 +352,6 @@ void picture(const Scene& scene, const WaveGrid& grid, const WaveImaging& imagin
   m.center_x_px = value(scene.view.center_x_px), m.center_y_px = value(scene.view.center_y_px);
   m.pixel_um = value(scene.view.pixel_size_um);
   m.width = scene.view.width, m.height = scene.view.height;
-  const Line<S> line(scene.microscope, value);
   std::vector<Image> part(images.size());
   std::vector<Image*> parts;
   for (Image& image : part) parts.push_back(&image);
@@ -422,8 +425,8 @@ WaveField flux_field(MarchedField marched, const WaveGrid& g, double k0, double 
 
 }  // namespace
 
-void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, const std::vector<int>& active,
-                 int threads, Rendering& into) {
+void render_wave(const Scene& scene, const WavePlan& plan, const BeamMaker& light, const Theta& theta,
+                 const std::vector<int>& active, int threads, Rendering& into) {
   // What moves only the picture needs no light sent through the sample again.
   struct Part {
     std::vector<int> parameters;
@@ -455,12 +458,12 @@ void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, c
   SentFields base;  // without derivatives
   const auto send = [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
     const Values<S> value(theta, chunk);
-    const Line<S> line(scene.microscope, value);
+    const Line<S> line = light.in(value).line;
     const auto medium = wave_medium(scene, value, plan.ramp_um);
     SentFields fields;
     for (std::size_t i = 0; i < static_cast<std::size_t>(line.in().count); ++i)
       fields.push_back(propagate(plan.grid, wave_light(scene, value, line.in().field[i]), *medium, threads));
-    picture(scene, plan.grid, plan.imaging, value, fields, threads, images);
+    picture(scene, line, plan.grid, plan.imaging, value, fields, threads, images);
     for (auto& of_one : fields) of_one.resize(1);
     base = std::move(fields);
   };
@@ -469,11 +472,12 @@ void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, c
   else
     in_chunks(of_light, send);
   in_chunks(of_picture, [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
-    picture(scene, plan.grid, plan.imaging, Values<S>(theta, chunk), base, threads, images);
+    const Values<S> value(theta, chunk);
+    picture(scene, light.in(value).line, plan.grid, plan.imaging, value, base, threads, images);
   });
 }
 
-Image marched_picture(const Scene& scene, const Theta& theta, int threads) {
+Image marched_picture(const Scene& scene, const BeamMaker& light, const Theta& theta, int threads) {
   const Values<double> value(theta, {});
   const Values<Pack> lanes(theta, {});
   const WaveObject o = wave_object(scene, value);
@@ -510,7 +514,7 @@ Image marched_picture(const Scene& scene, const Theta& theta, int threads) {
     return {eo + de * n.x * n.x, eo + de * n.y * n.y, eo + de * n.z * n.z,
             de * n.x * n.y,      de * n.x * n.z,      de * n.y * n.z};
   };
-  const Line<double> line(scene.microscope, value);
+  const Line<double> line = light.in(value).line;
   std::vector<MarchWave> waves(static_cast<std::size_t>(line.in().count));
   for (std::size_t i = 0; i < waves.size(); ++i) {
     const Field<double>& f = line.in().field[i];
@@ -521,15 +525,16 @@ Image marched_picture(const Scene& scene, const Theta& theta, int threads) {
   for (std::size_t i = 0; i < waves.size(); ++i)
     fields[i].push_back(flux_field(std::move(marched[i]), g, k0, o.n_host));
   Image image;
-  picture<Pack>(scene, g, imaging_of(scene, value, g), lanes, fields, threads, {&image});
+  picture<Pack>(scene, light.in(lanes).line, g, imaging_of(scene, value, g), lanes, fields, threads, {&image});
   return image;
 }
 
-double march_error_on_twin(const Scene& scene, const Theta& theta, int threads, const RenderPicture& picture) {
+double march_error_on_twin(const Scene& scene, const BeamMaker& light, const Theta& theta, int threads,
+                           const RenderPicture& picture) {
   const std::optional<RadialTwin> twin = radial_twin(scene, theta);
   if (!twin) throw UserError(Where{}, "there is no radial twin of this sample to measure the march on", "");
-  return error_on_twin(*twin, 1, picture, [&](const Scene& scaled, const Theta& values) {
-    return marched_picture(scaled, values, threads);
+  return error_on_twin(*twin, light, 1, picture, [&](const Scene& scaled, const Theta& values) {
+    return marched_picture(scaled, light, values, threads);
   });
 }
 

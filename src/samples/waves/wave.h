@@ -40,15 +40,16 @@ std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta);
 double picture_error(const Image& image, const Image& exact);
 
 /// See image_by_march and march_error of birefit/render.h; `picture` renders the exact one.
-Image marched_picture(const Scene& scene, const Theta& theta, int threads);
-double march_error_on_twin(const Scene& scene, const Theta& theta, int threads, const RenderPicture& picture);
+Image marched_picture(const Scene& scene, const BeamMaker& light, const Theta& theta, int threads);
+double march_error_on_twin(const Scene& scene, const BeamMaker& light, const Theta& theta, int threads,
+                           const RenderPicture& picture);
 
 /// The plan of one picture. Throws UserError when the scene is neither sphere nor sampled field, the numerical aperture
 /// is missing or above the host's index, or the propagation would need more memory than there should be.
 RenderPlan plan_wave(const Planning&);
 
 /// The whole picture and its derivatives by `active` (indices of theta), images and all resized to fit.
-void render_wave(const Scene& scene, const WavePlan& plan, const Theta& theta, const std::vector<int>& active,
-                 int threads, Rendering& into);
+void render_wave(const Scene& scene, const WavePlan& plan, const BeamMaker& light, const Theta& theta,
+                 const std::vector<int>& active, int threads, Rendering& into);
 
 }  // namespace birefit
