@@ -1,7 +1,6 @@
 // birefit explain: which model and method would run, why, what it is expected to cost and to err.
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -12,7 +11,9 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "app/watch.h"
 #include "app/work.h"
+#include "birefit/forecast.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "samples/waves/wave.h"
@@ -44,41 +45,14 @@ std::string quoted(const std::vector<std::string>& list) {
 
 std::string json_number(double x) { return std::isfinite(x) ? fmt::format("{}", x) : "null"; }
 
-/// Of one image on one thread: measured, the best of three; as the planner says where it foresees more than a second,
-/// and of rays what some pixels one by one make of it where that is more than five: an upper bound then, since pictures
-/// share their rays.
-double seconds_an_image(const Scene& scene, const RenderPlan& chosen, const Theta& theta) {
-  if (chosen.cost_seconds > 1) return chosen.cost_seconds;
+/// Of one image, or of what leaves in all directions of light, on one thread.
+double seconds_an_image(const Config& config, const RenderPlan& chosen, const Theta& theta) {
+  const Scene& scene = config.scene;
+  if (scene.microscope.directions.empty()) return forecast_image(scene, config.job.demand, theta, config.observable);
   using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-  };
-  const int width = scene.view.width, height = scene.view.height;
-  if (scene.microscope.directions.empty() && !chosen.wave) {
-    std::vector<std::array<int, 2>> some;
-    for (int i = 0; i < 64; ++i) some.push_back({(2 * (i % 8) + 1) * width / 16, (2 * (i / 8) + 1) * height / 16});
-    // What one pixel takes is what all share: tables, rays that are traced once.
-    const auto first = Clock::now();
-    render_pixels(scene, chosen, theta, {some[0]}, {}, 1);
-    const auto begin = Clock::now();
-    render_pixels(scene, chosen, theta, some, {}, 1);
-    const double shared = std::chrono::duration<double>(begin - first).count(),
-                 each = (since(begin) - shared) / static_cast<double>(some.size() - 1);
-    if (const double bound = shared + each * width * height; bound > 5) return bound;
-  }
-  double best = std::numeric_limits<double>::infinity(), all = 0;
-  Rendering image;
-  for (int i = 0; i < 3 && all < 1; ++i) {
-    const auto begin = Clock::now();
-    if (scene.microscope.directions.empty())
-      render(scene, chosen, theta, {}, 1, image);
-    else
-      jones(scene, chosen, theta);
-    const double seconds = since(begin);
-    best = std::min(best, seconds);
-    all += seconds;
-  }
-  return best;
+  const auto begin = Clock::now();
+  jones(scene, chosen, theta);
+  return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 int explain(const Arguments& arguments, const Config& config, double memory) {
@@ -95,7 +69,8 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
   bool fitted = false;
   for (int i = 0; i < table.size(); ++i) fitted = fitted || table[i].free;
   constexpr double kMostSeconds = 60;  // images with derivatives
-  const double seconds = seconds_an_image(config.scene, chosen, theta);
+  const double seconds = seconds_an_image(config, chosen, theta);
+  const double fit_seconds = picture && fitted ? forecast_fit(config.job) : std::numeric_limits<double>::quiet_NaN();
   const bool quick = seconds * table.size() < kMostSeconds;
   const std::optional<Outlook> expected =
       picture && fitted && quick ? std::optional(outlook(config.job)) : std::nullopt;
@@ -120,11 +95,12 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
     std::cout << fmt::format(
         "{{\n  \"method\": {},\n  \"physics\": {},\n  \"reasons\": {},\n  \"numerical_error\": {},\n  \"model_error\": "
         "{},\n"
-        "  \"cost_seconds\": {},\n  \"memory_bytes\": {:.0f},\n  \"warnings\": {},\n  \"identifiable\": {},\n  "
+        "  \"cost_seconds\": {},\n  \"fit_seconds\": {},\n  \"memory_bytes\": {:.0f},\n  \"warnings\": {},\n  "
+        "\"identifiable\": {},\n  "
         "\"next\": [{}],\n  \"parameters\": "
         "[{}]\n}}\n",
         quoted(chosen.method), quoted(chosen.physics), quoted(chosen.reasons), chosen.numerical_error,
-        chosen.model_error, seconds, memory, quoted(warnings),
+        chosen.model_error, seconds, json_number(fit_seconds), memory, quoted(warnings),
         expected ? (expected->identifiable ? "true" : "false") : "null", next, free);
     return kExitDone;
   }
@@ -136,8 +112,10 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
   std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error,
                            chosen.model_error,
                            chosen.wave ? "RMS over the picture's own RMS" : "intensity, fraction of the incident");
-  std::cout << fmt::format("Cost       {:.2g} s an image on one thread\nMemory     about {}\n", seconds,
-                           describe_memory(memory));
+  std::cout << fmt::format("Cost       {:.2g} s an image on one thread\n", seconds);
+  if (std::isfinite(fit_seconds))
+    std::cout << "Time       about " << describe_duration(fit_seconds) << " to fit, within a factor of three or so\n";
+  std::cout << "Memory     about " << describe_memory(memory) << "\n";
   bool any = false;
   for (int i = 0; i < table.size(); ++i) {
     const Parameter& parameter = table[i];

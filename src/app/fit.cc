@@ -1,16 +1,19 @@
 // birefit fit: estimates the parameters that the config marks `fit`.
 
+#include <cmath>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <optional>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/output.h"
+#include "app/watch.h"
 #include "app/work.h"
+#include "birefit/forecast.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 
@@ -25,6 +28,31 @@ struct Arguments {
   int threads = -1, coverage = 0;
   bool quiet = false, json = false, npy = false;
 };
+
+/// The time that the job is foreseen to take, less what went by; NaN where it cannot be foreseen.
+double seconds_left(const FitJob& job, double& foreseen, double elapsed) {
+  if (std::isnan(foreseen)) {
+    try {
+      foreseen = forecast_fit(job);
+    } catch (const std::exception&) {
+      foreseen = std::numeric_limits<double>::infinity();  // the fit itself says what is wrong
+    }
+  }
+  return foreseen - elapsed;
+}
+
+/// work(), during which whoever waits is told what is done and about how long it takes.
+template <class Work>
+auto watched(bool quiet, FitJob& job, const Work& work) {
+  FitJob alone = job;  // another thread looks at it
+  alone.options.progress = {};
+  double foreseen = std::numeric_limits<double>::quiet_NaN();
+  Watch watch(quiet, [&](double elapsed) { return seconds_left(alone, foreseen, elapsed); });
+  if (!quiet) job.options.progress = [&](const std::string& line) { watch.say(line); };
+  auto result = work();
+  job.options.progress = {};
+  return result;
+}
 
 int run_fit(const Arguments& arguments) {
   Problems problems;
@@ -50,24 +78,22 @@ int run_fit(const Arguments& arguments) {
   if (arguments.threads >= 0) job.options.threads = arguments.threads;
   const Interrupt interrupt;
   job.options.interrupted = &interrupt.flag();
-  const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
-  if (terminal)
-    job.options.progress = [](const std::string& line) { std::cerr << "\r\033[K" << printable(line) << std::flush; };
   const double memory = memory_to_fit(job);
   std::vector<std::string> formats = {".tif"};
   if (arguments.npy) formats.push_back(".npy");
-  FitResult result = do_work(config, memory, [&] { return fit(job); });
+  FitResult result = watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); });
   for (std::string& words : describe_rows(config)) result.warnings.push_back(std::move(words));
   if (arguments.coverage > 0 && result.has_answer() && config.signals.empty()) {
     write_results(out, config, result, formats);  // the audit may take hours
     folder->keep();
-    if (terminal) std::cerr << fmt::format("\r\033[Kfitting {} simulated images", arguments.coverage) << std::flush;
+    const auto nobody_knows = [](double) { return std::numeric_limits<double>::quiet_NaN(); };
+    Watch watch(arguments.quiet, nobody_knows);
+    watch.say(fmt::format("fitting {} simulated images", arguments.coverage));
     result.coverage = do_work(config, memory, [&] { return measure_coverage(job, result, arguments.coverage); });
   } else if (arguments.coverage > 0) {
     result.warnings.push_back(config.signals.empty() ? "--coverage: this fit has no answer to simulate images at."
                                                      : "--coverage is for images, not for tables of signals.");
   }
-  if (terminal) std::cerr << "\r\033[K" << std::flush;
   do_work(config, memory, [&] { write_results(out, config, result, formats); });
   folder->keep();
 

@@ -4,18 +4,19 @@
 #include <atomic>
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/plot.h"
+#include "app/watch.h"
 #include "app/work.h"
 #include "birefit/series.h"
 #include "core/printable.h"
@@ -240,10 +241,15 @@ int run_series(const Arguments& arguments) {
   remove_parts(out);
 
   const Interrupt interrupt;
-  const bool terminal = !arguments.quiet && ::isatty(STDERR_FILENO);
   std::vector<std::optional<FitResult>> fits(series.frames.size());
   const FitResult* neighbour = nullptr;
-  std::atomic<std::size_t> kept{0};
+  std::atomic<std::size_t> kept{0}, done{0};
+  const auto seconds_left = [&](double elapsed) {
+    const double so_far = static_cast<double>(done.load() - kept.load()), all = static_cast<double>(fits.size());
+    if (!(so_far > 0)) return std::numeric_limits<double>::quiet_NaN();
+    return elapsed / so_far * (all - static_cast<double>(done.load()));
+  };
+  std::optional<Watch> watch(std::in_place, arguments.quiet, seconds_left);
   const auto do_frame = [&](std::size_t i, int threads) {
     std::optional<Config> opened = open_frame(series, i);
     if (!opened) return;
@@ -259,10 +265,8 @@ int run_series(const Arguments& arguments) {
       config.job.options.threads = threads;
       config.job.options.interrupted = &interrupt.flag();
       const std::string at = fmt::format("{} of {}: {}", i + 1, series.frames.size(), printable(series.frames[i].name));
-      if (terminal)
-        config.job.options.progress = [&](const std::string& line) {
-          std::cerr << fmt::format("\r\033[K{}: {}", at, printable(line)) << std::flush;
-        };
+      watch->say(at);
+      config.job.options.progress = [&](const std::string& line) { watch->say(at + ": " + line); };
       const std::optional<FitResult> result = fit_frame(series.frames[i], config);
       if (!result || result->interrupted) return;  // the next run does it whole
       write_results(place, config, *result);
@@ -271,6 +275,7 @@ int run_series(const Arguments& arguments) {
       if (!record) throw std::logic_error("fit.json cannot be read back");
     }
     fits[i] = std::move(record->result);
+    ++done;
   };
   // The first alone, then a few at a time that all start where the frames before them ended: how many does not depend
   // on the number of cores, so that neither do the results.
@@ -285,7 +290,7 @@ int run_series(const Arguments& arguments) {
     for (std::size_t i = first; i < first + count; ++i)
       if (fits[i] && fits[i]->has_answer()) neighbour = &*fits[i];
   }
-  if (terminal) std::cerr << "\r\033[K" << std::flush;
+  watch.reset();
 
   SeriesResult result = settle_series(series, std::move(fits));
   for (const std::string& name : other_frames(out / "frames", series))

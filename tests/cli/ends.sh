@@ -105,6 +105,7 @@ sed -i 's/1500, 1500/16384, 16384/' large.yaml
 refused 'too large a picture' $? 'this takes about'
 grep -q '^large.yaml:1:1: .* of memory, and at most' err.txt || fail "memory: $(cat err.txt)"
 run explain crystal.yaml && grep -q '^Memory     about [0-9]* MB' out.txt || fail 'explain does not say the memory'
+grep -q '^Time       about .* to fit' out.txt || fail 'explain does not say how long a fit takes'
 
 # ---- threads ---------------------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,121 @@
+#include "birefit/forecast.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+#include "core/threads.h"
+#include "fit/problem/task.h"
+
+namespace birefit {
+namespace {
+
+using namespace estimation;
+using Clock = std::chrono::steady_clock;
+
+double pixels_of(const View& view) { return static_cast<double>(view.width) * view.height; }
+
+/// A scene with numbers of its own behind those of the table.
+struct Coarse {
+  Scene scene;
+  Theta theta;
+
+  void replace(ParameterRef& ref, double value) {
+    theta.push_back(value);
+    ref.index = static_cast<int>(theta.size()) - 1;
+  }
+  double value(ParameterRef ref) const { return theta[static_cast<std::size_t>(ref.index)]; }
+};
+
+/// The same scene in pixels k times as large, the last ones cut off.
+Coarse coarser(const Scene& scene, const Theta& theta, int k) {
+  Coarse coarse{scene, theta};
+  if (k == 1) return coarse;
+  View& view = coarse.scene.view;
+  view.width = std::max(1, view.width / k), view.height = std::max(1, view.height / k);
+  const auto move = [&](ParameterRef& place) {
+    if (place) coarse.replace(place, (coarse.value(place) - 0.5 * (k - 1)) / k);
+  };
+  move(view.center_x_px), move(view.center_y_px);
+  if (view.pixel_size_um) coarse.replace(view.pixel_size_um, k * coarse.value(view.pixel_size_um));
+  if (auto* crystal = std::get_if<Crystal>(&coarse.scene.sample))
+    move(crystal->electrode_low_px), move(crystal->electrode_high_px);
+  return coarse;
+}
+
+/// Seconds of a picture on one thread: what all of it shares, and what each of its pixels adds.
+struct Cost {
+  double shared = 0, a_pixel = 0;
+  double of(double pixels) const { return shared + a_pixel * pixels; }
+};
+
+/// From pictures of the scene that grow until they tell enough, or are whole.
+Cost measure(const Scene& scene, const Demand& demand, const Theta& theta, const Observable& observable,
+             const std::vector<int>& active) {
+  constexpr double kEnough = 0.15;  // s: what a clock and other programs add then matters little
+  constexpr int kSmallest = 24;     // pixels on a side of the first
+  const int side = std::max(scene.view.width, scene.view.height);
+  Cost cost;
+  double before_seconds = 0, before_pixels = 0;
+  Rendering image;
+  for (int k = std::max(1, side / kSmallest);; k = std::max(1, k / 2)) {
+    const Coarse small = coarser(scene, theta, k);
+    const RenderPlan chosen = plan(small.scene, demand, small.theta, observable);
+    const auto begin = Clock::now();
+    render(small.scene, chosen, small.theta, active, 1, image);
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count(),
+                 pixels = pixels_of(small.scene.view);
+    const bool grown = before_pixels > 0 && pixels > before_pixels;
+    cost.a_pixel = grown ? std::max(0.0, (seconds - before_seconds) / (pixels - before_pixels)) : seconds / pixels;
+    cost.shared = std::max(0.0, seconds - cost.a_pixel * pixels);
+    if (k == 1 || (seconds > kEnough && grown) || seconds > 4 * kEnough) return cost;
+    before_seconds = seconds, before_pixels = pixels;
+  }
+}
+
+}  // namespace
+
+double forecast_image(const Scene& scene, const Demand& demand, const Theta& theta, const Observable& observable) {
+  if (!scene.microscope.directions.empty()) return 0;
+  if (const RenderPlan chosen = plan(scene, demand, theta, observable); chosen.wave && chosen.cost_seconds > 1)
+    return chosen.cost_seconds;
+  return measure(scene, demand, theta, observable, {}).of(pixels_of(scene.view));
+}
+
+double forecast_fit(const FitJob& job) {
+  const Task task(job);
+  const Theta theta = job.parameters.values();
+  // How often a fit looks at what: the solver and the analysis of errors at all pixels with derivatives, the search
+  // before them many times at some; and what noise, residuals and reports take of each pixel (s). Found by the shipped
+  // configs (docs/methods.md, "How long a fit takes").
+  constexpr double kWhole = 90, kScan = 900, kPixel = 1.2e-5;
+  constexpr double kRoundsOfDiscs = 4;  // what is left out of a disc follows its parameters, a fit each time
+  const double scanned_each = std::max(50.0, static_cast<double>(job.options.scan_pixels) / std::max(1, task.frames()));
+  double whole = 0, scanned = 0, pixels = 0;
+  Cost with_derivatives, plain;
+  const View* measured = nullptr;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Picture& picture = task.picture(g);
+    const View& view = picture.scene.view;
+    // Pictures of a job that are as large as each other cost alike: the first of them is measured.
+    if (!measured || measured->width != view.width || measured->height != view.height) {
+      with_derivatives = measure(picture.scene, job.demand, theta, task.observable(g), task.unknowns.searched);
+      plain = measure(picture.scene, job.demand, theta, task.observable(g), {});
+      measured = &view;
+    }
+    double used = pixels_of(view);
+    if (!picture.mask.empty())
+      used = static_cast<double>(std::count(picture.mask.values().begin(), picture.mask.values().end(), 1));
+    whole += with_derivatives.of(used);
+    pixels += used;
+    scanned += plain.of(std::min(used, scanned_each));
+  }
+  double rounds = std::max<double>(1, static_cast<double>(job.branches.size()));
+  if (task.frames() > 0 && std::holds_alternative<StressedDisc>(task.picture(0).scene.sample)) rounds *= kRoundsOfDiscs;
+  const bool searches = !task.unknowns.searched.empty();
+  return rounds * (kWhole * whole + (searches ? kScan * scanned : 0)) / thread_count(job.options.threads) +
+         kPixel * pixels;
+}
+
+}  // namespace birefit
