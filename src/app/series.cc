@@ -47,18 +47,59 @@ void remove_parts(const fs::path& folder) {
       fs::remove(entry.path(), ignored);
 }
 
-/// What an earlier run left in the folder of frames that this series does not have: its fits may be wanted again.
-std::vector<std::string> other_frames(const fs::path& folder, const ImageSeries& series) {
-  std::vector<std::string> others;
+/// Is this folder of a frame's results, and not somebody else's?
+bool holds_fit(const fs::path& folder) {
   std::error_code code;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, code)) {
-    const std::string name = entry.path().filename().string();
-    if (std::none_of(series.frames.begin(), series.frames.end(), [&](const SeriesFrame& f) { return f.name == name; }))
-      others.push_back(name);
-  }
-  std::sort(others.begin(), others.end());
-  return others;
+  return fs::is_regular_file(folder / "fit.json", code);
 }
+
+/// Results of earlier runs that are none of this series' stand apart: beside new ones they would pass for some of them.
+class EarlierFrames {
+ public:
+  explicit EarlierFrames(const fs::path& out) : frames_(out / "frames"), earlier_(out / "earlier") {}
+
+  /// Brings a frame's results back where the series has it again: they may be up to date.
+  void bring_back(const std::string& name) const {
+    std::error_code code;
+    if (!fs::exists(frames_ / name, code) && holds_fit(earlier_ / name))
+      fs::rename(earlier_ / name, frames_ / name, code);
+  }
+
+  /// Takes away what there is of a frame that has no result now; says whether there was anything.
+  bool take_away(const std::string& name) const {
+    std::error_code code;
+    if (!holds_fit(frames_ / name)) return false;
+    fs::create_directories(earlier_, code);
+    fs::remove_all(earlier_ / name, code);  // still earlier
+    fs::rename(frames_ / name, earlier_ / name, code);
+    return !code;
+  }
+
+  /// Takes away the frames that the series does not have; what was said of it, in sentences. What holds no fit stays.
+  std::vector<std::string> take_away_others(const ImageSeries& series) const {
+    std::vector<std::string> names, taken, sentences;
+    std::error_code code;
+    for (const fs::directory_entry& entry : fs::directory_iterator(frames_, code))
+      names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    for (const std::string& name : names) {
+      const auto is_it = [&](const SeriesFrame& f) { return f.name == name; };
+      if (std::any_of(series.frames.begin(), series.frames.end(), is_it)) continue;
+      if (take_away(name))
+        taken.push_back(name);
+      else
+        sentences.push_back("frames/" + name + " is no frame of this series.");
+    }
+    if (!taken.empty())
+      sentences.push_back(fmt::format("{} of an earlier run {} no frame of this series: moved to {}/.",
+                                      taken.size() == 1 ? "frames/" + taken[0] : fmt::format("{} frames", taken.size()),
+                                      taken.size() == 1 ? "is" : "are", earlier_.filename().string()));
+    return sentences;
+  }
+
+ private:
+  const fs::path frames_, earlier_;
+};
 
 /// "diameter (um)" of sample.droplet.diameter_um: the unit is part of every name.
 std::string axis_label(const std::string& path) {
@@ -239,6 +280,7 @@ int run_series(const Arguments& arguments) {
   OutputFolder folder(out);
 
   remove_parts(out);
+  const EarlierFrames earlier(out);
 
   const Interrupt interrupt;
   std::vector<std::optional<FitResult>> fits(series.frames.size());
@@ -257,6 +299,7 @@ int run_series(const Arguments& arguments) {
     if (neighbour) start_from(config, *neighbour);
     config.fingerprint = fingerprint_of(config);
     const fs::path place = out / "frames" / series.frames[i].name;
+    earlier.bring_back(series.frames[i].name);
     remove_parts(place);
     std::optional<RecordedFit> record = load_recorded_fit(place / "fit.json");
     if (record && record->fingerprint == config.fingerprint) {
@@ -293,8 +336,9 @@ int run_series(const Arguments& arguments) {
   watch.reset();
 
   SeriesResult result = settle_series(series, std::move(fits));
-  for (const std::string& name : other_frames(out / "frames", series))
-    result.warnings.push_back("frames/" + name + " is of an earlier run: this series has no such frame.");
+  for (std::size_t i = 0; i < series.frames.size(); ++i)
+    if (!series.frames[i].unreadable.empty()) earlier.take_away(series.frames[i].name);
+  for (std::string& sentence : earlier.take_away_others(series)) result.warnings.push_back(std::move(sentence));
   write_file(out / "series.csv", series_csv(series, result));
   folder.keep();
   // What an earlier run left is of other numbers.

@@ -101,6 +101,16 @@ std::vector<SeriesFrame> frames_of(ConfigReader& reader, const std::string& file
   return frames;
 }
 
+/// The unit that the end of a key states: "V" of sample.crystal.bias_v; "" of none that a table could contradict.
+std::string unit_of_key(const std::string& path) {
+  static constexpr std::pair<const char*, const char*> kUnits[] = {{"_um", "um"}, {"_nm", "nm"},   {"_cm", "cm"},
+                                                                   {"_mm", "mm"}, {"_deg", "deg"}, {"_rad", "rad"},
+                                                                   {"_k", "K"},   {"_v", "V"}};
+  for (const auto& [end, unit] : kUnits)
+    if (path.ends_with(end)) return unit;
+  return {};
+}
+
 /// "stack.tif, page 3".
 std::string words_of(const SeriesFrame& frame) {
   return frame.file + (frame.page ? ", page " + std::to_string(*frame.page) : "");
@@ -143,10 +153,23 @@ class Join {
           "it has " + some_of(names) + "; expected file (or page, of a single stack), then parameter paths");
       return false;
     }
-    for (std::size_t c = 0; c < names.size(); ++c)
-      if (c != file_at_ && c != page_at_)
-        series.columns.push_back({names[c], place_of(table_.header_line, table_.header[c])});
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      if (c == file_at_ || c == page_at_) continue;
+      series.columns.push_back({names[c], place_of(table_.header_line, table_.header[c])});
+      check_unit(c);
+    }
     return true;
+  }
+
+  /// A line of units under the names contradicts what a name says: nothing here scales numbers.
+  void check_unit(std::size_t c) {
+    if (table_.units.empty()) return;
+    const std::string &given = table_.units[c], wanted = unit_of_key(table_.header[c].text);
+    if (wanted.empty() || !contradicts_unit(given, wanted)) return;
+    reader_.problems.add(
+        place_of(table_.header_line, table_.header[c]),
+        table_.header[c].text + " is in " + given + " by the table's line of units, and in " + wanted + " by its name",
+        "give the column in " + wanted + ", and say so in the line of units");
   }
 
   void know_files_of_table() {

@@ -13,6 +13,7 @@
 #include "io/report_format.h"
 #include "io/results/fit_file.h"
 #include "io/results/provenance.h"
+#include "io/results/residual.h"
 #include "io/results/write.h"
 
 namespace birefit {
@@ -177,22 +178,6 @@ Json coverage_json(const FitResult& result) {
           {"parameters", of}};
 }
 
-double residual_fraction(const MicrographResult& m) {
-  return m.signal_range > 0 ? m.residual_rms / m.signal_range : std::numeric_limits<double>::quiet_NaN();
-}
-
-/// Root mean square over all used pixels, each as a fraction of its micrograph's signal range.
-double overall_residual_rms(const FitResult& result) {
-  double sum = 0, pixels = 0;
-  for (const MicrographResult& m : result.micrographs) {
-    const double fraction = residual_fraction(m);
-    if (!std::isfinite(fraction) || m.used <= 0) continue;
-    sum += m.used * fraction * fraction;
-    pixels += m.used;
-  }
-  return pixels > 0 ? std::sqrt(sum / pixels) : std::numeric_limits<double>::quiet_NaN();
-}
-
 std::string unit_suffix(const std::string& unit) { return unit.empty() ? "" : " " + unit; }
 
 std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
@@ -269,7 +254,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["chi_square"] = number(result.chi_square);
   json["reduced_chi_square"] = number(result.reduced_chi_square);
   json["degrees_of_freedom"] = result.degrees_of_freedom;
-  json["residual_rms"] = number(overall_residual_rms(result));
+  json["residual_rms"] = number(residual_fraction(result));
 
   PixelCounts total;
   Json micrographs = Json::array();
@@ -316,9 +301,8 @@ std::string summary(const FitResult& result) {
   for (const ParameterEstimate& p : result.parameters) width = std::max(width, p.name.size());
   for (const ParameterEstimate& p : result.parameters) text += parameter_line(p, width) + "\n";
 
-  text +=
-      fmt::format("  reduced chi-square {:.4g} ({} degrees of freedom), residual rms {} of the signal range\n",
-                  result.reduced_chi_square, result.degrees_of_freedom, format_percent(overall_residual_rms(result)));
+  text += fmt::format("  reduced chi-square {:.4g} ({} degrees of freedom), residual rms {}\n",
+                      result.reduced_chi_square, result.degrees_of_freedom, describe_residual(result));
 
   struct Pair {
     double correlation;

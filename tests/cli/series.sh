@@ -134,6 +134,31 @@ echo 'f11.tif,110,930' >> frames.csv
 run --out changed --resume || fail 'resume with one more frame'
 grep -q '^10 frames were up to date' stdout.txt && [ "$(wc -l < changed/series.csv)" -eq 12 ] || fail "one more frame: $(head -1 stdout.txt)"
 
+# ---- nothing stale beside new results: frames that the series no longer has stand apart, and come back -----------------
+
+cp -r changed narrowed
+mkdir narrowed/frames/notes narrow && cp frames/f1.tif frames/f2.tif frames/f3.tif narrow/ && head -4 frames.csv > narrow.csv
+sed 's/files: "frames/files: "narrow/; s/frames.csv/narrow.csv/' series.yaml > narrow.yaml
+"$birefit" series narrow.yaml --threads 1 --resume --out narrowed > stdout.txt 2> stderr.txt || fail "fewer frames: $(cat stderr.txt)"
+ls narrowed/frames | tr '\n' ' ' | grep -qx 'f1 f2 f3 notes ' || fail "stale frames beside new ones: $(ls narrowed/frames)"
+ls narrowed/earlier | tr '\n' ' ' | grep -qx 'f10 f11 f4 f5 f6 f7 f8 f9 ' || fail "earlier frames: $(ls narrowed/earlier)"
+grep -q 'warning: 8 frames of an earlier run are no frame of this series: moved to earlier/' stdout.txt &&
+  grep -q 'warning: frames/notes is no frame of this series' stdout.txt || fail "stale frames are not said: $(cat stdout.txt)"
+run --out narrowed --resume || fail 'frames that came back'
+grep -q '^8 frames were up to date' stdout.txt && [ -z "$(ls narrowed/earlier)" ] || fail "frames that came back: $(head -1 stdout.txt)"
+cmp -s changed/series.csv narrowed/series.csv || fail 'frames that came back: another table'
+
+# ---- a line of units is held against the names ------------------------------------------------------------------------
+
+{ head -1 frames.csv; echo ',s,kV'; tail -n +2 frames.csv; } > units.csv
+sed 's/frames.csv/units.csv/' series.yaml > units.yaml
+"$birefit" series units.yaml --out units > stdout.txt 2> stderr.txt
+[ $? -eq 2 ] && grep -q 'units.csv:1:13: sample.crystal.bias_v is in kV by the table.s line of units, and in V by its name; give the column in V' stderr.txt ||
+  fail "units of a table: $(cat stderr.txt)"
+[ -e units ] && fail 'units of a table: something was written'
+sed -i 's/,s,kV/,s,V/' units.csv
+"$birefit" explain units.yaml > stdout.txt 2> stderr.txt || fail "units that agree: $(cat stderr.txt)"
+
 # ---- frames without an answer stay ------------------------------------------------------------------------------------
 
 sed 's/fit: \[1000, 2500\]/fit: [1000, 1450]/' series.yaml > pinned.yaml
@@ -163,6 +188,10 @@ ls torn_out/frames | tr '\n' ' ' | grep -qx 'f1 f6 ' || fail 'results of a frame
 cp frames/f2.tif frames/f3.tif frames/f4.tif frames/f5.tif torn/
 "$birefit" series torn.yaml --threads 2 --resume --out torn_out > stdout.txt 2> stderr.txt || fail "frames that came back: $(cat stderr.txt)"
 grep -q '^1 frames were up to date' stdout.txt || fail "frames that came back: $(head -1 stdout.txt)"
+head -c 1000 frames/f2.tif > torn/f2.tif
+cp -r torn_out torn_later && "$birefit" series torn.yaml --threads 2 --resume --quiet --out torn_later
+[ $? -eq 1 ] && [ ! -e torn_later/frames/f2 ] && [ -e torn_later/earlier/f2/fit.json ] || fail 'the result of a frame that can no longer be read'
+cp frames/f2.tif torn/
 "$birefit" series torn.yaml --threads 2 --quiet --out torn_whole && cmp -s torn_out/series.csv torn_whole/series.csv || fail 'frames that came back: not what they are'
 
 # ---- text of others is drawn, never run --------------------------------------------------------------------------------

@@ -333,6 +333,20 @@ TEST(Report, ShowsEverySection) {
   EXPECT_EQ(html, report_html(c.config, c.result)) << "same result, same bytes";
 }
 
+// Frames of an even cell have no range of their own: that of all of them serves.
+TEST(Summary, OfEvenImagesTheirOwnRangeIsThatOfAll) {
+  FitResult result;
+  for (const double level : {100.0, 300.0}) {
+    MicrographResult m;
+    m.fitted = Image(4, 4, level), m.residual = Image(4, 4, 2.0);
+    m.used = 16, m.residual_rms = 2, m.signal_range = 0;
+    result.micrographs.push_back(m);
+  }
+  EXPECT_THAT(summary(result), HasSubstr("residual rms 1 % of the signal range"));
+  result.micrographs.pop_back();
+  EXPECT_THAT(summary(result), HasSubstr("residual rms 2 (even images have no range)"));
+}
+
 TEST(Report, SaysWhyThereIsNoAnswer) {
   Case c = make_case();
   EXPECT_THAT(report_html(c.config, c.result), HasSubstr("badge good"));

@@ -1,12 +1,18 @@
 #include "io/files/whole_file.h"
 
 #include <array>
+#include <ctime>
 #include <fstream>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <new>
+#include <optional>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
+#include <sys/stat.h>
 
 namespace birefit {
 namespace {
@@ -29,6 +35,22 @@ class Sha256 {
  private:
   std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
 };
+
+/// What a file is known by while nobody writes to it: device, inode, size, time of the last change (s, ns).
+using Identity = std::tuple<std::uintmax_t, std::uintmax_t, std::intmax_t, std::intmax_t, std::intmax_t>;
+
+/// Nothing of what is no regular file.
+std::optional<Identity> identity_of(const std::filesystem::path& path) {
+  struct stat status = {};
+  if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return std::nullopt;
+  return Identity{status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+}
+
+/// Was the last change long enough ago that another one would have another time?
+bool is_settled(const Identity& identity) {
+  constexpr std::intmax_t kCoarsest = 2;  // s: of FAT
+  return std::time(nullptr) - std::get<3>(identity) > kCoarsest;
+}
 
 /// Calls piece(bytes, count) until the end; false where that was not reached.
 template <class Piece>
@@ -67,9 +89,25 @@ std::string sha256(const std::string& bytes) {
 }
 
 std::string sha256_of_file(const std::filesystem::path& path) {
+  // A series asks for a stack, a mask and its calibration frames once a frame.
+  static std::mutex mutex;
+  static std::map<Identity, std::string> known;
+  const std::optional<Identity> before = identity_of(path);
+  if (before) {
+    const std::lock_guard lock(mutex);
+    if (const auto found = known.find(*before); found != known.end()) return found->second;
+  }
   Sha256 digest;
   const bool whole = read_pieces(path, [&](const char* bytes, std::size_t count) { digest.add(bytes, count); });
-  return whole ? digest.text() : std::string();
+  if (!whole) return {};
+  const std::string text = digest.text();
+  // Of a file that changed meanwhile nothing is remembered, nor of one so new that it may change within the clock's
+  // step.
+  if (before && before == identity_of(path) && is_settled(*before)) {
+    const std::lock_guard lock(mutex);
+    known.emplace(*before, text);
+  }
+  return text;
 }
 
 }  // namespace birefit
