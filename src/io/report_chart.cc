@@ -196,6 +196,26 @@ std::string tick_label(double value, double step) {
   return fmt::format("{:.{}f}", value, decimals);
 }
 
+namespace {
+
+/// For who cannot see it: what is drawn against what, and between which numbers.
+std::string alternative_text(const Chart& chart, double x_low, double x_high) {
+  std::string text = chart.title + ".";
+  for (const Panel& panel : chart.panels) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    visit_values(panel, false, [&](double v) { low = std::min(low, v), high = std::max(high, v); });
+    std::string names;
+    for (const Series& series : panel.series)
+      if (!series.label.empty()) names += (names.empty() ? ": " : ", ") + series.label;
+    text += fmt::format(" {}{}", panel.y_label, names);
+    if (low <= high) text += fmt::format(", from {:.4g} to {:.4g}", low, high);
+    text += ".";
+  }
+  return text + fmt::format(" Against {} from {:.4g} to {:.4g}.", chart.x_label, x_low, x_high);
+}
+
+}  // namespace
+
 std::string svg(const Chart& chart) {
   double x_low = std::numeric_limits<double>::infinity(), x_high = -x_low;
   for (const Panel& panel : chart.panels)
@@ -211,7 +231,7 @@ std::string svg(const Chart& chart) {
 
   std::string out = fmt::format(
       "<svg class=\"chart\" viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\" font-size=\"11.5\" fill=\"none\">",
-      chart.width, height, escape_html(chart.title));
+      chart.width, height, escape_html(alternative_text(chart, x_low, x_high)));
   int x_power = 0;
   const std::vector<Tick> x_ticks =
       linear_ticks(x_low, x_high, std::clamp(static_cast<int>((right - kLeft) / 70), 3, 12), x_power);

@@ -144,7 +144,10 @@ std::string svg(const ImagePanel& panel) {
   std::string out = fmt::format(
       "<svg class=\"image\" viewBox=\"0 0 {:.0f} {:.0f}\" style=\"max-width:{:.0f}px\" role=\"img\" aria-label=\"{}\" "
       "font-size=\"10.5\">",
-      total, bar_height + top + 6, 1.7 * total, escape_html(panel.title));
+      total, bar_height + top + 6, 1.7 * total,
+      escape_html(fmt::format("{}, {} x {} pixels, {} from {:.4g} to {:.4g} {}", panel.title, values.width(),
+                              values.height(), panel.colours == Colours::grey ? "black to white" : "blue to red",
+                              panel.low, panel.high, panel.unit)));
   // Few pixels: each is a square to be seen. Many: let the browser average.
   const bool pixelated = std::max(values.width(), values.height()) / factor < 1.4 * std::max(width, height);
   out += fmt::format(
