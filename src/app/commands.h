@@ -21,6 +21,7 @@ Command add_render_command(CLI::App& app);
 Command add_jones_command(CLI::App& app);
 Command add_explain_command(CLI::App& app);
 Command add_new_command(CLI::App& app);
+Command add_schema_command(CLI::App& app);
 Command add_chart_command(CLI::App& app);
 Command add_stress_command(CLI::App& app);
 
