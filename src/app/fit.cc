@@ -1,10 +1,12 @@
 // birefit fit: estimates the parameters that the config marks `fit`.
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <variant>
 
 #include <fmt/format.h>
 
@@ -31,6 +33,9 @@ struct Arguments {
 
 /// The time that the job is foreseen to take, less what went by; NaN where it cannot be foreseen.
 double seconds_left(const FitJob& job, double& foreseen, double elapsed) {
+  const auto is_table = [](const Measurement& m) { return std::holds_alternative<Readings>(m); };
+  if (std::isnan(foreseen) && std::any_of(job.measurements.begin(), job.measurements.end(), is_table))
+    foreseen = std::numeric_limits<double>::infinity();  // forecasts are of pictures
   if (std::isnan(foreseen)) {
     try {
       foreseen = forecast_fit(job);
