@@ -48,6 +48,8 @@ struct FitJob {
   std::optional<JointPrior> prior;
   FitOptions options;
   std::vector<std::string> warnings;  ///< gathered while reading the input
+  /// Sentences' parts: what is known of the pictures that makes any answer one with misfit (FitResult::misfit).
+  std::vector<std::string> misfit;
   /// sentences: what nobody has stated and the model therefore takes for granted
   std::vector<std::string> taken_as_exact;
 };
@@ -120,13 +122,28 @@ struct MicrographResult {
   RenderPlan plan;
 };
 
-/// What the estimates hang on: an input that all micrographs share and the fit takes as exact, and what `step` more of
-/// it would do to them.
+/// What the estimates hang on: an input that the fit takes as exact and all micrographs share, or that is stated, and
+/// what `step` more of it would do to them.
 struct InputEffect {
   std::string name, unit;
   double value = 0, step = 0;  ///< step: 1 deg, 1 px, else 1 % of the value
+  double known_to = 0;         ///< standard deviation that is in the errors; 0: taken as exact
   std::vector<double> shift;   ///< of FitResult::parameters, to first order
 };
+
+/// A number that is stated and that nobody knows exactly (Parameter::known_to).
+struct StatedNumber {
+  std::string name, unit;
+  double stated = 0, known_to = 0;  ///< and its standard deviation
+  bool fitted = false;              ///< pictures tell it: a nuisance beside the parameters; else by its derivative
+  double value = 0, stderr_ = 0;    ///< where fitted
+  std::string most_of;              ///< the searched parameter whose variance it makes most of
+  double share = 0;                 ///< of that variance, where not fitted
+  /// Standard deviations by which pictures want it elsewhere.
+  double away() const { return fitted && known_to > 0 ? (value - stated) / known_to : 0; }
+};
+/// Beyond so many standard deviations pictures contradict what was stated.
+inline constexpr double kContradicted = 3;
 
 /// A strip of a bar, plate or disc by itself, the rest of the image left out.
 struct Strip {
@@ -183,9 +200,13 @@ struct FitResult {
   /// that share: 0 a perfect model, 1 no better than a constant image (below 0 by chance; 0 too where there is nothing
   /// to compare with)
   double left_over = 0;
+  /// An answer all the same, but what noise does not explain is left over, or what was stated is contradicted: why, in
+  /// sentences. Empty: a plain answer.
+  std::vector<std::string> misfit;
   std::vector<ParameterEstimate> parameters;  ///< free ones in table order: searched first, then linear
   std::vector<std::string> names;             ///< order of correlation and covariance
   Eigen::MatrixXd covariance, correlation;    ///< parameters' own units
+  Eigen::MatrixXd stated_covariance;  ///< the part of it by what is stated: in common to all fits that state the same
   /// "white noise" | "scaled by reduced chi-square" | "clustered by image" | ..., in words
   std::string covariance_kind;
   double interval_degrees_of_freedom = 0;  ///< of the t quantile behind interval95
@@ -200,6 +221,8 @@ struct FitResult {
   std::vector<FisherDirection> directions;
   /// those that shift a searched parameter by a tenth of its standard error or more; largest first
   std::vector<InputEffect> inputs;
+  /// What is stated and not known exactly, and is in the errors; those that matter most first.
+  std::vector<StatedNumber> stated;
   std::vector<Strip> strips;  ///< empty where strips agree, or the sample has none
   /// columns and rows as Strip::roi_px: strips in which frames agree far better than elsewhere and the model no worse;
   /// a proposal
@@ -220,6 +243,9 @@ struct FitResult {
 
   /// True when the run deserves exit code 0.
   bool has_answer() const { return converged && !ambiguous && identifiable && !pinned && described && !interrupted; }
+  /// "answer", "answer with misfit", or why there is none: "not converged", "not described", "ambiguous", "not
+  /// identifiable", "at a bound".
+  std::string grade() const;
 };
 
 /// Estimates every free parameter; of several branches, those of the one with the best odds, and `ambiguous` when

@@ -23,10 +23,11 @@ struct Retarder {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("phase_deg", self.phase_deg, numbers::angle().left_out(), "at the light's wavelength; or");
-    visit.number("retardance_nm", self.retardance_nm, numbers::within(-1e5, 1e5, "nm").left_out(),
+    visit.number("phase_deg", self.phase_deg, numbers::angle().left_out().known_within(3),
+                 "at the light's wavelength; or");
+    visit.number("retardance_nm", self.retardance_nm, numbers::within(-1e5, 1e5, "nm").left_out().known_within(5),
                  "which is the same at all wavelengths");
-    visit.number("azimuth_deg", self.azimuth_deg, numbers::angle(), "of the slow axis, from +x");
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::dial(), "of the slow axis, from +x");
   }
 };
 /// Turns the polarization by angle_deg, counter-clockwise in the image.
@@ -62,18 +63,20 @@ struct Microscope {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("light.wavelength_nm", self.wavelength_nm, numbers::within(100, 20000, "nm"), "vacuum");
+    visit.number("light.wavelength_nm", self.wavelength_nm, numbers::within(100, 20000, "nm").known_within_share(0.003),
+                 "vacuum");
     visit.number("light.bandwidth_nm", self.bandwidth_nm, numbers::within(0, 5000, "nm").left_out(),
                  "FWHM of the line");
-    visit.number("polarizer_deg", self.polarizer_deg, numbers::angle(), "from +x");
-    visit.number("analyzer_deg", self.analyzer_deg, numbers::angle(), "from +x");
+    visit.number("polarizer_deg", self.polarizer_deg, numbers::dial(), "from +x");
+    visit.number("analyzer_deg", self.analyzer_deg, numbers::dial(), "from +x");
     visit.number("polarizer_extinction_ratio", self.polarizer_extinction_ratio,
                  numbers::within(1, 1e12).physical().left_out(), "flux along over flux across");
     visit.number("analyzer_extinction_ratio", self.analyzer_extinction_ratio,
                  numbers::within(1, 1e12).physical().left_out(), "flux along over flux across");
-    visit.number("objective_na", self.objective_na, numbers::positive(1.6).in_percent().left_out(), "of the objective");
+    visit.number("objective_na", self.objective_na,
+                 numbers::positive(1.6).in_percent().left_out().known_within_share(0.03), "of the objective");
     visit.number("condenser_na", self.condenser_na, numbers::positive(1.6).in_percent().left_out(), "of the condenser");
-    visit.number("focus_um", self.focus_um, numbers::within(-1000, 1000, "um").left_out(),
+    visit.number("focus_um", self.focus_um, numbers::within(-1000, 1000, "um").left_out().known_within(0.3),
                  "plane in focus, from the mid plane along the light");
     visit.inside("before", self.before);
     visit.inside("behind", self.behind);

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "birefit/parameters.h"
+
 namespace birefit {
 
 /// Unit, range, which of its limits are nature's own, and what holds where it is not given.
@@ -22,6 +24,7 @@ struct NumberSpec {
   bool fixed = false;                                              ///< cannot be fitted
   std::optional<double> fallback;                                  ///< value where it is not given
   bool optional = false;                                           ///< not given: an empty reference
+  Uncertainty known_to;                                            ///< where it is stated without another
 
   bool contains(double value) const {
     return (lower_open ? value > lower : value >= lower) && (upper_open ? value < upper : value <= upper);
@@ -50,6 +53,17 @@ struct NumberSpec {
     spec.percent = true;
     return spec;
   }
+  /// Nobody knows it better unless he says so.
+  NumberSpec known_within(double sd) const {
+    NumberSpec spec = *this;
+    spec.known_to.sd = sd;
+    return spec;
+  }
+  NumberSpec known_within_share(double share) const {
+    NumberSpec spec = *this;
+    spec.known_to.share = share;
+    return spec;
+  }
   /// Its lower limit is a physical one.
   NumberSpec physical() const {
     NumberSpec spec = *this;
@@ -75,6 +89,10 @@ inline NumberSpec length_um(double upper) { return positive(upper, "um").physica
 inline NumberSpec angle() { return within(-36000, 36000, "deg"); }
 inline NumberSpec angle(double lower, double upper) { return within(lower, upper, "deg"); }
 inline NumberSpec index() { return within(1, 4); }
+/// Read off a polarizer's mount, whose zero is as good.
+inline NumberSpec dial() { return angle().known_within(1); }
+/// Of a table, for about this temperature and wavelength.
+inline NumberSpec tabulated_index() { return index().known_within(0.01); }
 
 }  // namespace numbers
 }  // namespace birefit

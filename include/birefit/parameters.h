@@ -13,6 +13,13 @@
 
 namespace birefit {
 
+/// How well a number is known that is stated and not fitted: a standard deviation of so much and such a share of the
+/// value; exact where both are 0.
+struct Uncertainty {
+  double sd = 0, share = 0;
+  double of(double value) const { return sd + share * (value < 0 ? -value : value); }
+};
+
 /// What to do with a number: the three forms of docs/configuration.md.
 struct Parameter {
   std::string name;                                         ///< config path, e.g. "sample.droplet.diameter_um"
@@ -28,7 +35,13 @@ struct Parameter {
   double physical_lower = -std::numeric_limits<double>::infinity();
   double physical_upper = std::numeric_limits<double>::infinity();
   bool linear = false;  ///< gain or offset: solved exactly inside the fit, never searched
-  Where where;          ///< where the config gives it
+  /// Of a number that is not fitted: it enters every error, by its derivative or, where pictures tell it themselves, as
+  /// a nuisance (docs/methods.md, "What nobody knows exactly").
+  Uncertainty known_to;
+  /// Free for that reason alone: `prior_sd` has the tails of Student's t with four degrees of freedom, which let go of
+  /// what pictures contradict.
+  bool nuisance = false;
+  Where where;  ///< where the config gives it
 };
 
 /// Index into a ParameterTable. Default-constructed = "not given" (the scene part documents what that means).

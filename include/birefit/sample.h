@@ -29,7 +29,8 @@ struct Cell {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("thickness_um", self.thickness_um, numbers::length_um(10000), "between the faces");
+    visit.number("thickness_um", self.thickness_um, numbers::length_um(10000).known_within_share(0.005),
+                 "between the faces");
     visit.inside("director", self.director);
   }
 };
@@ -71,7 +72,8 @@ struct Plate {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("thickness_um", self.thickness_um, numbers::length_um(100000), "between the faces");
+    visit.number("thickness_um", self.thickness_um, numbers::length_um(100000).known_within_share(0.005),
+                 "between the faces");
     visit.number("view.half_angle_deg", self.half_angle_deg, numbers::positive(80, "deg").left_out(),
                  "of the cone, half the smaller image side");
     visit.number("view.screen_distance_um", self.screen_distance_um, numbers::length_um(1e8).left_out(),
@@ -156,8 +158,8 @@ struct StressedDisc {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("diameter_um", self.diameter_um, numbers::length_um(1e7), "of the disc");
-    visit.number("thickness_um", self.thickness_um, numbers::length_um(1e7).or_else(1000),
+    visit.number("diameter_um", self.diameter_um, numbers::length_um(1e7).known_within_share(0.005), "of the disc");
+    visit.number("thickness_um", self.thickness_um, numbers::length_um(1e7).or_else(1000).known_within_share(0.005),
                  "matters to residual stress alone, which needs it");
     visit.number("load_n", self.load_n, numbers::within(0, 1e7, "N").physical(), "pressing it together");
     visit.number("stress_optic_brewster", self.stress_optic_brewster, numbers::within(-1e5, 1e5, "brewster"),

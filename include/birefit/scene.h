@@ -40,7 +40,7 @@ struct View {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("pixel_size_um", self.pixel_size_um, numbers::length_um(1000).left_out(),
+    visit.number("pixel_size_um", self.pixel_size_um, numbers::length_um(1000).left_out().known_within_share(0.005),
                  "on the sample; the file's own where it states one");
     visit.number("center_px.x", self.center_x_px, numbers::within(-1e6, 1e6, "px").left_out(),
                  "of the sample; not given: the image's middle");
@@ -63,7 +63,7 @@ struct Scene {
   static void describe(Self& self, Visit&& visit) {
     visit.inside("sample", self.sample);
     visit.inside("sample.material", self.material);
-    visit.number("sample.surround.index", self.surround_index, numbers::index().left_out(),
+    visit.number("sample.surround.index", self.surround_index, numbers::tabulated_index().left_out(),
                  "of what is around the sample");
     visit.inside("sample.surround.file", self.surround_dispersion);
     visit.inside("microscope", self.microscope);

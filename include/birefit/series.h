@@ -78,9 +78,6 @@ struct RecordedFit {
 /// Nothing where there is no such file or it is no complete fit.json of a series.
 std::optional<RecordedFit> load_recorded_fit(const std::filesystem::path& fit_json);
 
-/// "answer", or why there is none: "not described", "ambiguous", "not identifiable", "at a bound", "not converged".
-std::string verdict_word(const FitResult& result);
-
 /// All frames with what they share settled.
 struct SeriesResult {
   std::vector<std::optional<FitResult>> alone;  ///< each frame by itself; nothing for those not fitted yet

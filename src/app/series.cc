@@ -219,7 +219,7 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
   std::map<std::string, std::size_t> verdicts, warnings;
   for (std::size_t i = 0; i < series.frames.size(); ++i) {
     const auto& fit = result.frames[i];
-    ++verdicts[fit ? verdict_word(*fit) : series.frames[i].unreadable.empty() ? "not done" : "unreadable"];
+    ++verdicts[fit ? fit->grade() : series.frames[i].unreadable.empty() ? "not done" : "unreadable"];
     if (fit)
       for (const std::string& warning : fit->warnings) ++warnings[warning];
   }

@@ -79,13 +79,15 @@ Image simulated(const Picture& micrograph, const MicrographResult& of, std::mt19
   return values;
 }
 
-/// Priors are observations, too: another draw has seen other ones.
+/// Priors are observations, too, and so is what was stated: another draw has seen other ones.
 void redraw_priors(FitJob& job, const Theta& truth, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   for (int i = 0; i < job.parameters.size(); ++i) {
     Parameter& p = job.parameters[i];
     if (p.free && p.prior_sd)
       p.value = std::clamp(truth[static_cast<std::size_t>(i)] + *p.prior_sd * normal(random), p.lower, p.upper);
+    else if (const double sd = p.known_to.of(p.value); !p.free && sd > 0)
+      p.value = truth[static_cast<std::size_t>(i)] + sd * normal(random);
   }
   if (!job.prior) return;
   JointPrior& prior = *job.prior;

@@ -1,6 +1,7 @@
 // One fit, from a job to its result. Alternatives (branches, curved rays, waves) are in strategy.cc.
 
 #include <chrono>
+#include <deque>
 #include <limits>
 #include <utility>
 
@@ -8,6 +9,7 @@
 
 #include "fit/errors/left_out.h"
 #include "fit/errors/report.h"
+#include "fit/errors/stated.h"
 #include "fit/strategy.h"
 #include "fit/weights/settle.h"
 
@@ -34,6 +36,7 @@ Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool bea
   foretell_curved_rays(task, optimum, sd, left_out);
   foretell_waves(task, optimum, sd, left_out);
   pay_for_discrepancy(task, optimum, covariances);
+  pay_for_stated(task, optimum, covariances);
   FitResult result = report(task, optimum, minima, std::move(rivals), left_out, std::move(covariances), beaten);
   return {std::move(result), left_out.change_by_curved_rays, left_out.change_by_waves};
 }
@@ -60,13 +63,9 @@ std::optional<Outcome> given_up(const Task& task, Minima minima) {
   return outcome;
 }
 
-/// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
-Outcome finish(const Task& task, const Minima& minima, bool beaten) {
-  if (minima.hopeless && !beaten)
-    if (std::optional<Outcome> outcome = given_up(task, minima)) return std::move(*outcome);
-  Optimum optimum = settle(task, best_minimum(task, minima, beaten));
+/// Judged, and once more from where a profile has gone on to and the solver had not.
+Outcome concluded(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
   Outcome outcome = judge(task, optimum, minima, beaten);
-  // A profile has gone on to where the solver had not: from there once more.
   constexpr int kTimes = 2;
   for (int i = 0; i < kTimes && optimum.better && !optimum.stopped; ++i) {
     optimum.rivals.push_back(optimum.searched);
@@ -78,6 +77,21 @@ Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   return outcome;
 }
 
+/// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
+Outcome finish(const Task& task, const Minima& minima, bool beaten) {
+  if (minima.hopeless && !beaten)
+    if (std::optional<Outcome> outcome = given_up(task, minima)) return std::move(*outcome);
+  Optimum optimum = settle(task, best_minimum(task, minima, beaten));
+  const WorthFitting told = worth_fitting(task, optimum);
+  if (told.numbers.empty()) return concluded(task, minima, std::move(optimum), beaten);
+  task.say("what is stated and not known exactly is fitted as well");
+  const FitJob job = with_nuisances(task.job, told.numbers);
+  const Task wider(job);
+  optimum = told.better ? settle(wider, best_with_nuisances(wider, task, optimum, minima))
+                        : with_settled_misfit(wider, with_nuisances_from(wider, task, std::move(optimum)));
+  return concluded(wider, minima, std::move(optimum), beaten);
+}
+
 }  // namespace
 
 Outcome fit_one(const FitJob& job) { return std::move(fit_side_by_side({&job, 1}).front()); }
@@ -86,13 +100,14 @@ std::vector<Outcome> fit_side_by_side(std::span<const FitJob> jobs) {
   // A branch whose misfit per pixel, by the same noise, is this many times the best one's has lost.
   constexpr double kBeaten = 10;
   double best = std::numeric_limits<double>::infinity();
+  std::deque<FitJob> completed;  // tasks refer to them
   std::vector<Task> tasks;
   tasks.reserve(jobs.size());  // problems refer to theirs
   std::vector<Minima> minima;
   std::vector<double> seconds;
   for (const FitJob& job : jobs) {
     const Clock::time_point begin = Clock::now();
-    tasks.emplace_back(job);
+    tasks.emplace_back(has_unstated_focus(job) ? completed.emplace_back(with_unstated_focus(job)) : job);
     minima.push_back(search(tasks.back(), prepare(tasks.back()), kBeaten * best));
     best = std::min(best, minima.back().lowest_per_pixel());
     seconds.push_back(seconds_since(begin));

@@ -359,6 +359,8 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
           ": a channel of a colour camera passes light about 100 nm wide, unless a filter or the lamp's "
           "line makes it less; the model takes one wavelength. State microscope.light.bandwidth_nm (1 for "
           "a laser); in white light the intervals do not hold.");
+    if (!of_colours.empty() && !shared.scene.microscope.bandwidth_nm)
+      reader.misfit.push_back(of_colours + " is a colour camera's channel, whose light is no single wavelength");
     if (!of_codes.empty())
       reader.warnings.push_back(of_codes +
                                 ": colours of 8 bits are sRGB codes as a rule, which are no measure of light; they are "
@@ -418,6 +420,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
   config.job.demand = reader.demand;
   config.job.parameters = std::move(reader.table);
   config.job.warnings = std::move(reader.warnings);
+  config.job.misfit = std::move(reader.misfit);
   config.inputs.assign(reader.inputs.begin(), reader.inputs.end());
   return config;
 }

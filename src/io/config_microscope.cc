@@ -101,7 +101,8 @@ void read_short_forms(ConfigReader& reader, const Block& block, Microscope& micr
                           "quarter_wave: true stands for a polarizer and all parts of a circular polariscope",
                           "list its plates under before and behind, or leave out what else is there");
     else
-      make_circular_polariscope(microscope, reader.constant("microscope.quarter_wave.phase_deg", numbers::angle(), 90));
+      make_circular_polariscope(
+          microscope, reader.constant("microscope.quarter_wave.phase_deg", numbers::angle().known_within(3), 90));
   }
   if (block.find("compensator")) {
     const Block compensator = reader.block(block, "compensator", {"phase_deg", "azimuth_deg"}, true);
@@ -122,8 +123,9 @@ ParameterRef polarizing_element(ConfigReader& reader, const Block& block, const 
   if (!node) node = other;
   if (node && node->is_scalar() && node->text == "none") return {};
   const std::string path = block.path_of(canonical);
-  if (node) return reader.number_at(*node, path, numbers::angle());
-  return reader.number(block, canonical, numbers::angle(), required ? std::nullopt : std::optional<double>(0));
+  if (node) return reader.number_at(*node, path, described<Microscope>(canonical));
+  return reader.number(block, canonical, described<Microscope>(canonical),
+                       required ? std::nullopt : std::optional<double>(0));
 }
 
 }  // namespace

@@ -182,6 +182,7 @@ ParameterRef ConfigReader::constant(const std::string& path, const NumberSpec& s
   parameter.linear = spec.linear;
   parameter.physical_lower = spec.physical_lower;
   parameter.physical_upper = spec.physical_upper;
+  parameter.known_to = spec.known_to;
   parameter.where = {file};
   const ParameterRef ref = table.add(std::move(parameter));
   specs[path] = spec;
@@ -195,7 +196,9 @@ ParameterRef ConfigReader::number(const Block& block, const std::string& key, co
   if (const YamlNode* node = block.find(key)) return number_at(*node, path, spec);
   if (!fallback && std::find(set_everywhere.begin(), set_everywhere.end(), path) == set_everywhere.end())
     missing(block, key);
-  return constant(path, spec, fallback.value_or(std::isfinite(spec.lower) ? spec.lower : 0));
+  const ParameterRef ref = constant(path, spec, fallback.value_or(std::isfinite(spec.lower) ? spec.lower : 0));
+  if (fallback) table[ref].known_to = {};  // what nobody has stated is the model's
+  return ref;
 }
 
 ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& path, const NumberSpec& spec) {
@@ -211,22 +214,33 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
     problems.add(node.where, name + " is known, not fitted: it must be a plain number");
     return ref;
   }
-  check_keys(node, path, {"value", "fit", "prior_sd"});
+  check_keys(node, path, {"value", "fit", "prior_sd", "exact"});
   const YamlNode* value_node = node.find("value");
   const YamlNode* fit_node = node.find("fit");
   const YamlNode* prior_node = node.find("prior_sd");
+  const YamlNode* exact_node = node.find("exact");
+  NumberSpec positive;
+  positive.lower = 0;
+  positive.lower_open = true;
   std::optional<double> value;
   if (value_node) value = value_of(*value_node, name, spec);
   if (value) parameter.value = *value;
 
   if (!fit_node) {
+    if (exact_node && prior_node)
+      problems.add(prior_node->where, name + " is exact and has a prior_sd", "give one of the two");
+    const bool exact = exact_node && exact_node->is_scalar() && exact_node->text == "true";
+    if (exact) parameter.known_to = {};
+    if (exact_node && !exact && !(exact_node->is_scalar() && exact_node->text == "false"))
+      problems.add(exact_node->where, name + ": exact must be true or false, found " + exact_node->describe());
     if (prior_node)
-      problems.add(prior_node->where, name + " has prior_sd but no fit: a prior needs a fitted parameter",
-                   "add fit: [low, high], or leave prior_sd out");
+      if (const std::optional<double> sd = value_of(*prior_node, name + " prior_sd", positive))
+        parameter.known_to = {*sd, 0};
     if (!value_node)
       problems.add(node.where, name + " needs a value", "write a number or {value: .., fit: [low, high]}");
     return ref;
   }
+  if (exact_node) problems.add(exact_node->where, name + " is fitted and exact", "give one of the two");
   parameter.free = true;
   const bool is_auto = fit_node->is_scalar() && fit_node->text == "auto";
   if (is_auto) {
@@ -273,9 +287,6 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
     }
   }
   if (prior_node) {
-    NumberSpec positive;
-    positive.lower = 0;
-    positive.lower_open = true;
     const std::optional<double> sd = value_of(*prior_node, name + " prior_sd", positive);
     if (!value_node) problems.add(prior_node->where, name + " has prior_sd but no value to centre it on");
     parameter.prior_sd = sd;

@@ -47,6 +47,7 @@ class ConfigReader {
   Problems problems;
   ParameterTable table;
   std::vector<std::string> warnings;
+  std::vector<std::string> misfit;  ///< FitJob::misfit
   /// Range of every number of the config by path, given or defaulted: what `set:` of a micrograph may name.
   std::map<std::string, NumberSpec> specs;
   std::map<std::string, ParameterRef> refs;

@@ -457,7 +457,8 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   if (surround.find("file")) {
     scene.surround_dispersion = read_surround_file(reader, surround);
   } else if (surround.node || *kind == "droplet") {
-    scene.surround_index = reader.number(surround, "index", numbers::index());
+    scene.surround_index = reader.number(surround, "index", described<Scene>("sample.surround.index"));
+    if (reader.table[scene.surround_index].value == 1) reader.table[scene.surround_index].known_to = {};  // air
   } else {
     scene.surround_index = reader.constant("sample.surround.index", numbers::index(), 1.0);
   }

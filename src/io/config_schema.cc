@@ -29,7 +29,8 @@ Json number_schema(const NumberSpec& spec, const std::string& words) {
                           {"properties",
                            {{"value", plain_number(spec)},
                             {"fit", {{"anyOf", std::move(fit)}}},
-                            {"prior_sd", {{"type", "number"}, {"exclusiveMinimum", 0}}}}},
+                            {"prior_sd", {{"type", "number"}, {"exclusiveMinimum", 0}}},
+                            {"exact", {{"type", "boolean"}}}}},
                           {"additionalProperties", false}};
   Json json = {{"description", words + (spec.unit.empty() ? "" : " (" + spec.unit + ")")},
                {"anyOf", {plain_number(spec), parameter}}};

@@ -19,6 +19,7 @@ namespace {
 using namespace page;
 
 std::string badge(const FitResult& result) {
+  if (result.has_answer() && !result.misfit.empty()) return "<span class=\"badge fair\">Answer with misfit</span>";
   if (result.has_answer()) return "<span class=\"badge good\">Answer</span>";
   const char* reason = result.interrupted     ? "interrupted"
                        : !result.converged    ? "not converged"
@@ -77,6 +78,7 @@ std::string report_html(const Config& config, const FitResult& result) {
   for (const Frame& frame : frames) out += frame_section(frame, result, figure, largest_side);
 
   out += "<h2>Parameters</h2>\n" + parameter_table(result) + statistics_section(config, result);
+  out += stated_table(result);
   out += input_table(result);
   out += branch_table(result);
   out += coverage_table(result);

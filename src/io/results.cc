@@ -58,6 +58,18 @@ Json parameter_json(const ParameterEstimate& p) {
   return json;
 }
 
+Json stated_json(const FitResult& result) {
+  Json list = Json::array();
+  for (const StatedNumber& n : result.stated) {
+    Json json = {{"name", n.name}, {"unit", n.unit}, {"value", number(n.stated)}, {"known_to", number(n.known_to)}};
+    json["fitted"] = n.fitted ? Json{{"value", number(n.value)}, {"stderr", number(n.stderr_)}} : Json(nullptr);
+    json["share_of_variance"] = number(n.share);
+    json["of"] = n.most_of.empty() ? Json(nullptr) : Json(n.most_of);
+    list.push_back(std::move(json));
+  }
+  return list;
+}
+
 Json plan_json(const RenderPlan& plan) {
   return {{"method", plan.method},
           {"physics", plan.physics},
@@ -157,6 +169,7 @@ Json inputs_json(const FitResult& result) {
                     {"unit", input.unit},
                     {"value", number(input.value)},
                     {"step", number(input.step)},
+                    {"known_to", number(input.known_to)},
                     {"shift", shift}});
   }
   return list;
@@ -225,6 +238,8 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["config"] = {{"file", printable(config.path.string())}, {"text", config.text}};
   if (!config.fingerprint.empty()) json["fingerprint"] = config.fingerprint;
   json["has_answer"] = result.has_answer();
+  json["grade"] = result.grade();
+  json["misfit"] = result.misfit;
   json["verdict"] = result.verdict;
   json["converged"] = result.converged;
   json["interrupted"] = result.interrupted;
@@ -237,11 +252,13 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["identifiable"] = result.identifiable;
   json["directions"] = directions_json(result);
   json["inputs"] = inputs_json(result);
+  json["stated"] = stated_json(result);
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
   json["coverage"] = coverage_json(result);
   json["correlation"] = matrix(result.names, result.correlation);
   json["covariance"] = matrix(result.names, result.covariance);
+  json["stated_covariance"] = matrix(result.names, result.stated_covariance);
   json["covariance_kind"] = result.covariance_kind;
   json["interval_degrees_of_freedom"] = number(result.interval_degrees_of_freedom);
   json["frame_scatter"] = nullptr;

@@ -26,6 +26,13 @@ Posterior posterior_of(const FitResult& fit) {
   return all;
 }
 
+/// Without what is stated, which all frames have in common and which no number of frames makes smaller.
+Posterior own_posterior_of(const FitResult& fit) {
+  Posterior own = posterior_of(fit);
+  if (fit.stated_covariance.rows() == own.covariance.rows()) own.covariance -= fit.stated_covariance;
+  return marginal(own, own.names) ? own : posterior_of(fit);
+}
+
 /// What the config itself knows of the shared parameters, the same in every frame.
 std::optional<Posterior> shared_prior(const Config& frame, const std::vector<std::string>& names) {
   const std::optional<JointPrior>& joint = frame.job.prior;
@@ -196,14 +203,6 @@ std::string fingerprint_of(const Config& frame) {
   return sha256(facts).substr(0, 16);
 }
 
-std::string verdict_word(const FitResult& result) {
-  if (!result.converged || result.interrupted) return "not converged";
-  if (!result.described) return "not described";
-  if (result.ambiguous) return "ambiguous";
-  if (!result.identifiable) return "not identifiable";
-  return result.pinned ? "at a bound" : "answer";
-}
-
 bool SeriesResult::has_answer() const {
   return std::all_of(frames.begin(), frames.end(), [](const auto& fit) { return fit && fit->has_answer(); });
 }
@@ -227,7 +226,7 @@ SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<
       return !p.limit.empty() && std::find(names.begin(), names.end(), p.name) != names.end();
     });
     if (!fit.has_answer() || limited) continue;
-    if (auto one = marginal(posterior_of(fit), names)) {
+    if (auto one = marginal(own_posterior_of(fit), names)) {
       posteriors.push_back(std::move(*one));
       heard[i] = true;
     }
@@ -237,17 +236,25 @@ SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<
         fmt::format("{} of {} frames say nothing of the shared parameters: they have no answer, or only a limit.",
                     done - posteriors.size(), done));
   if (posteriors.empty()) return result;
-  const SharedEstimate shared = combine(posteriors, shared_prior(load_frame(series, first_readable(series)), names));
+  SharedEstimate shared = combine(posteriors, shared_prior(load_frame(series, first_readable(series)), names));
   if (!shared.consistent)
     result.warnings.push_back(fmt::format(
         "The frames disagree on what they share: chi-square {:.4g} for {} degrees of freedom. Its error is enlarged by "
         "the root of their "
         "ratio; a parameter of each frame's own, or a model error that differs between frames, may be the cause.",
         shared.chi_square, shared.chi_square_degrees));
+  Eigen::MatrixXd stated = Eigen::MatrixXd::Zero(std::ssize(names), std::ssize(names));
   for (std::size_t i = 0; i < heard.size(); ++i) {
     if (!heard[i]) continue;
     FitResult& fit = *result.frames[i];
-    const Posterior all = informed(posterior_of(fit), shared);
+    const Posterior own = own_posterior_of(fit);
+    Posterior all = informed(own, shared);
+    const Eigen::MatrixXd in_common = posterior_of(fit).covariance - own.covariance;
+    all.covariance += in_common;
+    std::vector<Eigen::Index> of_shared;
+    for (const std::string& name : names)
+      of_shared.push_back(std::find(all.names.begin(), all.names.end(), name) - all.names.begin());
+    stated += in_common(of_shared, of_shared) / static_cast<double>(posteriors.size());
     const double t = interval95_factor(all.degrees_of_freedom);
     fit.covariance = all.covariance;
     for (ParameterEstimate& p : fit.parameters) {
@@ -259,6 +266,7 @@ SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<
       p.interval95_high = p.value + t * p.stderr_;
     }
   }
+  shared.posterior.covariance += stated;
   result.shared = shared;
   return result;
 }
@@ -290,7 +298,7 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
       text += "," + (estimate ? cells(*estimate) : ",,,");
     }
     if (fit)
-      text += fmt::format(",{},{},{}\n", cell(fit->reduced_chi_square), verdict_word(*fit),
+      text += fmt::format(",{},{},{}\n", cell(fit->reduced_chi_square), fit->grade(),
                           fit->has_answer() ? "" : csv_field(fit->verdict));
     else
       text += frame.unreadable.empty() ? ",,not done,\n" : ",,unreadable," + csv_field(frame.unreadable) + "\n";

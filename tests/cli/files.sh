@@ -50,13 +50,6 @@ holds() {  # CASE NAME TRUTH
     }
     END { exit !(found && inside) }' "$1.txt" || fail "$1: $2 = $3 is not $(grep -m1 "$2 *=" "$1.txt")"
 }
-# The four pictures of that mosaic were drawn around one middle of their own grids, half a pixel from where a camera's
-# cells have it: to a thousandth.
-near_droplet() {
-  ends "$1" 0
-  awk '$1 ~ "diameter_um$" && $2 == "=" { d = $3 / 9.3 - 1 } $1 ~ "birefringence$" && $2 == "=" { b = $3 / 0.22 - 1 }
-    END { exit !(d * d < 1e-6 && b * b < 1e-6 && d != 0) }' "$1.txt" || fail "$1: not 9.3 and 0.22"
-}
 is_droplet() { ends "$1" 0; holds "$1" diameter_um 9.3; holds "$1" birefringence 0.22; }
 
 # ---- white is zero; masks ---------------------------------------------------------------------------------------------
@@ -96,11 +89,11 @@ ends polarization 2
 says polarization 'analyzer_deg is given beside mosaic: polarization'
 grep -v analyzer_deg polarization.yaml > polarization_four.yaml
 run polarization_four
-near_droplet polarization_four
+is_droplet polarization_four
 grep -qF 'droplet_polarization.tif (135 deg)' polarization_four/fit.json || fail 'polarization_four: no picture at 135 deg'
 sed 's/mosaic: polarization/mosaic: {polarization: [[90, 45], [135, 0]]}/' polarization_four.yaml > polarization_layout.yaml
 run polarization_layout
-near_droplet polarization_layout
+is_droplet polarization_layout
 # The truth is not in another layout, and the picture says so.
 sed 's/mosaic: polarization/mosaic: {polarization: [[0, 45], [135, 90]]}/' polarization_four.yaml > polarization_wrong.yaml
 run polarization_wrong

@@ -167,9 +167,27 @@ TEST_F(Config, RefusesBoundsThatExcludeTheStart) {
 
 TEST_F(Config, AllowsABoundAtThePhysicalLimit) { EXPECT_EQ(mistakes(replaced(kRender, "[8.5, 10]", "[0, 10]")), ""); }
 
-TEST_F(Config, AsksForAFitWhereThereIsAPrior) {
-  EXPECT_NE(mistakes(replaced(kRender, "fit: [0.1, 0.3], ", "")).find("a prior needs a fitted parameter"),
+TEST_F(Config, StatesHowWellANumberIsKnown) {
+  const auto known_to = [&](const std::string& wavelength) {
+    const birefit::Config config =
+        load(replaced(kRender, "wavelength_nm: 590", "wavelength_nm: " + wavelength), ConfigUse::render);
+    const Parameter& p = config.job.parameters[config.scene.microscope.wavelength_nm];
+    return p.known_to.of(p.value);
+  };
+  EXPECT_NEAR(known_to("590"), 0.003 * 590, 1e-12);
+  EXPECT_NEAR(known_to("{value: 600}"), 0.003 * 600, 1e-12);
+  EXPECT_EQ(known_to("{value: 590, prior_sd: 4}"), 4);
+  EXPECT_EQ(known_to("{value: 590, exact: true}"), 0);
+  EXPECT_NE(mistakes(replaced(kRender, "wavelength_nm: 590", "wavelength_nm: {value: 590, exact: true, prior_sd: 1}"))
+                .find("is exact and has a prior_sd"),
             std::string::npos);
+  EXPECT_NE(mistakes(replaced(kRender, "wavelength_nm: 590", "wavelength_nm: {value: 590, exact: quite}"))
+                .find("exact must be true or false"),
+            std::string::npos);
+  EXPECT_NE(
+      mistakes(replaced(kRender, "wavelength_nm: 590", "wavelength_nm: {value: 590, fit: [500, 600], exact: true}"))
+          .find("is fitted and exact"),
+      std::string::npos);
 }
 
 TEST_F(Config, RefusesAliases) {

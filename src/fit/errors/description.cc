@@ -39,6 +39,7 @@ std::string judge_discrepancy(const Task& task, const Optimum& optimum, const In
         100 * missed / contrast);
   }
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    if (task.job.parameters[task.unknowns.table_index(static_cast<int>(j))].nuisance) continue;
     const ParameterEstimate& p = result.parameters[j];
     const double half = 0.5 * (p.interval95_high - p.interval95_low);
     if (p.linear || !p.limit.empty() || !std::isfinite(half)) continue;

@@ -2,23 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <set>
 
+#include "fit/errors/changed_input.h"
 #include "fit/errors/report.h"
 #include "medium/references.h"
 
 namespace birefit::estimation {
 namespace {
 
-/// Known numbers that all micrographs read.
+/// Numbers that all micrographs read and that are taken as exact.
 std::vector<int> shared_inputs(const Task& task) {
   std::map<int, int> readers;
   for (int g = 0; g < task.frames(); ++g) {
     std::set<int> read;
     for_each_ref(task.picture(g).scene, [&](const ParameterRef& ref) {
       if (!ref || task.job.parameters[ref].free) return;
+      if (task.job.parameters[ref].known_to.of(task.job.parameters[ref].value) > 0) return;
       const bool of_a_vector =
           task.job.parameters[ref].name.find(".axis.") != std::string::npos;  // no quantity by itself
       if (!of_a_vector) read.insert(ref.index);
@@ -30,66 +31,6 @@ std::vector<int> shared_inputs(const Task& task) {
     if (number == task.frames()) inputs.push_back(index);
   return inputs;
 }
-
-/// The optimum's own picture as the measurement, and an input that is not what it was made with: what a fit makes of
-/// that, by a part of the pixels. The first order does not tell it where the picture turns by a good part of a fringe,
-/// or where light ends at an edge that lies between pixels: two of its derivatives at one place are as far from it as
-/// they like.
-class ChangedInput {
- public:
-  ChangedInput(const Task& task, const Optimum& optimum, int index, double value)
-      : optimum_(optimum), job_(changed(task.job, index, value)), task_(job_) {
-    std::vector<RenderPlan> plans;
-    std::vector<PixelSet> sets;
-    std::size_t all = 0;
-    for (const Frame& frame : optimum.frames) all += frame.pixels.size();
-    for (int g = 0; g < task.frames(); ++g) {
-      const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
-      const std::size_t share = std::max<std::size_t>(1, kPixels * frame.pixels.size() / std::max<std::size_t>(all, 1));
-      const Image picture = fitted_image(task, optimum.frames, g, optimum.theta);
-      PixelSet set = pixel_set(task.picture(g), frame.sigma, subsample(frame.pixels, share));
-      for (std::size_t i = 0; i < set.pixels.size(); ++i)
-        set.value[static_cast<Eigen::Index>(i)] = picture(set.pixels[i][0], set.pixels[i][1]);
-      sets.push_back(std::move(set));
-      plans.push_back(frame.plan);
-    }
-    problem_ = std::make_unique<LeastSquares>(task_, std::move(plans), std::move(sets));
-    problem_->set_misfit(optimum.problem->misfit());
-  }
-
-  /// Solved for from where the first order leads.
-  Eigen::VectorXd shift(const Task& task, const Eigen::VectorXd& linear) {
-    Eigen::VectorXd searched = optimum_.searched + linear.head(optimum_.searched.size());
-    for (Eigen::Index j = 0; j < searched.size(); ++j) {
-      const Parameter& parameter = task.searched(static_cast<std::size_t>(j));
-      searched[j] = std::clamp(searched[j], parameter.lower, parameter.upper);
-    }
-    SolveOptions few;
-    few.max_iterations = 15;
-    few.function_tolerance = 1e-6;
-    few.interrupted = task.job.options.interrupted;
-    problem_->solve(searched, few);
-    Eigen::VectorXd change(linear.size());
-    for (int j = 0; j < task.unknowns.size(); ++j) {
-      const auto at = static_cast<std::size_t>(task.unknowns.table_index(j));
-      change[j] = problem_->theta()[at] - optimum_.theta[at];
-    }
-    return change;
-  }
-
- private:
-  static FitJob changed(FitJob job, int index, double value) {
-    job.parameters[index].value = value;
-    job.prior.reset();
-    return job;
-  }
-
-  static constexpr std::size_t kPixels = 4000;  // as of a scan
-  const Optimum& optimum_;
-  FitJob job_;
-  Task task_;
-  std::unique_ptr<LeastSquares> problem_;
-};
 
 }  // namespace
 
@@ -104,18 +45,22 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const Parameter& p = task.job.parameters[inputs[k]];
     const double value = optimum.theta[static_cast<std::size_t>(inputs[k])];
-    InputEffect effect{p.name, p.unit, value, p.unit == "deg" || p.unit == "px" ? 1.0 : 0.01 * std::abs(value), {}};
+    InputEffect effect{p.name, p.unit, value, step_of(p.unit, value), 0, {}};
     if (!(effect.step > 0)) continue;
     Eigen::VectorXd shift =
         optimum.problem->shift_by(effect.step * columns.col(static_cast<Eigen::Index>(k)), of_noise.covariance);
     constexpr double kOfNote = 0.5;  // standard errors: what is less is not named
     const bool of_note = (shift.array().abs() > kOfNote * sd).head(optimum.searched.size()).any();
     if (shift.allFinite() && of_note && determined)
-      shift = ChangedInput(task, optimum, inputs[k], value + effect.step).shift(task, shift);
+      shift = shift_by_input(task, optimum, inputs[k], value + effect.step, shift);
     if (!shift.allFinite()) continue;
     effect.shift.assign(shift.begin(), shift.end());
     effects.push_back(std::move(effect));
   }
+  result.inputs.insert(result.inputs.end(), effects.begin(), effects.end());
+}
+
+void keep_inputs_of_note(const Task& task, FitResult& result) {
   const auto weight = [&](const InputEffect& effect) {
     double most = 0;
     for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)
@@ -123,10 +68,9 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
     return most;
   };
   constexpr double kOfNote = 0.1;
-  std::erase_if(effects, [&](const InputEffect& effect) { return weight(effect) < kOfNote; });
-  std::stable_sort(effects.begin(), effects.end(),
+  std::erase_if(result.inputs, [&](const InputEffect& effect) { return weight(effect) < kOfNote; });
+  std::stable_sort(result.inputs.begin(), result.inputs.end(),
                    [&](const InputEffect& a, const InputEffect& b) { return weight(a) > weight(b); });
-  result.inputs = std::move(effects);
 }
 
 }  // namespace birefit::estimation

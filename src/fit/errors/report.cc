@@ -61,6 +61,8 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
     words += ", and the error of wave propagation" + std::string(propagation.cols() > 1 ? " and of sampling" : "") +
              " by the exact image of a radial twin";
   if (left_out.by_curved_rays) words += ", and what curved rays would change";
+  if (covariances.stated.shift.size() > 0 && !covariances.stated.shift.isZero(0))
+    words += ", and what is stated and not known exactly";
   if (left_out.by_waves) words += ", and what rays lose of a wave-optical image";
   return words;
 }
@@ -95,6 +97,34 @@ std::optional<double> scatter_of_frames(const Task& task, const Optimum& optimum
   return std::hypot(found.frame_sd, found.lamp_jitter * std::sqrt(light));
 }
 
+/// A rival that lies inside the intervals makes no answer ambiguous, and one that is close by becomes part of them:
+/// with either as likely as the other the variance is that of both together.
+void take_in_close_rivals(const Task& task, FitResult& result) {
+  constexpr double kCloseBy = 4, kOfValue = 0.02;  // half-widths; the hull is then three, or a hundredth of the value
+  const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
+  result.ambiguous = false;
+  for (RivalMinimum& rival : result.rivals) {
+    if (!rival.counts) continue;
+    Eigen::VectorXd change = Eigen::VectorXd::Zero(task.unknowns.size());
+    bool inside = true, close = true;
+    for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j) {
+      if (task.searched(j).nuisance) continue;
+      const auto index = static_cast<std::size_t>(task.unknowns.searched[j]);
+      const auto row = static_cast<Eigen::Index>(j);
+      change[row] = rival.theta[index] - result.theta[index];
+      const double half = t * std::sqrt(result.covariance(row, row)), away = std::abs(change[row]);
+      inside = inside && away <= half;
+      close = close && (away <= kCloseBy * half || away + 2 * half <= kOfValue * std::abs(result.theta[index]));
+    }
+    if (!close) {
+      result.ambiguous = true;
+      continue;
+    }
+    rival.counts = false;
+    if (!inside) result.covariance += 0.25 * change * change.transpose();
+  }
+}
+
 }  // namespace
 
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation) {
@@ -119,6 +149,14 @@ void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& 
   covariance = wider.asDiagonal() * covariance * wider.asDiagonal();
 }
 
+void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covariances) {
+  if (optimum.stopped || task.unknowns.searched.empty()) return;
+  Stated stated = stated_numbers(task, optimum, covariances.of_noise.covariance);
+  if (!stated.shift.allFinite()) return;
+  covariances.with_misfit.covariance += stated.shift * stated.shift.transpose();
+  covariances.stated = std::move(stated);
+}
+
 FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
                  Covariances covariances, bool beaten) {
   FitResult result;
@@ -128,7 +166,6 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.iterations = optimum.iterations;
   result.scans = minima.scan.traces;
   result.identifiable = optimum.possible;
-  result.ambiguous = rivals.ambiguous;
   result.rivals = std::move(rivals.minima);
   result.warnings = optimum.warnings;
   result.taken_as_exact = task.job.taken_as_exact;
@@ -149,6 +186,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
     if (change) covariance += *change * change->transpose();
   result.log_share = log_share(projected_information(*optimum.problem), task.job, task.unknowns);
   result.covariance = covariance;
+  take_in_close_rivals(task, result);
   result.covariance_kind = covariance_words(task, optimum, covariances, left_out);
 
   report_parameters(task, optimum, covariances.of_noise, result);
@@ -163,6 +201,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   std::string misfit;
   if (covariances.discrepancy && result.described)
     misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
+  report_stated(task, optimum, covariances, result);
+  keep_inputs_of_note(task, result);
   report_micrographs(task, optimum, result);
   collect_warnings(task, optimum, result);
   compare_strips(task, optimum, result);
@@ -171,6 +211,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.evaluations = optimum.evaluations + optimum.problem->evaluations();
   // Since then, too: profiles and warnings may be half done.
   if (task.interrupted()) result.interrupted = true, result.converged = false;
+  leave_nuisances(task, result);
+  judge_misfit(task, optimum, covariances, result);
   result.verdict = (misfit.empty() ? "" : misfit + " ") + verdict(result, signal);
   return result;
 }

@@ -4,6 +4,7 @@
 
 #include "fit/errors/left_out.h"
 #include "fit/errors/rivals.h"
+#include "fit/errors/stated.h"
 #include "fit/errors/statistics.h"
 
 namespace birefit::estimation {
@@ -15,12 +16,15 @@ struct Covariances {
   Inverse with_misfit;       ///< and what propagation errs by, and what the residual holds along the parameters
   double along = 1;          ///< largest factor on a standard error by the latter
   bool discrepancy = false;  ///< one is left over, and what one of its size could do is in `with_misfit`
+  Stated stated;             ///< what it would be to state these otherwise is in `with_misfit`, too
 };
 /// `propagation`: LeftOut::propagation.
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);
 /// Adds what a discrepancy could do. After what better models would change is foretold: that is judged in units of the
 /// errors without it.
 void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances);
+/// Adds what numbers that nobody knows exactly could do.
+void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covariances);
 
 /// Everything that is to be said of a fit. `beaten`: another branch has won, so that this one was not finished.
 FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
@@ -31,7 +35,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
 /// Values, standard errors, limits, intervals, with the result's covariance and interval_degrees_of_freedom. Moves the
 /// problem and brings it back.
 void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noise, FitResult& result);
-/// What the fit takes as exact, and what the estimates owe to it.
+/// result.inputs: what the fit takes as exact, and what the estimates owe to it.
 void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result);
 /// Does the model describe the images at all? False: an image without structure is as good, compared in units of the
 /// misfit (an F test), with what the freedom of the model and the number of `places` the scan looked at gain by chance.
@@ -42,6 +46,14 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
 /// that it, and not noise alone, leaves next to unknown. Says why in a sentence, with result.described = false; else
 /// nothing.
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result);
+/// Those that matter beside the errors, largest first.
+void keep_inputs_of_note(const Task& task, FitResult& result);
+/// result.stated, from those that were paid for and those that were fitted, and result.inputs by them.
+void report_stated(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result);
+/// Takes nuisances out of parameters, covariance and all that goes by their order: they are in result.stated.
+void leave_nuisances(const Task& task, FitResult& result);
+/// Fills result.misfit: why an answer is one with misfit.
+void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result);
 void report_micrographs(const Task& task, const Optimum& optimum, FitResult& result);
 /// Where strips of a bar, plate or disc that the model does not describe tell different things: result.strips, a
 /// warning, and a region where frames scatter far less than elsewhere and chi-square is below its median.

@@ -62,7 +62,6 @@ Rivals weigh_rivals(const Task& task, Optimum& optimum) {
       minimum.theta = problem.theta();
       for (int g = 0; g < task.frames(); ++g) minimum.chi_square += problem.frame_misfit(g).chi_square;
       minimum.chi_square += problem.prior_chi_square();
-      rivals.ambiguous = rivals.ambiguous || minimum.counts;
       rivals.minima.push_back(std::move(minimum));
     }
     std::stable_sort(rivals.minima.begin(), rivals.minima.end(),

@@ -7,7 +7,6 @@ namespace birefit::estimation {
 
 struct Rivals {
   std::vector<RivalMinimum> minima;  ///< best first
-  bool ambiguous = false;
 };
 
 /// Minima that survived the scan, with the weights of the final problem: misfit is paid for in the odds as well. The

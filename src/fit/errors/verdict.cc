@@ -124,6 +124,8 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
       const double of_data_a = std::sqrt(inverse.covariance(a, a)), of_data_b = std::sqrt(inverse.covariance(b, b)),
                    correlation = inverse.covariance(a, b) / (of_data_a * of_data_b);
       if (!(std::abs(correlation) > kTogether)) continue;
+      const auto is_nuisance = [&](int j) { return job.parameters[unknowns.table_index(j)].nuisance; };
+      if (is_nuisance(a) || is_nuisance(b)) continue;  // what it is known to ends the valley
       if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) continue;  // the prior's own correlation
       if (!(of_data_a > kValley * inverse.conditional_sd[a] && of_data_b > kValley * inverse.conditional_sd[b]))
         continue;
@@ -247,10 +249,16 @@ void say_values(const FitResult& result, bool signal, Sentences& sentences) {
   }
 }
 
-/// The inputs whose error would be the estimates'.
-void say_inputs(const FitResult& result, bool signal, Sentences& sentences) {
+/// Why an answer is one with misfit.
+void say_misfit(const FitResult& result, Sentences& sentences) {
+  if (!result.misfit.empty()) sentences.push_back("With misfit: " + joined(result.misfit, "; and ") + ".");
+}
+
+/// The inputs whose error would be the estimates', those that are taken as exact or those that are not.
+void say_inputs(const FitResult& result, bool signal, bool exact, Sentences& sentences) {
   std::vector<std::string> inputs;
   for (const InputEffect& input : result.inputs) {
+    if ((input.known_to == 0) != exact) continue;
     int most = -1;
     double weight = 0.5;  // standard errors
     for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
@@ -262,13 +270,17 @@ void say_inputs(const FitResult& result, bool signal, Sentences& sentences) {
     const ParameterEstimate& p = result.parameters[most];
     const double shift = input.shift[static_cast<std::size_t>(most)];
     const bool of_value = p.unit != "deg" && std::abs(p.value) > 10 * p.stderr_;  // what may be zero has no per cent
-    inputs.push_back(fmt::format("{} more of {} makes {} {}",
-                                 input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %", input.name,
-                                 name_of(result, most),
-                                 of_value ? fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value))
-                                          : fmt::format("{:+.2g}{}", shift, unit_suffix(p))));
+    inputs.push_back(
+        fmt::format("{} more of {} makes {} {}", input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %",
+                    input.name, name_of(result, most),
+                    of_value ? fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value))
+                             : fmt::format("{:+.2g}{}", shift, unit_suffix(p))) +
+        (exact ? ""
+               : fmt::format(" (known to {:.2g}{}{})", input.known_to, input.unit.empty() ? "" : " ", input.unit)));
   }
-  if (signal && !inputs.empty()) sentences.push_back("Taken as exact: " + joined(inputs) + ".");
+  if (signal && !inputs.empty())
+    sentences.push_back((exact ? "Taken as exact: " : "In the errors, as well as it is known: ") + joined(inputs) +
+                        ".");
 }
 
 }  // namespace
@@ -288,7 +300,9 @@ std::string verdict(const FitResult& result, bool signal) {
         : result.reduced_chi_square > 2
             ? std::string(": the model does not describe the ") + (rows ? "signal" : "image") + " within its noise"
             : ""));
-  say_inputs(result, signal, sentences);
+  say_misfit(result, sentences);
+  say_inputs(result, signal, false, sentences);
+  say_inputs(result, signal, true, sentences);
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
   return text;

@@ -79,13 +79,17 @@ void warn_of_misfit(const MicrographResult& micrograph, double range_of_all, dou
   const double percent = range > 0 ? 100 * micrograph.residual_rms / range : 0,
                reduced = micrograph.chi_square / std::max(1, micrograph.used);
   if (!(reduced > 2)) return;
-  warn(result,
-       fmt::format("{}: the model does not describe the image within its noise (reduced chi-square {:.3g}, residual "
-                   "{:.2g} % of the signal range){}",
-                   micrograph.name, reduced, percent,
-                   percent > 15
-                       ? ": so large a misfit means that the model is wrong or incomplete; do not trust the values."
-                       : "; the errors allow for it as far as the residuals show it."));
+  warn(
+      result,
+      fmt::format("{}: the model does not describe the image within its noise (reduced chi-square {:.3g}, residual "
+                  "{:.2g} % of the signal range){}",
+                  micrograph.name, reduced, percent,
+                  percent > 15 && !result.described
+                      ? ": so large a misfit means that the model is wrong or incomplete; do not trust the values."
+                  : percent > 15
+                      ? ": so large a misfit means that the model is incomplete; the errors allow for it as far as the "
+                        "residuals show it."
+                      : "; the errors allow for it as far as the residuals show it."));
 }
 
 /// The rows of one table together.
@@ -98,13 +102,17 @@ void warn_of_misfit(const std::string& name, const Rows& rows, FitResult& result
       rows.high > rows.low ? 100 * std::sqrt(rows.squares / rows.number) / (rows.high - rows.low) : 0;
   if (rows.chi_square / rows.number > 2 && rows.number > 3)
     warn(result,
-         fmt::format("{}: the model does not describe the signal within its noise (reduced chi-square {:.3g}, residual "
-                     "{:.2g} % of the "
-                     "signal's spread){}",
-                     name, rows.chi_square / rows.number, percent,
-                     percent > 5
-                         ? ": a curve this far off is another one, or its label is wrong; do not trust the values."
-                         : "; the errors allow for it as far as the residuals show it."));
+         fmt::format(
+             "{}: the model does not describe the signal within its noise (reduced chi-square {:.3g}, residual "
+             "{:.2g} % of the "
+             "signal's spread){}",
+             name, rows.chi_square / rows.number, percent,
+             percent > 5 && !result.described
+                 ? ": a curve this far off is another one, or its label is wrong; do not trust the values."
+             : percent > 5
+                 ? ": a curve this far off may be another one, or its label wrong; the errors allow for it as far "
+                   "as the residuals show it."
+                 : "; the errors allow for it as far as the residuals show it."));
 }
 
 /// What is said of several micrographs in the same words ("NAME: words") is one line.
@@ -182,7 +190,8 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
   }
   for (const auto& [name, rows] : tables) warn_of_misfit(name, rows, result);
   for (const ParameterEstimate& estimate : result.parameters)
-    if (estimate.prior_sd && estimate.stderr_ > 0.98 * *estimate.prior_sd)
+    if (estimate.prior_sd && !task.job.parameters[task.job.parameters.find(estimate.name)].nuisance &&
+        estimate.stderr_ > 0.98 * *estimate.prior_sd)
       warn(result, fmt::format("The image adds nothing to the prior on {}.", estimate.name));
   result.warnings = with_shared_lines(task, result.warnings);
 }

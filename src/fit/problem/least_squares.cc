@@ -7,6 +7,8 @@
 #include <memory>
 #include <numbers>
 #include <set>
+#include <tuple>
+#include <utility>
 
 #include "birefit/render.h"
 #include "core/threads.h"
@@ -50,6 +52,17 @@ void for_parts(Eigen::Index rows, int threads, const Body& body) {
     const Eigen::Index begin = part * kTileRows;
     body(static_cast<std::size_t>(part), begin, std::min(kTileRows, rows - begin));
   });
+}
+
+/// -2 ln of Student's t with four degrees of freedom where it is wider than the normal distribution, which it follows
+/// up to one standard deviation: its signed root, so that squares add up, and the root's derivative. A nuisance that
+/// pictures contradict is let go of; a normal prior would hold it and move all others.
+std::pair<double, double> student_root(double z) {
+  const double away = std::abs(z);
+  if (away <= 1) return {z, 1};
+  constexpr double kFreedom = 4;
+  const double root = std::sqrt(1 + (kFreedom + 1) * std::log((kFreedom + z * z) / (kFreedom + 1)));
+  return {std::copysign(root, z), (kFreedom + 1) * away / ((kFreedom + z * z) * root)};
 }
 
 int position(const std::vector<int>& indices, int index) {
@@ -154,6 +167,7 @@ void LeastSquares::set_priors() {
     if (!parameter.prior_sd) continue;
     rows.push_back(Eigen::RowVectorXd::Unit(n, j) / *parameter.prior_sd);
     target.push_back(parameter.value / *parameter.prior_sd);
+    student_.push_back(parameter.nuisance);
   }
   if (job_.prior && !job_.prior->names.empty()) {
     const JointPrior& prior = *job_.prior;
@@ -172,6 +186,7 @@ void LeastSquares::set_priors() {
       }
       rows.push_back(row);
       target.push_back(mean);
+      student_.push_back(false);
     }
   }
   prior_root_.resize(static_cast<Eigen::Index>(rows.size()), n);
@@ -180,6 +195,7 @@ void LeastSquares::set_priors() {
     prior_root_.row(static_cast<Eigen::Index>(i)) = rows[i];
     prior_target_[static_cast<Eigen::Index>(i)] = target[i];
   }
+  prior_slope_ = Eigen::VectorXd::Ones(prior_root_.rows());
 }
 
 /// Intensity of a frame's used pixels and its derivatives by table entries.
@@ -271,6 +287,26 @@ Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change,
   return -covariance * pull;
 }
 
+LeastSquares::Beside LeastSquares::beside(Eigen::MatrixXd columns) const {
+  const Eigen::Index n = unknowns_.size(), k = columns.cols();
+  Beside sums{Eigen::MatrixXd::Zero(k, k), Eigen::MatrixXd::Zero(n, k), Eigen::VectorXd::Zero(k)};
+  for (const Frame& frame : frames_) {
+    auto part = columns.middleRows(frame.begin, frame.count);
+    const Eigen::VectorXd gain = light(frame, true, 0, frame.count);
+    for (Eigen::Index j = 0; j < k; ++j) part.col(j).array() *= gain.array();
+    whiten(frame, part, thread_count(job_.options.threads));
+  }
+  for (const Tile& tile : tiles_) {
+    if (tile.micrograph < 0) continue;
+    const Eigen::Index begin = frames_[tile.micrograph].begin + tile.begin;
+    const auto here = columns.middleRows(begin, tile.count);
+    sums.among += here.transpose() * here;
+    sums.with_unknowns += full_rows(tile).transpose() * here;
+    sums.with_residual += here.transpose() * residual_.segment(begin, tile.count);
+  }
+  return sums;
+}
+
 /// Sum of the coefficients of the intensity, or of those by themselves, at these pixels.
 Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity, Eigen::Index begin,
                                     Eigen::Index rows) const {
@@ -338,7 +374,8 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
     });
     whiten(frame, searched_columns_.middleRows(frame.begin, frame.count), threads);
   });
-  if (prior_root_.rows() > 0) searched_columns_.bottomRows(prior_root_.rows()) = prior_root_.leftCols(p);
+  if (prior_root_.rows() > 0)
+    searched_columns_.bottomRows(prior_root_.rows()) = prior_slope_.asDiagonal() * prior_root_.leftCols(p);
 
   // How the freely solved linear unknowns follow: projection = (X^T X)^-1 X^T D.
   projection_ = Eigen::MatrixXd::Zero(l, p);
@@ -431,9 +468,11 @@ void LeastSquares::solve_linear() {
           residual += coefficient * term.whitened.segment(begin, rows);
     });
   });
-  if (prior_root_.rows() > 0)
-    residual_.tail(prior_root_.rows()) =
-        prior_root_.leftCols(p) * searched + prior_root_.rightCols(l) * linear - prior_target_;
+  if (prior_root_.rows() == 0) return;
+  auto of_priors = residual_.tail(prior_root_.rows());
+  of_priors = prior_root_.leftCols(p) * searched + prior_root_.rightCols(l) * linear - prior_target_;
+  for (Eigen::Index i = 0; i < of_priors.size(); ++i)
+    if (student_[static_cast<std::size_t>(i)]) std::tie(of_priors[i], prior_slope_[i]) = student_root(of_priors[i]);
 }
 
 /// Triangular factor of the rows that rows_of(tile) gives, of some tiles at a time and then of those factors.
@@ -474,7 +513,7 @@ Eigen::MatrixXd LeastSquares::projected_factor(const Eigen::VectorXd& scale) con
 
 Eigen::MatrixXd LeastSquares::full_rows(const Tile& tile) const {
   const Eigen::Index p = searched_size();
-  if (tile.micrograph < 0) return prior_root_;
+  if (tile.micrograph < 0) return prior_slope_.asDiagonal() * prior_root_;
   const Frame& frame = frames_[tile.micrograph];
   const Eigen::Index begin = frame.begin + tile.begin;
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(tile.count, unknowns_.size());

@@ -100,6 +100,13 @@ class LeastSquares {
   /// By how much the unknowns at the optimum change when the model's intensity does by this at every pixel; to first
   /// order.
   Eigen::VectorXd shift_by(const Eigen::VectorXd& intensity_change, const Eigen::MatrixXd& covariance) const;
+  /// What the rows have in common with further columns, d(intensity of every pixel)/d(something else), by the weights
+  /// of the problem: the columns among themselves, with the unknowns' (searched first) and with the residual.
+  struct Beside {
+    Eigen::MatrixXd among, with_unknowns;
+    Eigen::VectorXd with_residual;
+  };
+  Beside beside(Eigen::MatrixXd intensity_columns) const;
   /// Of the model intensity over all used pixels of a micrograph.
   std::array<double, 2> intensity_range(int micrograph) const;
   /// Sum of squares of the prior rows.
@@ -161,6 +168,8 @@ class LeastSquares {
   Eigen::Index pixel_rows_ = 0;
   Eigen::MatrixXd prior_root_;    ///< whitening of all unknowns' deviation from the prior means
   Eigen::VectorXd prior_target_;  ///< prior_root_ * means
+  std::vector<bool> student_;     ///< of each of those rows: with the tails of Student's t
+  Eigen::VectorXd prior_slope_;   ///< d(residual of the row)/d(its deviation), at the last evaluated point; else 1
 
   Theta theta_;
   Eigen::VectorXd intensity_;  ///< raw

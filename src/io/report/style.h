@@ -6,7 +6,8 @@ namespace birefit::page {
 inline constexpr const char* kStyle = R"css(
 :root { --ink: #1d2127; --soft: #5b626c; --line: #d9dde2; --paper: #fff; --accent: #2166ac; color-scheme: light dark;
   --quiet: #3c434d; --pre: #f6f7f9; --warn: #fdf8ec; --warn-line: #d9a441; --good: #1c6b3f; --good-line: #9cc9ae;
-  --good-back: #f1f8f3; --bad: #9b2c1f; --bad-line: #dfaaa2; --bad-back: #fcf3f1; }
+  --good-back: #f1f8f3; --fair: #7a4b00; --fair-line: #e0bf7e;
+  --fair-back: #fdf6e6; --bad: #9b2c1f; --bad-line: #dfaaa2; --bad-back: #fcf3f1; }
 * { box-sizing: border-box; }
 html { -webkit-text-size-adjust: 100%; }
 body { margin: 0; background: var(--paper); color: var(--ink); line-height: 1.5; font-size: 16px;
@@ -27,6 +28,7 @@ p { margin: 0 0 10px; max-width: 46em; }
 .badge { flex: none; font-size: 12px; font-weight: 600; padding: 3px 10px; border-radius: 999px; border: 1px solid;
   white-space: nowrap; }
 .good { color: var(--good); border-color: var(--good-line); background: var(--good-back); }
+.fair { color: var(--fair); border-color: var(--fair-line); background: var(--fair-back); }
 .bad { color: var(--bad); border-color: var(--bad-line); background: var(--bad-back); }
 .key { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr)); gap: 0; margin: 0 0 8px;
   border-top: 1px solid var(--line);
@@ -86,6 +88,7 @@ td code { font-size: 11px; overflow-wrap: anywhere; white-space: normal; }
   :root { --ink: #e4e7eb; --soft: #a3abb6; --line: #353b43; --paper: #15181c; --accent: #7db5ea; --quiet: #c3cad4;
     --pre: #1d2126; --warn: #2b2413; --warn-line: #b98a35; --good: #86d3a4; --good-line: #2f6b47;
   --good-back: #14251b;
+    --fair: #eec275; --fair-line: #7a5a1f; --fair-back: #2a2010;
     --bad: #f0988c; --bad-line: #7d3a32; --bad-back: #2b1614; }
   svg [fill="#2b2f36"] { fill: var(--ink); }
   svg [stroke="#2b2f36"], svg [stroke="#5b626c"] { stroke: var(--ink); }

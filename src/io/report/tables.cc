@@ -148,20 +148,20 @@ std::string input_table(const FitResult& result) {
         std::isfinite(result.parameters[j].stderr_))
       shown.push_back(j);
   if (shown.empty()) return {};
-  std::string out = result.inputs.empty() && result.taken_as_exact.empty() ? "" : "<h2>Taken as exact</h2>\n";
+  std::string out = result.inputs.empty() && result.taken_as_exact.empty() ? "" : "<h2>What the values hang on</h2>\n";
   if (!result.taken_as_exact.empty()) out += list(result.taken_as_exact);
   if (result.inputs.empty()) return out;
   out +=
-      "<p>What the estimates would change by if an input were otherwise; in brackets over the standard error. An input "
-      "with a "
-      "<code>prior_sd</code> is fitted, and its uncertainty counted.</p>\n<div "
-      "class=\"scroll\"><table>\n<tr><th>input</th><th>value</th><th>more by</th>";
+      "<p>What the estimates would change by if what was stated were otherwise; in brackets over the standard error. "
+      "What is known to some standard deviation is in the errors; what is exact is not.</p>\n<div "
+      "class=\"scroll\"><table>\n<tr><th>input</th><th>value</th><th>known to</th><th>more by</th>";
   for (const std::size_t j : shown) out += "<th>" + escape_html(short_name(result.parameters[j].name)) + "</th>";
   out += "</tr>\n";
   for (std::size_t i = 0; i < std::min(kMostInputs, result.inputs.size()); ++i) {
     const InputEffect& input = result.inputs[i];
-    out += fmt::format("<tr><td class=\"name\">{}</td><td>{} {}</td><td>{}</td>", escape_html(input.name),
+    out += fmt::format("<tr><td class=\"name\">{}</td><td>{} {}</td><td>{}</td><td>{}</td>", escape_html(input.name),
                        html_number(fmt::format("{:.6g}", input.value)), escape_html(input.unit),
+                       input.known_to > 0 ? html_number(fmt::format("{:.2g}", input.known_to)) : "exact",
                        input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %");
     for (const std::size_t j : shown) {
       const ParameterEstimate& p = result.parameters[j];
@@ -172,6 +172,25 @@ std::string input_table(const FitResult& result) {
     out += "</tr>\n";
   }
   return out + "</table></div>\n";
+}
+
+/// Numbers of the instrument that the picture knows better than whoever stated them.
+std::string stated_table(const FitResult& result) {
+  std::string rows;
+  for (const StatedNumber& n : result.stated)
+    if (n.fitted)
+      rows +=
+          fmt::format("<tr><td class=\"name\">{}</td><td>{} \u00b1 {} {}</td><td>{} \u00b1 {}</td><td>{}</td></tr>\n",
+                      escape_html(n.name), html_number(fmt::format("{:.6g}", n.stated)),
+                      html_number(fmt::format("{:.2g}", n.known_to)), escape_html(n.unit),
+                      html_number(fmt::format("{:.6g}", n.value)), html_number(fmt::format("{:.2g}", n.stderr_)),
+                      html_number(fmt::format("{:+.1f}", n.away())));
+  if (rows.empty()) return {};
+  return "<h2>The instrument, as the picture has it</h2>\n<p>Stated, not known exactly, and fitted along; the last "
+         "column "
+         "is how far off in standard deviations of what was stated. Beyond three it is contradicted.</p>\n<div "
+         "class=\"scroll\"><table>\n<tr><th>number</th><th>stated</th><th>found</th><th>away</th></tr>\n" +
+         rows + "</table></div>\n";
 }
 
 std::string coverage_table(const FitResult& result) {

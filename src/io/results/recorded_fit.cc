@@ -33,6 +33,15 @@ ParameterEstimate estimate_of(const std::string& name, const json& entry) {
   return p;
 }
 
+Eigen::MatrixXd matrix_of(const json& rows, std::size_t size) {
+  const auto n = static_cast<Eigen::Index>(size);
+  Eigen::MatrixXd matrix(n, n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j)
+      matrix(i, j) = number(rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)));
+  return matrix;
+}
+
 FitResult fit_of(const json& root) {
   FitResult fit;
   fit.converged = root.at("converged");
@@ -49,12 +58,9 @@ FitResult fit_of(const json& root) {
   fit.degrees_of_freedom = root.at("degrees_of_freedom");
   fit.warnings = root.at("warnings");
   fit.names = root.at("covariance").at("names");
-  const json& matrix = root.at("covariance").at("matrix");
-  const auto n = static_cast<Eigen::Index>(fit.names.size());
-  fit.covariance.resize(n, n);
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j)
-      fit.covariance(i, j) = number(matrix.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)));
+  fit.covariance = matrix_of(root.at("covariance").at("matrix"), fit.names.size());
+  fit.stated_covariance = matrix_of(root.at("stated_covariance").at("matrix"), fit.names.size());
+  fit.misfit = root.at("misfit");
   for (const std::string& name : fit.names) fit.parameters.push_back(estimate_of(name, root.at("parameters").at(name)));
   return fit;
 }

@@ -1,0 +1,209 @@
+#include "fit/errors/stated.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "fit/errors/changed_input.h"
+#include "fit/errors/statistics.h"
+#include "medium/references.h"
+
+namespace birefit::estimation {
+namespace {
+
+/// Read by every frame, not fitted, and not exact. What frames or rows have for themselves, as a spectrum its
+/// wavelengths, is exact: were each free, they would describe anything.
+std::vector<int> uncertain(const Task& task) {
+  std::map<int, int> readers;
+  for (int g = 0; g < task.frames(); ++g) {
+    std::set<int> read;
+    for_each_ref(task.picture(g).scene, [&](const ParameterRef& ref) {
+      if (!ref || task.job.parameters[ref].free) return;
+      if (task.job.parameters[ref].known_to.of(task.job.parameters[ref].value) > 0) read.insert(ref.index);
+    });
+    for (const int index : read) ++readers[index];
+  }
+  std::vector<int> found;
+  for (const auto& [index, number] : readers)
+    if (number == task.frames()) found.push_back(index);
+  return found;
+}
+
+/// What the weights of the problem have been divided by for what noise does not explain.
+double beyond_noise(const Optimum& optimum) {
+  double largest = 1;
+  for (const Misfit& misfit : optimum.problem->misfit()) largest = std::max(largest, misfit.shape_variance);
+  return largest;
+}
+
+/// First order alone.
+Stated linear_in(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance) {
+  Stated stated;
+  stated.index = uncertain(task);
+  const auto k = static_cast<Eigen::Index>(stated.index.size());
+  stated.sd.resize(k);
+  for (Eigen::Index i = 0; i < k; ++i) {
+    const int index = stated.index[static_cast<std::size_t>(i)];
+    stated.sd[i] = task.job.parameters[index].known_to.of(optimum.theta[static_cast<std::size_t>(index)]);
+  }
+  const LeastSquares::Beside sums = optimum.problem->beside(optimum.problem->intensity_by(stated.index));
+  const auto units = stated.sd.asDiagonal();
+  stated.shift = -covariance * sums.with_unknowns * units;
+  stated.information = units * (sums.among - sums.with_unknowns.transpose() * covariance * sums.with_unknowns) * units;
+  stated.pull = units * sums.with_residual;
+  return stated;
+}
+
+/// The depth of field of an objective on light of a wavelength in what is around the sample.
+double depth_of_field_um(const FitJob& job, const Scene& scene) {
+  constexpr double kLeast = 0.3;  // by eye
+  const auto value = [&](ParameterRef ref, double otherwise) { return ref ? job.parameters[ref].value : otherwise; };
+  const double na = value(scene.microscope.objective_na, 1), index = value(scene.surround_index, 1),
+               wavelength_um = 1e-3 * value(scene.microscope.wavelength_nm, 0);
+  return std::max(kLeast, wavelength_um * index / (2 * na * na));
+}
+
+bool may_be_out_of_focus(const FitJob& job, const Scene& scene) {
+  const ParameterRef na = scene.microscope.objective_na;
+  return job.demand.ceiling == Ceiling::wave && na && !scene.microscope.focus_um && !job.parameters[na].free &&
+         job.parameters[na].known_to.of(job.parameters[na].value) > 0;
+}
+
+/// A place of the narrow problem in the wider one.
+Eigen::VectorXd widened(const Task& wider, const Task& narrow, const Theta& theta, const Eigen::VectorXd& searched) {
+  const Theta all = narrow.with(theta, searched);
+  Eigen::VectorXd place(static_cast<Eigen::Index>(wider.unknowns.searched.size()));
+  for (Eigen::Index j = 0; j < place.size(); ++j) {
+    const auto index = static_cast<std::size_t>(wider.unknowns.searched[static_cast<std::size_t>(j)]);
+    place[j] = std::clamp(all[index], wider.searched(static_cast<std::size_t>(j)).lower,
+                          wider.searched(static_cast<std::size_t>(j)).upper);
+  }
+  return place;
+}
+
+}  // namespace
+
+Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance) {
+  Stated stated = linear_in(task, optimum, covariance);
+  const Eigen::ArrayXd sd = covariance.diagonal().array().cwiseMax(0).sqrt();
+  if (by_waves(optimum.frames)) return stated;  // a fit is too dear
+  for (Eigen::Index i = 0; i < stated.sd.size(); ++i) {
+    const Eigen::VectorXd linear = stated.shift.col(i);
+    constexpr double kOfNote = 0.5;  // standard errors
+    if (!linear.allFinite() || !(linear.array().abs() > kOfNote * sd).head(optimum.searched.size()).any()) continue;
+    const int index = stated.index[static_cast<std::size_t>(i)];
+    const double value = optimum.theta[static_cast<std::size_t>(index)] + stated.sd[i];
+    const Eigen::VectorXd shift = shift_by_input(task, optimum, index, value, linear);
+    if (shift.allFinite()) stated.shift.col(i) = shift;
+  }
+  return stated;
+}
+
+WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
+  if (optimum.stopped || task.unknowns.searched.empty()) return {};
+  const Inverse inverse = invert_normal_equations(optimum.problem->factor());
+  if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return {};
+  const Stated stated = linear_in(task, optimum, inverse.covariance);
+  const Eigen::Index k = stated.sd.size();
+  if (k == 0 || !stated.shift.allFinite() || !stated.information.allFinite()) return {};
+  const double unit = beyond_noise(optimum);
+  const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(k, k), information = unit * stated.information;
+  const Eigen::LDLT<Eigen::MatrixXd> both(prior + information);
+  const Eigen::VectorXd pull = unit * stated.pull;
+  constexpr double kTold = 0.05, kBetter = 9, kWider = 1.2;
+  WorthFitting told;
+  for (Eigen::Index i = 0; i < k; ++i)
+    if (information(i, i) > kTold) told.numbers.push_back(stated.index[static_cast<std::size_t>(i)]);
+  // By chance each lowers chi-square by one at most.
+  told.better = pull.dot(both.solve(pull)) > kBetter + static_cast<double>(told.numbers.size());
+  if (told.better) return told;
+  const Eigen::MatrixXd posterior = both.solve(prior);
+  for (Eigen::Index j = 0; j < optimum.searched.size(); ++j) {
+    const double noise = inverse.covariance(j, j), stated_alone = stated.shift.row(j).squaredNorm(),
+                 fitted = stated.shift.row(j) * posterior * stated.shift.row(j).transpose();
+    if (noise + stated_alone > kWider * (noise + fitted)) return told;
+  }
+  return {};
+}
+
+FitJob with_nuisances(const FitJob& job, const std::vector<int>& numbers) {
+  FitJob wider = job;
+  for (const int index : numbers) {
+    Parameter& parameter = wider.parameters[index];
+    const double sd = parameter.known_to.of(parameter.value);
+    constexpr double kFarthest = 12;  // standard deviations: a wrong model would run off with them
+    parameter.free = parameter.nuisance = true;
+    parameter.prior_sd = sd;
+    parameter.lower = parameter.value - kFarthest * sd;
+    parameter.upper = parameter.value + kFarthest * sd;
+    if (std::isfinite(parameter.physical_lower)) parameter.lower = std::max(parameter.lower, parameter.physical_lower);
+    if (std::isfinite(parameter.physical_upper)) parameter.upper = std::min(parameter.upper, parameter.physical_upper);
+  }
+  return wider;
+}
+
+Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optimum) {
+  optimum.searched = widened(wider, narrow, optimum.theta, optimum.searched);
+  for (Eigen::VectorXd& rival : optimum.rivals) rival = widened(wider, narrow, optimum.theta, rival);
+  optimum.evaluations += optimum.problem->evaluations();
+  optimum.problem = problem_of(wider, optimum.frames, optimum.problem->misfit());
+  solve_again(wider, optimum, "with what is stated");
+  return optimum;
+}
+
+Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima) {
+  Minima places;
+  places.frames = optimum.frames;
+  places.theta = optimum.theta;
+  places.evaluations = optimum.evaluations + optimum.problem->evaluations();
+  Frames few = optimum.frames;
+  for (Frame& frame : few) {
+    frame.pixels =
+        subsample(frame.pixels,
+                  static_cast<std::size_t>(std::max(50, wider.job.options.scan_pixels / std::max(1, wider.frames()))));
+    places.rows += static_cast<double>(frame.pixels.size());
+  }
+  std::vector<Eigen::VectorXd> starts{widened(wider, narrow, optimum.theta, optimum.searched)};
+  std::set<int> focus;
+  for_each_scene(wider.job.measurements, [&](const Scene& scene) { focus.insert(scene.microscope.focus_um.index); });
+  for (std::size_t j = 0; j < wider.unknowns.searched.size(); ++j) {
+    if (!focus.contains(wider.unknowns.searched[j]) || !wider.searched(j).nuisance) continue;
+    for (const double by : {-2.0, -1.0, 1.0, 2.0}) {
+      starts.push_back(starts.front());
+      starts.back()[static_cast<Eigen::Index>(j)] += by * *wider.searched(j).prior_sd;
+    }
+  }
+  constexpr std::size_t kMost = 12;
+  for (const Eigen::VectorXd& rival : optimum.rivals)
+    if (starts.size() < kMost) starts.push_back(widened(wider, narrow, optimum.theta, rival));
+  for (std::size_t i = 1; i < minima.scan.candidates.size() && starts.size() < kMost; ++i)
+    starts.push_back(widened(wider, narrow, optimum.theta, minima.scan.candidates[i].searched));
+  const std::unique_ptr<LeastSquares> problem = problem_of(wider, few, misfit_expected(wider, few, optimum.theta));
+  constexpr int kSteps = 8;
+  places.scan = polish(*problem, wider.job, std::move(starts), kSteps, {});
+  places.evaluations += problem->evaluations();
+  places.stopped = places.scan.interrupted;
+  return best_minimum(wider, places, false);
+}
+
+bool has_unstated_focus(const FitJob& job) {
+  bool found = false;
+  for_each_scene(job.measurements, [&](const Scene& scene) { found = found || may_be_out_of_focus(job, scene); });
+  return found;
+}
+
+FitJob with_unstated_focus(FitJob job) {
+  ParameterRef focus;
+  for_each_scene(job.measurements, [&](Scene& scene) {
+    if (!may_be_out_of_focus(job, scene)) return;
+    if (!focus) {
+      focus = job.parameters.add_constant("microscope.focus_um", 0, "um");
+      job.parameters[focus].known_to.sd = depth_of_field_um(job, scene);
+    }
+    scene.microscope.focus_um = focus;
+  });
+  return job;
+}
+
+}  // namespace birefit::estimation

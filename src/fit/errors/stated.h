@@ -1,0 +1,48 @@
+#pragma once
+// What the instrument and the sample are stated to be, and nobody knows exactly.
+
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "fit/search/optimum.h"
+
+namespace birefit::estimation {
+
+/// Numbers that are read and not fitted, with a standard deviation (Parameter::known_to), about an optimum. In units
+/// of that deviation: each shifts the unknowns (searched first), and the picture tells something of it once they have
+/// followed.
+struct Stated {
+  std::vector<int> index;       ///< in the parameter table
+  Eigen::VectorXd sd;           ///< in their own units
+  Eigen::MatrixXd shift;        ///< d(unknowns)/d(number), a column each
+  Eigen::MatrixXd information;  ///< that the pictures have of them, the noise's weights; the prior's would be 1
+  Eigen::VectorXd pull;         ///< half the gradient of chi-square by them
+};
+/// To first order, but that a shift of half a standard error or more is found by a short fit
+/// (`Inverse::covariance` of the unknowns by the problem's weights).
+Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);
+
+/// Those that the pictures know themselves, where it matters: fitted beside the unknowns they leave them smaller
+/// errors, or describe the pictures better than by chance.
+struct WorthFitting {
+  std::vector<int> numbers;  ///< table indices
+  bool better = false;       ///< the pictures want them elsewhere: other minima may be the best then
+};
+WorthFitting worth_fitting(const Task& task, const Optimum& optimum);
+
+/// The job with these free, about what is stated, as nuisances.
+FitJob with_nuisances(const FitJob& job, const std::vector<int>& numbers);
+
+/// From the optimum without them, for a few steps: errors are what changes.
+Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optimum);
+/// From all the places that a search without them has found, whose best need not be the best with them; the focus from
+/// one and two standard deviations to either side as well.
+Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima);
+
+/// The focus, where an objective is stated and no focus: set by eye within the depth of field,
+/// wavelength index / (2 NA^2), or 0.3 um. The same job where there is nothing to add.
+FitJob with_unstated_focus(FitJob job);
+bool has_unstated_focus(const FitJob& job);
+
+}  // namespace birefit::estimation

@@ -1,0 +1,154 @@
+// What a result says of the numbers that were stated, and of a misfit that is left.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "fit/errors/changed_input.h"
+#include "fit/errors/report.h"
+#include "fit/errors/verdict.h"
+
+namespace birefit::estimation {
+namespace {
+
+void add_effect(const Parameter& of, double value, double known_to, const Eigen::VectorXd& shift_per_unit,
+                FitResult& result) {
+  InputEffect effect{of.name, of.unit, value, step_of(of.unit, value), known_to, {}};
+  const Eigen::VectorXd shift = effect.step * shift_per_unit;
+  effect.shift.assign(shift.begin(), shift.end());
+  if (effect.step > 0) result.inputs.push_back(std::move(effect));
+}
+
+}  // namespace
+
+void report_stated(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result) {
+  const Stated& found = covariances.stated;
+  const auto searched = static_cast<Eigen::Index>(task.unknowns.searched.size());
+  const Eigen::Index all = task.unknowns.size();
+  result.stated_covariance = Eigen::MatrixXd::Zero(all, all);
+  if (found.shift.size() > 0) result.stated_covariance += found.shift * found.shift.transpose();
+  const Eigen::MatrixXd information = covariances.factor.transpose() * covariances.factor;
+  std::vector<Eigen::Index> estimates;
+  for (Eigen::Index j = 0; j < all; ++j)
+    if (!task.job.parameters[task.unknowns.table_index(static_cast<int>(j))].nuisance) estimates.push_back(j);
+  const Eigen::LDLT<Eigen::MatrixXd> own(Eigen::MatrixXd(information(estimates, estimates)));
+  for (Eigen::Index j = 0; j < searched; ++j) {
+    const Parameter& parameter = task.searched(static_cast<std::size_t>(j));
+    if (!parameter.nuisance) continue;
+    const ParameterEstimate& estimate = result.parameters[static_cast<std::size_t>(j)];
+    // Another draw of what is stated would move the prior's mean, and the estimates by this for each of its deviations.
+    const Eigen::VectorXd by_prior = covariances.of_noise.covariance.col(j) / *parameter.prior_sd;
+    result.stated_covariance += by_prior * by_prior.transpose();
+    // Were it otherwise and all that is stated beside it as it is.
+    if (estimates.size() > 0) {
+      Eigen::VectorXd shift = Eigen::VectorXd::Zero(all);
+      shift(estimates) = -own.solve(Eigen::VectorXd(information(estimates, j)));
+      add_effect(parameter, estimate.value, *parameter.prior_sd, shift, result);
+    }
+    result.stated.push_back({.name = parameter.name,
+                             .unit = parameter.unit,
+                             .stated = parameter.value,
+                             .known_to = *parameter.prior_sd,
+                             .fitted = true,
+                             .value = estimate.value,
+                             .stderr_ = estimate.stderr_,
+                             .most_of = {},
+                             .share = 0});
+  }
+  std::vector<StatedNumber> others;
+  for (Eigen::Index i = 0; i < found.sd.size(); ++i) {
+    const int index = found.index[static_cast<std::size_t>(i)];
+    StatedNumber number{.name = task.job.parameters[index].name,
+                        .unit = task.job.parameters[index].unit,
+                        .stated = optimum.theta[static_cast<std::size_t>(index)],
+                        .known_to = found.sd[i],
+                        .fitted = false,
+                        .value = 0,
+                        .stderr_ = 0,
+                        .most_of = {},
+                        .share = 0};
+    add_effect(task.job.parameters[index], number.stated, found.sd[i], found.shift.col(i) / found.sd[i], result);
+    for (Eigen::Index j = 0; j < searched; ++j) {
+      const double variance = result.covariance(j, j), share = std::pow(found.shift(j, i), 2) / variance;
+      if (task.searched(static_cast<std::size_t>(j)).nuisance || !(share > number.share)) continue;
+      number.share = share;
+      number.most_of = task.searched(static_cast<std::size_t>(j)).name;
+    }
+    others.push_back(std::move(number));
+  }
+  std::stable_sort(others.begin(), others.end(),
+                   [](const StatedNumber& a, const StatedNumber& b) { return a.share > b.share; });
+  result.stated.insert(result.stated.end(), others.begin(), others.end());
+}
+
+void leave_nuisances(const Task& task, FitResult& result) {
+  std::vector<int> kept;
+  for (int j = 0; j < task.unknowns.size(); ++j)
+    if (!task.job.parameters[task.unknowns.table_index(j)].nuisance) kept.push_back(j);
+  if (static_cast<int>(kept.size()) == task.unknowns.size()) return;
+  const auto keep = [&](auto& list) {
+    if (list.size() != static_cast<std::size_t>(task.unknowns.size())) return;
+    std::remove_reference_t<decltype(list)> left;
+    for (const int j : kept) left.push_back(std::move(list[static_cast<std::size_t>(j)]));
+    list = std::move(left);
+  };
+  const std::vector<std::string> all = result.names;
+  const auto is_kept = [&](const std::string& name) {
+    return std::any_of(kept.begin(), kept.end(), [&](int j) { return all[static_cast<std::size_t>(j)] == name; });
+  };
+  keep(result.parameters);
+  keep(result.names);
+  result.covariance = Eigen::MatrixXd(result.covariance(kept, kept));
+  result.correlation = Eigen::MatrixXd(result.correlation(kept, kept));
+  result.stated_covariance = Eigen::MatrixXd(result.stated_covariance(kept, kept));
+  for (InputEffect& input : result.inputs) keep(input.shift);
+  std::vector<int> searched;
+  for (const int j : kept)
+    if (j < static_cast<int>(task.unknowns.searched.size())) searched.push_back(j);
+  for (Strip& strip : result.strips)
+    for (std::vector<double>* list : {&strip.value, &strip.stderr_}) {
+      std::vector<double> left;
+      for (const int j : searched)
+        if (static_cast<std::size_t>(j) < list->size()) left.push_back((*list)[static_cast<std::size_t>(j)]);
+      *list = std::move(left);
+    }
+  for (FisherDirection& direction : result.directions)
+    std::erase_if(direction.weights, [&](const auto& weight) { return !is_kept(weight.first); });
+  std::erase_if(result.profiles, [&](const ProfileTrace& trace) { return !is_kept(trace.name); });
+}
+
+void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result) {
+  result.misfit = task.job.misfit;
+  for (const StatedNumber& number : result.stated)
+    if (std::abs(number.away()) > kContradicted)
+      result.misfit.push_back(fmt::format(
+          "{} is fitted as {}{}, {:.2g} times what it was thought to be known to away from the {:.6g} that are stated",
+          number.name, with_error(number.value, number.stderr_), number.unit.empty() ? "" : " " + number.unit,
+          std::abs(number.away()), number.stated));
+  // A noise that is estimated a tenth too small is no misfit of the model.
+  constexpr double kOfNote = 1.2;
+  if (covariances.discrepancy || (optimum.misfit.beyond_noise && result.reduced_chi_square > kOfNote))
+    result.misfit.push_back("the model leaves over what noise does not explain");
+  for (const MicrographResult& m : result.micrographs)
+    if (m.outliers > 0) {
+      result.misfit.push_back("pixels were left out because they stood out of the residual");
+      break;
+    }
+}
+
+}  // namespace birefit::estimation
+
+namespace birefit {
+
+std::string FitResult::grade() const {
+  if (!converged || interrupted) return "not converged";
+  if (!described) return "not described";
+  if (ambiguous) return "ambiguous";
+  if (!identifiable) return "not identifiable";
+  if (pinned) return "at a bound";
+  return misfit.empty() ? "answer" : "answer with misfit";
+}
+
+}  // namespace birefit
