@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "birefit/fit.h"
+#include "fit/errors/stated.h"
 #include "fit/errors/statistics.h"
 #include "fit/errors/verdict.h"
 #include "fit/problem/least_squares.h"
@@ -110,6 +111,7 @@ struct Information {
   Unknowns unknowns;
   Eigen::MatrixXd factor;
   Inverse inverse;
+  Eigen::MatrixXd covariance;  ///< with what is stated and not known exactly
 };
 Information information(const Planned& p) {
   Information result;
@@ -122,6 +124,10 @@ Information information(const Planned& p) {
   problem.evaluate(start, true);
   result.factor = problem.factor();
   result.inverse = invert_normal_equations(result.factor);
+  result.covariance = result.inverse.covariance;
+  const Eigen::MatrixXd stated =
+      covariance_by(linear_stated_numbers(task, problem, problem.theta(), result.inverse.covariance));
+  if (stated.allFinite()) result.covariance += stated;
   return result;
 }
 
@@ -157,7 +163,7 @@ void turn_polarizer(Microscope& microscope, ParameterRef to) {
 }  // namespace
 
 Outlook outlook(const FitJob& job) {
-  const Planned p = planned(job);
+  const Planned p = planned(has_unstated_focus(job) ? with_unstated_focus(job) : job);
   const Information known = information(p);
   FitResult result;
   result.interval_degrees_of_freedom = std::numeric_limits<double>::infinity();
@@ -171,11 +177,11 @@ Outlook outlook(const FitJob& job) {
     estimate.upper = parameter.upper;
     estimate.linear = j >= static_cast<int>(known.unknowns.searched.size());
     if (parameter.prior_sd) estimate.prior_value = parameter.value, estimate.prior_sd = parameter.prior_sd;
-    estimate.stderr_ = std::sqrt(known.inverse.covariance(j, j));
+    estimate.stderr_ = std::sqrt(known.covariance(j, j));
     result.names.push_back(parameter.name);
     result.parameters.push_back(std::move(estimate));
   }
-  result.covariance = known.inverse.covariance;
+  result.covariance = known.covariance;
   const Eigen::VectorXd inverse_sd =
       result.covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
   result.correlation = inverse_sd.asDiagonal() * result.covariance * inverse_sd.asDiagonal();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "io/images/mask.h"
 #include "io/images/mosaic.h"
 #include "medium/references.h"
@@ -70,6 +72,12 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   Mask saturated(width, height, 0);
   mark_saturated(image.values, saturation.from, saturated);
   const double step = smallest_step(image);
+  if (const std::optional<CutBlack> cut = find_cut_black(image, area, step))
+    reader.warnings.push_back(fmt::format(
+        "{}: {:.2g} % of the pixels sit at the lowest code, {:g}: the black was cut off, by a background that "
+        "was subtracted or a contrast that was stretched. Their mean is not that of the light: take "
+        "pictures with a black level above the noise, or mask what is dark.",
+        name, 100 * cut->share, cut->code));
   linearise(image.values, settings.transfer, image.top_code);
 
   micrograph.mask = Mask(width, height, 0);

@@ -82,6 +82,36 @@ Saturation find_saturation(const LoadedImage& image, const PixelRect& area, std:
   return saturation;
 }
 
+std::optional<CutBlack> find_cut_black(const LoadedImage& image, const PixelRect& area, double step) {
+  constexpr double kShare = 0.005, kOverNext = 3, kNoise = 0.7;  // half a code, and rounding by the same measure
+  if (!(image.top_code > 0) || !(step > 0)) return std::nullopt;
+  double lowest = std::numeric_limits<double>::infinity();
+  const auto for_pixels = [&](const auto& what) {
+    for (int y = area.y0; y < area.y1; ++y)
+      for (int x = area.x0; x < area.x1; ++x)
+        if (const double value = image.values(x, y); std::isfinite(value)) what(x, y, value);
+  };
+  for_pixels([&](int, int, double value) { lowest = std::min(lowest, value); });
+  double pixels = 0, here = 0, next = 0;
+  // Of three neighbours that are not cut, the middle one off the others' mean: noise without the picture's slope.
+  std::vector<double> off;
+  for_pixels([&](int x, int y, double value) {
+    ++pixels;
+    here += value == lowest;
+    next += value > lowest && value < lowest + 1.5 * step;
+    if (x > area.x0 && x + 1 < area.x1 && value > lowest) {
+      const double left = image.values(x - 1, y), right = image.values(x + 1, y);
+      if (left > lowest && right > lowest) off.push_back(std::abs(value - 0.5 * (left + right)));
+    }
+  });
+  if (!(here > kShare * pixels) || !(here >= kOverNext * next) || off.empty()) return std::nullopt;
+  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
+  std::nth_element(off.begin(), middle, off.end());
+  const double noise = 1.4826 * *middle / std::sqrt(1.5);
+  if (!(noise > kNoise * step)) return std::nullopt;
+  return CutBlack{lowest, here / pixels};
+}
+
 int exclude_outliers(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness,
                      Mask& mask) {
   if (const SubGrid grid = sub_grid(mask); grid.spacing > 1) {

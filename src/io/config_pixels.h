@@ -26,6 +26,15 @@ struct Saturation {
 /// Given counts stand; else the file's top code, or a lower code at which many pixels of the area pile up.
 Saturation find_saturation(const LoadedImage& image, const PixelRect& area, std::optional<double> given);
 
+/// Black that was cut off: pixels that pile up at the lowest code of the area, whose noise is more than half a code (of
+/// less noise, dark ground has one code by right).
+struct CutBlack {
+  double code = 0;
+  double share = 0;  ///< of the area's pixels
+};
+/// `step` between codes.
+std::optional<CutBlack> find_cut_black(const LoadedImage& image, const PixelRect& area, double step);
+
 enum class Smoothness {
   image,  ///< fringes may be as fine as pixels: only isolated pixels are suspect
   frame,  ///< a calibration frame: whatever leaves its neighbourhood is suspect

@@ -61,7 +61,9 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
     words += ", and the error of wave propagation" + std::string(propagation.cols() > 1 ? " and of sampling" : "") +
              " by the exact image of a radial twin";
   if (left_out.by_curved_rays) words += ", and what curved rays would change";
-  if (covariances.stated.shift.size() > 0 && !covariances.stated.shift.isZero(0))
+  const bool fitted = std::any_of(task.unknowns.searched.begin(), task.unknowns.searched.end(),
+                                  [&](int index) { return task.job.parameters[index].nuisance; });
+  if (fitted || (covariances.stated.shift.size() > 0 && !covariances.stated.shift.isZero(0)))
     words += ", and what is stated and not known exactly";
   if (left_out.by_waves) words += ", and what rays lose of a wave-optical image";
   return words;
@@ -144,6 +146,7 @@ void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& 
   const Eigen::VectorXd sd = sd_of_discrepancy(task, optimum);
   if (sd.size() == 0) return;
   covariances.discrepancy = true;
+  covariances.by_discrepancy = sd;
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
   const Eigen::VectorXd wider = sd.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMax(1);
   covariance = wider.asDiagonal() * covariance * wider.asDiagonal();

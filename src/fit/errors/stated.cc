@@ -37,24 +37,6 @@ double beyond_noise(const Optimum& optimum) {
   return largest;
 }
 
-/// First order alone.
-Stated linear_in(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance) {
-  Stated stated;
-  stated.index = uncertain(task);
-  const auto k = static_cast<Eigen::Index>(stated.index.size());
-  stated.sd.resize(k);
-  for (Eigen::Index i = 0; i < k; ++i) {
-    const int index = stated.index[static_cast<std::size_t>(i)];
-    stated.sd[i] = task.job.parameters[index].known_to.of(optimum.theta[static_cast<std::size_t>(index)]);
-  }
-  const LeastSquares::Beside sums = optimum.problem->beside(optimum.problem->intensity_by(stated.index));
-  const auto units = stated.sd.asDiagonal();
-  stated.shift = -covariance * sums.with_unknowns * units;
-  stated.information = units * (sums.among - sums.with_unknowns.transpose() * covariance * sums.with_unknowns) * units;
-  stated.pull = units * sums.with_residual;
-  return stated;
-}
-
 /// The depth of field of an objective on light of a wavelength in what is around the sample.
 double depth_of_field_um(const FitJob& job, const Scene& scene) {
   constexpr double kLeast = 0.3;  // by eye
@@ -84,8 +66,32 @@ Eigen::VectorXd widened(const Task& wider, const Task& narrow, const Theta& thet
 
 }  // namespace
 
+Stated linear_stated_numbers(const Task& task, LeastSquares& problem, const Theta& theta,
+                             const Eigen::MatrixXd& covariance) {
+  Stated stated;
+  stated.index = uncertain(task);
+  const auto k = static_cast<Eigen::Index>(stated.index.size());
+  stated.sd.resize(k);
+  for (Eigen::Index i = 0; i < k; ++i) {
+    const int index = stated.index[static_cast<std::size_t>(i)];
+    stated.sd[i] = task.job.parameters[index].known_to.of(theta[static_cast<std::size_t>(index)]);
+  }
+  const LeastSquares::Beside sums = problem.beside(problem.intensity_by(stated.index));
+  const auto units = stated.sd.asDiagonal();
+  stated.shift = -covariance * sums.with_unknowns * units;
+  stated.information = units * (sums.among - sums.with_unknowns.transpose() * covariance * sums.with_unknowns) * units;
+  stated.pull = units * sums.with_residual;
+  return stated;
+}
+
+Eigen::MatrixXd covariance_by(const Stated& stated) {
+  const Eigen::Index k = stated.sd.size();
+  const Eigen::LDLT<Eigen::MatrixXd> both(Eigen::MatrixXd::Identity(k, k) + stated.information);
+  return stated.shift * both.solve(Eigen::MatrixXd(stated.shift.transpose()));
+}
+
 Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance) {
-  Stated stated = linear_in(task, optimum, covariance);
+  Stated stated = linear_stated_numbers(task, *optimum.problem, optimum.theta, covariance);
   const Eigen::ArrayXd sd = covariance.diagonal().array().cwiseMax(0).sqrt();
   if (by_waves(optimum.frames)) return stated;  // a fit is too dear
   for (Eigen::Index i = 0; i < stated.sd.size(); ++i) {
@@ -104,7 +110,7 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   if (optimum.stopped || task.unknowns.searched.empty()) return {};
   const Inverse inverse = invert_normal_equations(optimum.problem->factor());
   if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return {};
-  const Stated stated = linear_in(task, optimum, inverse.covariance);
+  const Stated stated = linear_stated_numbers(task, *optimum.problem, optimum.theta, inverse.covariance);
   const Eigen::Index k = stated.sd.size();
   if (k == 0 || !stated.shift.allFinite() || !stated.information.allFinite()) return {};
   const double unit = beyond_noise(optimum);

@@ -19,7 +19,12 @@ struct Stated {
   Eigen::MatrixXd information;  ///< that the pictures have of them, the noise's weights; the prior's would be 1
   Eigen::VectorXd pull;         ///< half the gradient of chi-square by them
 };
-/// To first order, but that a shift of half a standard error or more is found by a short fit
+/// To first order.
+Stated linear_stated_numbers(const Task& task, LeastSquares& problem, const Theta& theta,
+                             const Eigen::MatrixXd& covariance);
+/// What they add to the covariance where each is fitted along as far as the pictures tell it.
+Eigen::MatrixXd covariance_by(const Stated& stated);
+/// The same, but that a shift of half a standard error or more is found by a short fit
 /// (`Inverse::covariance` of the unknowns by the problem's weights).
 Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);
 

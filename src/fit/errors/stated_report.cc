@@ -21,6 +21,14 @@ void add_effect(const Parameter& of, double value, double known_to, const Eigen:
   if (effect.step > 0) result.inputs.push_back(std::move(effect));
 }
 
+/// The estimate of an unknown once nuisances have left; null of those.
+const ParameterEstimate* estimate_at(const Task& task, const FitResult& result, int unknown) {
+  const std::string& name = task.job.parameters[task.unknowns.table_index(unknown)].name;
+  const auto found = std::find_if(result.parameters.begin(), result.parameters.end(),
+                                  [&](const ParameterEstimate& p) { return p.name == name; });
+  return found == result.parameters.end() ? nullptr : &*found;
+}
+
 }  // namespace
 
 void report_stated(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result) {
@@ -127,9 +135,15 @@ void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& c
           "{} is fitted as {}{}, {:.2g} times what it was thought to be known to away from the {:.6g} that are stated",
           number.name, with_error(number.value, number.stderr_), number.unit.empty() ? "" : " " + number.unit,
           std::abs(number.away()), number.stated));
-  // A noise that is estimated a tenth too small is no misfit of the model.
-  constexpr double kOfNote = 1.2;
-  if (covariances.discrepancy || (optimum.misfit.beyond_noise && result.reduced_chi_square > kOfNote))
+  // A noise that is estimated a tenth too small is no misfit of the model, nor is a discrepancy that errors hardly
+  // feel.
+  constexpr double kOfNote = 1.2, kOfVariance = 0.2;
+  bool felt = false;
+  for (Eigen::Index j = 0; covariances.discrepancy && j < optimum.searched.size(); ++j)
+    if (const auto at = estimate_at(task, result, static_cast<int>(j)); at && at->unit != "px")
+      felt = felt || std::pow(covariances.by_discrepancy[j], 2) - covariances.of_noise.covariance(j, j) >
+                         kOfVariance * std::pow(at->stderr_, 2);
+  if (felt || (optimum.misfit.beyond_noise && result.reduced_chi_square > kOfNote))
     result.misfit.push_back("the model leaves over what noise does not explain");
   for (const MicrographResult& m : result.micrographs)
     if (m.outliers > 0) {
