@@ -196,6 +196,13 @@ void pay_for_limit(const UpperLimit& limit, double t, int unknown, FitResult& re
   result.covariance += change * change.transpose();
 }
 
+/// t standard errors of what the fit itself has found; what is stated has a standard deviation that is no estimate.
+double half_width(const FitResult& result, int unknown, double t) {
+  const double all = result.covariance(unknown, unknown),
+               stated = std::min(result.stated_covariance(unknown, unknown), all), normal = normal_quantile(0.975);
+  return std::sqrt(t * t * (all - stated) + normal * normal * stated);
+}
+
 }  // namespace
 
 void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noise, FitResult& result) {
@@ -214,8 +221,9 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
   }
   for (int j = 0; j < task.unknowns.size(); ++j) {
     ParameterEstimate estimate = estimate_of(task, optimum, result.covariance, j);
-    estimate.interval95_low = estimate.value - t * estimate.stderr_;
-    estimate.interval95_high = estimate.value + t * estimate.stderr_;
+    const double half = half_width(result, j, t);
+    estimate.interval95_low = estimate.value - half;
+    estimate.interval95_high = estimate.value + half;
     settle_at_bound(question(j).parameter(), gradient[j], estimate, result);
     if (const auto& limit = limits[static_cast<std::size_t>(j)]) {
       estimate.limit = "upper";

@@ -189,6 +189,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
     if (change) covariance += *change * change->transpose();
   result.log_share = log_share(projected_information(*optimum.problem), task.job, task.unknowns);
   result.covariance = covariance;
+  result.stated_covariance = stated_covariance(task, covariances);
   take_in_close_rivals(task, result);
   result.covariance_kind = covariance_words(task, optimum, covariances, left_out);
 

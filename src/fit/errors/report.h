@@ -49,6 +49,8 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result);
 /// Those that matter beside the errors, largest first.
 void keep_inputs_of_note(const Task& task, FitResult& result);
+/// The part of the covariance by what is stated.
+Eigen::MatrixXd stated_covariance(const Task& task, const Covariances& covariances);
 /// result.stated, from those that were paid for and those that were fitted, and result.inputs by them.
 void report_stated(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result);
 /// Takes nuisances out of parameters, covariance and all that goes by their order: they are in result.stated.

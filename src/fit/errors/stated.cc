@@ -108,27 +108,38 @@ Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::Mat
 
 WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   if (optimum.stopped || task.unknowns.searched.empty()) return {};
+  // Where the scatter of a few frames is what is known of a misfit, more unknowns would leave it no degrees of freedom:
+  // by derivatives then.
+  if (task.frames() > 1 && (optimum.misfit.frames_scatter || optimum.misfit.beyond_noise)) return {};
   const Inverse inverse = invert_normal_equations(optimum.problem->factor());
   if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return {};
   const Stated stated = linear_stated_numbers(task, *optimum.problem, optimum.theta, inverse.covariance);
   const Eigen::Index k = stated.sd.size();
   if (k == 0 || !stated.shift.allFinite() || !stated.information.allFinite()) return {};
+  // By the problem's weights, which a misfit has made smaller, and by those of the noise: the misfit may be theirs.
   const double unit = beyond_noise(optimum);
-  const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(k, k), information = unit * stated.information;
-  const Eigen::LDLT<Eigen::MatrixXd> both(prior + information);
-  const Eigen::VectorXd pull = unit * stated.pull;
-  constexpr double kTold = 0.05, kBetter = 9, kWider = 1.2;
-  WorthFitting told;
-  for (Eigen::Index i = 0; i < k; ++i)
-    if (information(i, i) > kTold) told.numbers.push_back(stated.index[static_cast<std::size_t>(i)]);
-  // By chance each lowers chi-square by one at most.
-  told.better = pull.dot(both.solve(pull)) > kBetter + static_cast<double>(told.numbers.size());
-  if (told.better) return told;
-  const Eigen::MatrixXd posterior = both.solve(prior);
+  const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(k, k);
+  constexpr double kTold = 0.05, kBetter = 9, kOfExcess = 0.2, kWider = 1.2;
+  const auto told_by = [&](double units) {
+    std::vector<int> told;
+    for (Eigen::Index i = 0; i < k; ++i)
+      if (units * stated.information(i, i) > kTold) told.push_back(stated.index[static_cast<std::size_t>(i)]);
+    return told;
+  };
+  const auto gain_by = [&](double units) {
+    const Eigen::VectorXd pull = units * stated.pull;
+    return pull.dot((prior + units * stated.information).ldlt().solve(pull));
+  };
+  // By chance each lowers chi-square by one at most; of a misfit that is not theirs, by as much in its own units.
+  const std::vector<int> told = told_by(unit);
+  const double enough = kBetter + static_cast<double>(told.size()),
+               excess = optimum.chi_square(task) - static_cast<double>(optimum.problem->pixel_rows());
+  if (gain_by(unit) > enough && (gain_by(unit) > kOfExcess * excess || gain_by(1) > enough)) return {told, true};
+  const Eigen::MatrixXd posterior = (prior + stated.information).ldlt().solve(prior);
   for (Eigen::Index j = 0; j < optimum.searched.size(); ++j) {
     const double noise = inverse.covariance(j, j), stated_alone = stated.shift.row(j).squaredNorm(),
                  fitted = stated.shift.row(j) * posterior * stated.shift.row(j).transpose();
-    if (noise + stated_alone > kWider * (noise + fitted)) return told;
+    if (noise + stated_alone > kWider * (noise + fitted)) return {told_by(1), false};
   }
   return {};
 }

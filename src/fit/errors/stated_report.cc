@@ -31,12 +31,25 @@ const ParameterEstimate* estimate_at(const Task& task, const FitResult& result, 
 
 }  // namespace
 
+Eigen::MatrixXd stated_covariance(const Task& task, const Covariances& covariances) {
+  const Eigen::Index all = task.unknowns.size();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(all, all);
+  const Eigen::MatrixXd& shift = covariances.stated.shift;
+  if (shift.size() > 0) sum += shift * shift.transpose();
+  for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j) {
+    if (!task.searched(j).nuisance) continue;
+    // Another draw of what is stated would move the prior's mean, and the estimates by this for each of its deviations.
+    const Eigen::VectorXd by_prior =
+        covariances.of_noise.covariance.col(static_cast<Eigen::Index>(j)) / *task.searched(j).prior_sd;
+    sum += by_prior * by_prior.transpose();
+  }
+  return sum;
+}
+
 void report_stated(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result) {
   const Stated& found = covariances.stated;
   const auto searched = static_cast<Eigen::Index>(task.unknowns.searched.size());
   const Eigen::Index all = task.unknowns.size();
-  result.stated_covariance = Eigen::MatrixXd::Zero(all, all);
-  if (found.shift.size() > 0) result.stated_covariance += found.shift * found.shift.transpose();
   const Eigen::MatrixXd information = covariances.factor.transpose() * covariances.factor;
   std::vector<Eigen::Index> estimates;
   for (Eigen::Index j = 0; j < all; ++j)
@@ -46,9 +59,6 @@ void report_stated(const Task& task, const Optimum& optimum, const Covariances& 
     const Parameter& parameter = task.searched(static_cast<std::size_t>(j));
     if (!parameter.nuisance) continue;
     const ParameterEstimate& estimate = result.parameters[static_cast<std::size_t>(j)];
-    // Another draw of what is stated would move the prior's mean, and the estimates by this for each of its deviations.
-    const Eigen::VectorXd by_prior = covariances.of_noise.covariance.col(j) / *parameter.prior_sd;
-    result.stated_covariance += by_prior * by_prior.transpose();
     // Were it otherwise and all that is stated beside it as it is.
     if (estimates.size() > 0) {
       Eigen::VectorXd shift = Eigen::VectorXd::Zero(all);

@@ -110,7 +110,7 @@ void warn_of_misfit(const std::string& name, const Rows& rows, FitResult& result
              percent > 5 && !result.described
                  ? ": a curve this far off is another one, or its label is wrong; do not trust the values."
              : percent > 5
-                 ? ": a curve this far off may be another one, or its label wrong; the errors allow for it as far "
+                 ? ": a curve this far off may be another one, or its label is wrong; the errors allow for it as far "
                    "as the residuals show it."
                  : "; the errors allow for it as far as the residuals show it."));
 }
