@@ -20,7 +20,7 @@ struct Uncertainty {
   double of(double value) const { return sd + share * (value < 0 ? -value : value); }
 };
 
-/// What to do with a number: the three forms of docs/configuration.md.
+/// What to do with a number: the forms of docs/configuration.md.
 struct Parameter {
   std::string name;                                         ///< config path, e.g. "sample.droplet.diameter_um"
   std::string unit;                                         ///< "um", "deg", "V", "K", "px" or "" (dimensionless)

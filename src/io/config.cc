@@ -353,14 +353,14 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
         check_overlap(reader, picture.scene, picture.name);
         check_stressed_disc(reader, picture);
       }
-    if (!of_colours.empty() && !shared.scene.microscope.bandwidth_nm)
+    if (!of_colours.empty() && !shared.scene.microscope.bandwidth_nm) {
       reader.warnings.push_back(
           of_colours +
           ": a channel of a colour camera passes light about 100 nm wide, unless a filter or the lamp's "
           "line makes it less; the model takes one wavelength. State microscope.light.bandwidth_nm (1 for "
           "a laser); in white light the intervals do not hold.");
-    if (!of_colours.empty() && !shared.scene.microscope.bandwidth_nm)
       reader.misfit.push_back(of_colours + " is a colour camera's channel, whose light is no single wavelength");
+    }
     if (!of_codes.empty())
       reader.warnings.push_back(of_codes +
                                 ": colours of 8 bits are sRGB codes as a rule, which are no measure of light; they are "

@@ -21,7 +21,7 @@ Json plain_number(const NumberSpec& spec) {
   return json;
 }
 
-/// The three forms of a number: known, fitted, with a prior.
+/// The forms of a number: known as well as such numbers are, to a standard deviation or exactly; fitted; with a prior.
 Json number_schema(const NumberSpec& spec, const std::string& words) {
   Json fit = {{{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}};
   if (spec.automatic) fit.push_back({{"const", "auto"}});

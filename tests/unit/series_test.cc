@@ -316,6 +316,36 @@ TEST_F(SeriesFiles, WhatTheFramesShareShowsInTheFirstThatCanBeRead) {
   EXPECT_THAT(problem_of(config("micrographs: {files: \"frames/*.tif\"}")), HasSubstr("is empty"));
 }
 
+// Frames that state the same pixel size err by it together: their noise is averaged, that is not.
+TEST_F(SeriesFiles, WhatFramesStateAlikeIsNotAveraged) {
+  const std::string tilt = "sample.crystal.field_legendre[1]";
+  constexpr int kFrames = 4;
+  for (int i = 0; i < kFrames; ++i) expose(fmt::format("f{}.tif", i), 700, 1 + static_cast<unsigned>(i));
+  write("series.yaml", config(fmt::format("micrographs: {{files: \"frames/*.tif\", shared: [\"{}\"]}}", tilt)));
+  const ImageSeries series = load_series(folder_ / "series.yaml");
+  std::vector<std::optional<FitResult>> own, with_stated;
+  double stated_sd = 0, of_one = 0;
+  for (int i = 0; i < kFrames; ++i) {
+    FitResult r = fit(load_frame(series, static_cast<std::size_t>(i)).job);
+    ASSERT_TRUE(r.has_answer()) << r.verdict;
+    r.covariance -= r.stated_covariance;
+    r.stated_covariance.setZero();
+    own.push_back(r);
+    const auto at = std::find(r.names.begin(), r.names.end(), tilt) - r.names.begin();
+    if (i == 0) of_one = r.covariance(at, at), stated_sd = 2 * std::sqrt(of_one);
+    r.stated_covariance(at, at) = stated_sd * stated_sd;
+    r.covariance += r.stated_covariance;
+    with_stated.push_back(r);
+  }
+  const SeriesResult noise = settle_series(series, own), both = settle_series(series, with_stated);
+  ASSERT_TRUE(noise.shared && both.shared);
+  const double alone = noise.shared->posterior.covariance(0, 0);
+  EXPECT_LT(alone, 0.5 * of_one);
+  EXPECT_NEAR(both.shared->posterior.covariance(0, 0), alone + stated_sd * stated_sd, 1e-9 * stated_sd * stated_sd);
+  EXPECT_NEAR(both.shared->posterior.mean[0], noise.shared->posterior.mean[0], 1e-9 * stated_sd);
+  EXPECT_NEAR(both.shared->chi_square, noise.shared->chi_square, 1e-6);
+}
+
 TEST_F(SeriesFiles, AFrameWithoutAnAnswerStaysInTheTable) {
   expose("f1.tif", 700, 1);
   expose("f2.tif", 710, 2);

@@ -2,33 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
 
 #include "fit/errors/changed_input.h"
 #include "fit/errors/report.h"
-#include "medium/references.h"
 
 namespace birefit::estimation {
 namespace {
 
 /// Numbers that all micrographs read and that are taken as exact.
 std::vector<int> shared_inputs(const Task& task) {
-  std::map<int, int> readers;
-  for (int g = 0; g < task.frames(); ++g) {
-    std::set<int> read;
-    for_each_ref(task.picture(g).scene, [&](const ParameterRef& ref) {
-      if (!ref || task.job.parameters[ref].free) return;
-      if (task.job.parameters[ref].known_to.of(task.job.parameters[ref].value) > 0) return;
-      const bool of_a_vector =
-          task.job.parameters[ref].name.find(".axis.") != std::string::npos;  // no quantity by itself
-      if (!of_a_vector) read.insert(ref.index);
-    });
-    for (const int index : read) ++readers[index];
-  }
-  std::vector<int> inputs;
-  for (const auto& [index, number] : readers)
-    if (number == task.frames()) inputs.push_back(index);
+  std::vector<int> inputs = known_to_all_frames(task);
+  std::erase_if(inputs, [&](int index) {
+    const Parameter& p = task.job.parameters[index];
+    const bool of_a_vector = p.name.find(".axis.") != std::string::npos;  // no quantity by itself
+    return of_a_vector || p.known_to.of(p.value) > 0;
+  });
   return inputs;
 }
 

@@ -55,7 +55,7 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
   if (covariances.along > 1)
     words += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters",
                          covariances.along);
-  if (covariances.discrepancy) words += ", and what a discrepancy of the size that is left over could do";
+  if (covariances.discrepancy()) words += ", and what a discrepancy of the size that is left over could do";
   const Eigen::MatrixXd& propagation = left_out.propagation;
   if (!propagation.isZero(0))
     words += ", and the error of wave propagation" + std::string(propagation.cols() > 1 ? " and of sampling" : "") +
@@ -145,7 +145,6 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
 void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances) {
   const Eigen::VectorXd sd = sd_of_discrepancy(task, optimum);
   if (sd.size() == 0) return;
-  covariances.discrepancy = true;
   covariances.by_discrepancy = sd;
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
   const Eigen::VectorXd wider = sd.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMax(1);
@@ -203,7 +202,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
   if (!signal) result.identifiable = false;
   std::string misfit;
-  if (covariances.discrepancy && result.described)
+  if (covariances.discrepancy() && result.described)
     misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
   report_stated(task, optimum, covariances, result);
   keep_inputs_of_note(task, result);

@@ -15,9 +15,9 @@ struct Covariances {
   Inverse of_noise;                ///< by the weights alone
   Inverse with_misfit;             ///< and what propagation errs by, and what the residual holds along the parameters
   double along = 1;                ///< largest factor on a standard error by the latter
-  bool discrepancy = false;        ///< one is left over, and what one of its size could do is in `with_misfit`
-  Eigen::VectorXd by_discrepancy;  ///< standard deviations of all unknowns by it
-  Stated stated;                   ///< what it would be to state these otherwise is in `with_misfit`, too
+  Eigen::VectorXd by_discrepancy;  ///< standard deviations of all unknowns by one that is left over; empty: none
+  bool discrepancy() const { return by_discrepancy.size() > 0; }
+  Stated stated;  ///< what it would be to state these otherwise is in `with_misfit`, too
 };
 /// `propagation`: LeftOut::propagation.
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);

@@ -2,31 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 
 #include "fit/errors/changed_input.h"
 #include "fit/errors/statistics.h"
-#include "medium/references.h"
 
 namespace birefit::estimation {
 namespace {
 
+bool is_exact(const Parameter& parameter) { return !(parameter.known_to.of(parameter.value) > 0); }
+
 /// Read by every frame, not fitted, and not exact. What frames or rows have for themselves, as a spectrum its
 /// wavelengths, is exact: were each free, they would describe anything.
 std::vector<int> uncertain(const Task& task) {
-  std::map<int, int> readers;
-  for (int g = 0; g < task.frames(); ++g) {
-    std::set<int> read;
-    for_each_ref(task.picture(g).scene, [&](const ParameterRef& ref) {
-      if (!ref || task.job.parameters[ref].free) return;
-      if (task.job.parameters[ref].known_to.of(task.job.parameters[ref].value) > 0) read.insert(ref.index);
-    });
-    for (const int index : read) ++readers[index];
-  }
-  std::vector<int> found;
-  for (const auto& [index, number] : readers)
-    if (number == task.frames()) found.push_back(index);
+  std::vector<int> found = known_to_all_frames(task);
+  std::erase_if(found, [&](int index) { return is_exact(task.job.parameters[index]); });
   return found;
 }
 
@@ -49,7 +39,7 @@ double depth_of_field_um(const FitJob& job, const Scene& scene) {
 bool may_be_out_of_focus(const FitJob& job, const Scene& scene) {
   const ParameterRef na = scene.microscope.objective_na;
   return job.demand.ceiling == Ceiling::wave && na && !scene.microscope.focus_um && !job.parameters[na].free &&
-         job.parameters[na].known_to.of(job.parameters[na].value) > 0;
+         !is_exact(job.parameters[na]);
 }
 
 /// A place of the narrow problem in the wider one.

@@ -19,14 +19,14 @@ struct Stated {
   Eigen::MatrixXd information;  ///< that the pictures have of them, the noise's weights; the prior's would be 1
   Eigen::VectorXd pull;         ///< half the gradient of chi-square by them
 };
-/// To first order.
+/// To first order; `covariance` of the unknowns by the problem's weights.
 Stated linear_stated_numbers(const Task& task, LeastSquares& problem, const Theta& theta,
                              const Eigen::MatrixXd& covariance);
+/// The same, but that a shift of half a standard error or more is found by a short fit; not by waves, where that is too
+/// dear.
+Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);
 /// What they add to the covariance where each is fitted along as far as the pictures tell it.
 Eigen::MatrixXd covariance_by(const Stated& stated);
-/// The same, but that a shift of half a standard error or more is found by a short fit
-/// (`Inverse::covariance` of the unknowns by the problem's weights).
-Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);
 
 /// Those that the pictures know themselves, where it matters: fitted beside the unknowns they leave them smaller
 /// errors, or describe the pictures better than by chance.
@@ -45,8 +45,8 @@ Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optim
 /// one and two standard deviations to either side as well.
 Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima);
 
-/// The focus, where an objective is stated and no focus: set by eye within the depth of field,
-/// wavelength index / (2 NA^2), or 0.3 um. The same job where there is nothing to add.
+/// The focus, where an objective is stated, that is not exact, and no focus: set by eye within the depth of field,
+/// wavelength index / (2 NA^2), or 0.3 um if that is more. The same job where there is nothing to add.
 FitJob with_unstated_focus(FitJob job);
 bool has_unstated_focus(const FitJob& job);
 

@@ -149,7 +149,7 @@ void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& c
   // feel.
   constexpr double kOfNote = 1.2, kOfVariance = 0.2;
   bool felt = false;
-  for (Eigen::Index j = 0; covariances.discrepancy && j < optimum.searched.size(); ++j)
+  for (Eigen::Index j = 0; covariances.discrepancy() && j < optimum.searched.size(); ++j)
     if (const auto at = estimate_at(task, result, static_cast<int>(j)); at && at->unit != "px")
       felt = felt || std::pow(covariances.by_discrepancy[j], 2) - covariances.of_noise.covariance(j, j) >
                          kOfVariance * std::pow(at->stderr_, 2);

@@ -1,6 +1,10 @@
 #include "fit/problem/task.h"
 
+#include <map>
+#include <set>
+
 #include "fit/problem/light.h"
+#include "medium/references.h"
 
 namespace birefit::estimation {
 namespace {
@@ -64,6 +68,21 @@ std::vector<Sight> sights_of(const FitJob& job) {
       add_sights(std::get<Readings>(measurement), sights);
   }
   return sights;
+}
+
+std::vector<int> known_to_all_frames(const Task& task) {
+  std::map<int, int> readers;
+  for (int g = 0; g < task.frames(); ++g) {
+    std::set<int> read;
+    for_each_ref(task.picture(g).scene, [&](const ParameterRef& ref) {
+      if (ref && !task.job.parameters[ref].free) read.insert(ref.index);
+    });
+    for (const int index : read) ++readers[index];
+  }
+  std::vector<int> known;
+  for (const auto& [index, number] : readers)
+    if (number == task.frames()) known.push_back(index);
+  return known;
 }
 
 }  // namespace birefit::estimation

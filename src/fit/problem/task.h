@@ -35,6 +35,10 @@ struct Sight {
 /// The sights of a job's measurements, in their order. The job has to outlive them.
 std::vector<Sight> sights_of(const FitJob& job);
 
+struct Task;
+/// Table indices of the numbers that every frame of a task reads and that are not fitted, in ascending order.
+std::vector<int> known_to_all_frames(const Task& task);
+
 /// A job and what is estimated of it. Refers to the job, which has to outlive it.
 struct Task {
   explicit Task(const FitJob& of) : job(of), unknowns(Unknowns::of(of)), sights(sights_of(of)) {}
