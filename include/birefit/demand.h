@@ -1,9 +1,12 @@
 #pragma once
 // How a scene is to be computed: by which physics, and how exactly. What is there is the scene's business (scene.h).
 
+#include <memory>
 #include <string>
 
 namespace birefit {
+
+class Memo;  // birefit/memo.h
 
 /// The physics ceiling: what a render may leave out (docs/methods.md).
 enum class Ceiling {
@@ -24,6 +27,9 @@ struct Demand {
   Rays rays = Rays::straight;        ///< without meaning under Ceiling::wave
   double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold; (0, 0.1]
   std::string method = "auto";       ///< or a transport method's name
+  /// Equilibria that pictures ask for again and again, shared by all that this is passed to. plan() makes one where
+  /// there is none; a fit has one for all its plans.
+  std::shared_ptr<Memo> memo = nullptr;
 };
 
 }  // namespace birefit

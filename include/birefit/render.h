@@ -77,6 +77,6 @@ double ripple_period(const Scene& scene, const Demand& demand, const Theta& thet
 
 /// Largest change of retardance phase (rad) anywhere in the image per unit of theta[index]; 0 when the parameter forms
 /// no fringes. The coarse scan steps by less than a radian of it.
-double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index);
+double fringe_phase_per_unit(const Scene& scene, const Demand& demand, const Theta& theta, int index);
 
 }  // namespace birefit

@@ -83,7 +83,7 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
                           json_number(shot.stderr_));
     for (int i = 0; i < table.size(); ++i) {
       if (!table[i].free) continue;
-      const double phase = table[i].linear ? 0 : fringe_phase_per_unit(config.scene, theta, i);
+      const double phase = table[i].linear ? 0 : fringe_phase_per_unit(config.scene, config.job.demand, theta, i);
       free += fmt::format(
           "{}\n    {{\"name\": {}, \"unit\": {}, \"start\": {}, \"linear\": {}, \"fringe_rad_per_unit\": {}}}",
           free.empty() ? "" : ",", quoted(table[i].name), quoted(table[i].unit), table[i].value, table[i].linear,
@@ -127,7 +127,7 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
       continue;
     }
     std::cout << fmt::format(" from {:g} {}", parameter.value, parameter.unit);
-    const double phase = fringe_phase_per_unit(config.scene, theta, i);
+    const double phase = fringe_phase_per_unit(config.scene, config.job.demand, theta, i);
     const double span = parameter.upper - parameter.lower;
     if (phase * span > 1)
       std::cout << fmt::format(", forms fringes: {:.3g} rad between its bounds, scanned before the solver",

@@ -7,6 +7,8 @@
 
 #include "core/threads.h"
 #include "fit/problem/task.h"
+#include "medium/references.h"
+#include "samples/kind.h"
 
 namespace birefit {
 namespace {
@@ -34,13 +36,10 @@ Coarse coarser(const Scene& scene, const Theta& theta, int k) {
   if (k == 1) return coarse;
   View& view = coarse.scene.view;
   view.width = std::max(1, view.width / k), view.height = std::max(1, view.height / k);
-  const auto move = [&](ParameterRef& place) {
-    if (place) coarse.replace(place, (coarse.value(place) - 0.5 * (k - 1)) / k);
-  };
-  move(view.center_x_px), move(view.center_y_px);
+  for_each_number(coarse.scene, [&](ParameterRef& place, const NumberSpec& spec) {
+    if (place && spec.unit == "px") coarse.replace(place, (coarse.value(place) - 0.5 * (k - 1)) / k);
+  });
   if (view.pixel_size_um) coarse.replace(view.pixel_size_um, k * coarse.value(view.pixel_size_um));
-  if (auto* crystal = std::get_if<Crystal>(&coarse.scene.sample))
-    move(crystal->electrode_low_px), move(crystal->electrode_high_px);
   return coarse;
 }
 
@@ -90,7 +89,7 @@ double forecast_fit(const FitJob& job) {
   // before them many times at some; and what noise, residuals and reports take of each pixel (s). Found by the shipped
   // configs (docs/methods.md, "How long a fit takes").
   constexpr double kWhole = 90, kScan = 900, kPixel = 1.2e-5;
-  constexpr double kRoundsOfDiscs = 4;  // what is left out of a disc follows its parameters, a fit each time
+  constexpr double kRoundsOfZones = 4;  // what is left out of a picture follows the parameters, a fit each time
   const double scanned_each = std::max(50.0, static_cast<double>(job.options.scan_pixels) / std::max(1, task.frames()));
   double whole = 0, scanned = 0, pixels = 0;
   Cost with_derivatives, plain;
@@ -112,7 +111,7 @@ double forecast_fit(const FitJob& job) {
     scanned += plain.of(std::min(used, scanned_each));
   }
   double rounds = std::max<double>(1, static_cast<double>(job.branches.size()));
-  if (task.frames() > 0 && std::holds_alternative<StressedDisc>(task.picture(0).scene.sample)) rounds *= kRoundsOfDiscs;
+  if (task.frames() > 0 && kind_of(task.picture(0).scene).zone) rounds *= kRoundsOfZones;
   const bool searches = !task.unknowns.searched.empty();
   return rounds * (kWhole * whole + (searches ? kScan * scanned : 0)) / thread_count(job.options.threads) +
          kPixel * pixels;

@@ -15,6 +15,7 @@
 #include "fit/problem/light.h"
 #include "fit/weights/noise.h"
 #include "fit/zone.h"
+#include "samples/kind.h"
 #include "scene/polariscope.h"
 
 namespace birefit {
@@ -235,7 +236,7 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
         });
   }
   const Scene& scene = first_picture(base).scene;
-  if (std::holds_alternative<StressedDisc>(scene.sample) && now.before.empty() && now.behind.empty())
+  if (traits_of(scene).isoclinics && now.before.empty() && now.behind.empty())
     candidates.emplace_back("with quarter-wave plates (circular polariscope)", [=](Scene& s, ParameterTable& t) {
       make_circular_polariscope(s.microscope, constant(t, "next phase_deg", 90));
     });

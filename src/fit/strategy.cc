@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "birefit/memo.h"
 #include "fit/errors/left_out.h"
 #include "fit/zone.h"
 #include "samples/waves/wave.h"
@@ -208,6 +209,11 @@ FitResult fit_by_chosen_waves(const FitJob& job) {
 
 }  // namespace
 
-FitResult fit(const FitJob& job) { return fit_following_zones(job, fit_by_chosen_waves); }
+FitResult fit(const FitJob& job) {
+  if (job.demand.memo) return fit_following_zones(job, fit_by_chosen_waves);
+  FitJob remembering = job;
+  remembering.demand.memo = std::make_shared<Memo>();
+  return fit_following_zones(remembering, fit_by_chosen_waves);
+}
 
 }  // namespace birefit

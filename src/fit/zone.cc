@@ -2,94 +2,94 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "samples/disc/disc.h"
+#include "samples/kind.h"
+#include "samples/zone.h"
 
 namespace birefit::estimation {
 namespace {
 
-const StressedDisc* disc_of(const Picture& picture) { return std::get_if<StressedDisc>(&picture.scene.sample); }
+/// What the scene's sample takes out of a picture; null: nothing.
+std::unique_ptr<Zone> zone_of(const Scene& scene, const Theta& theta) {
+  const auto zone = kind_of(scene).zone;
+  return zone ? zone(scene, theta) : nullptr;
+}
 
-/// The pictures of discs among a job's measurements, and where they are among its sights.
-struct PictureOfDisc {
+/// A picture of a job with a zone, and where it is among the job's sights.
+struct ZonedPicture {
   std::size_t sight = 0;
   Picture* picture = nullptr;
 };
-std::vector<PictureOfDisc> discs_of(FitJob& job) {
-  std::vector<PictureOfDisc> discs;
+std::vector<ZonedPicture> zoned_pictures(FitJob& job) {
+  std::vector<ZonedPicture> zoned;
   std::size_t sight = 0;
   for (Measurement& measurement : job.measurements) {
     Picture* picture = std::get_if<Picture>(&measurement);
-    if (picture && disc_of(*picture)) discs.push_back({sight, picture});
+    if (picture && kind_of(picture->scene).zone) zoned.push_back({sight, picture});
     sight += picture ? 1 : std::get<Readings>(measurement).rows.size();
   }
-  return discs;
+  return zoned;
 }
 
-Mask outside_all(Mask mask, const std::vector<DiscZone>& zones) {
+void leave_out(const Zone& zone, Mask& mask) {
   for (int y = 0; y < mask.height(); ++y)
     for (int x = 0; x < mask.width(); ++x)
-      if (mask(x, y) && !std::all_of(zones.begin(), zones.end(), [&](const DiscZone& z) { return z.fitted(x, y); }))
-        mask(x, y) = 0;
-  return mask;
+      if (mask(x, y) && !zone.fitted(x, y)) mask(x, y) = 0;
 }
 
 long count(const Mask& mask) {
   return std::count_if(mask.values().begin(), mask.values().end(), [](auto used) { return used != 0; });
 }
 
-/// Without whatever the zone covers for some parameters within their bounds: the corners of centre, diameter and pixel
-/// size, the forces at steps of half of what is left out around them.
-Mask possible_pixels(const FitJob& job, const Picture& micrograph, const Theta& theta) {
-  const StressedDisc& disc = *disc_of(micrograph);
-  const View& view = micrograph.scene.view;
+/// Without whatever the zone covers for some parameters within their bounds.
+Mask possible_pixels(const FitJob& job, const Picture& picture, const Theta& theta) {
   std::vector<Theta> places{theta};
-  for (const ParameterRef ref : {disc.diameter_um, view.pixel_size_um, view.center_x_px, view.center_y_px,
-                                 disc.load_azimuth_deg, view.rotation_deg}) {
-    if (!ref || !job.parameters[ref].free) continue;
-    const double lower = job.parameters[ref].lower, upper = job.parameters[ref].upper;
-    if (!std::isfinite(upper - lower)) continue;
-    int steps = 1;
-    if (ref == disc.load_azimuth_deg || ref == view.rotation_deg) {
-      const double contact = DiscZone(micrograph.scene, theta).margins().contact * 180 / std::numbers::pi;
-      steps = static_cast<int>(std::ceil(std::min(upper - lower, 180.0) / (0.5 * contact)));
-    }
+  for (const Zone::Mover& mover : zone_of(picture.scene, theta)->movers()) {
+    const Parameter& parameter = job.parameters[mover.parameter];
+    const double width = parameter.upper - parameter.lower;
+    if (!parameter.free || !std::isfinite(width)) continue;
+    const int steps =
+        mover.step > 0
+            ? static_cast<int>(std::ceil((mover.period > 0 ? std::min(width, mover.period) : width) / mover.step))
+            : 1;
     std::vector<Theta> more;
     for (const Theta& place : places)
       for (int i = 0; i <= steps; ++i) {
         more.push_back(place);
-        more.back()[static_cast<std::size_t>(ref.index)] = lower + (upper - lower) * i / std::max(1, steps);
+        more.back()[static_cast<std::size_t>(mover.parameter.index)] = parameter.lower + width * i / std::max(1, steps);
       }
     places = std::move(more);
   }
-  std::vector<DiscZone> zones;
-  for (const Theta& place : places) zones.emplace_back(micrograph.scene, place);
-  return outside_all(micrograph.mask, zones);
+  Mask mask = picture.mask;
+  for (const Theta& place : places) leave_out(*zone_of(picture.scene, place), mask);
+  return mask;
 }
 
 }  // namespace
 
-Mask fitted_pixels(const Picture& micrograph, const Theta& theta) {
-  return disc_of(micrograph) ? outside_all(micrograph.mask, {DiscZone(micrograph.scene, theta)}) : micrograph.mask;
+Mask fitted_pixels(const Picture& picture, const Theta& theta) {
+  Mask mask = picture.mask;
+  if (const std::unique_ptr<Zone> zone = zone_of(picture.scene, theta)) leave_out(*zone, mask);
+  return mask;
 }
 
 FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(const FitJob&)>& fit) {
   FitJob now = job;
-  const std::vector<PictureOfDisc> discs = discs_of(now);
-  if (discs.empty()) return fit(job);
+  const std::vector<ZonedPicture> zoned = zoned_pictures(now);
+  if (zoned.empty()) return fit(job);
   std::vector<Mask> given;
-  for (const PictureOfDisc& disc : discs) given.push_back(disc.picture->mask);
+  for (const ZonedPicture& one : zoned) given.push_back(one.picture->mask);
   Theta theta = job.parameters.values();
   bool depends = false;
-  for (const PictureOfDisc& disc : discs) {
-    Mask possible = possible_pixels(job, *disc.picture, theta);
-    Mask& mask = disc.picture->mask;
-    mask = fitted_pixels(*disc.picture, theta);
+  for (const ZonedPicture& one : zoned) {
+    Mask possible = possible_pixels(job, *one.picture, theta);
+    Mask& mask = one.picture->mask;
+    mask = fitted_pixels(*one.picture, theta);
     if (possible.values() == mask.values()) continue;
     depends = true;
     // Bounds so wide that they leave next to nothing tell no more than the start.
@@ -105,11 +105,11 @@ FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(c
   for (int round = 0; depends && round < kRounds && changed > kSettled && !result.interrupted; ++round) {
     double pixels = 0;
     changed = 0;
-    for (std::size_t d = 0; d < discs.size(); ++d) {
-      Picture& picture = *discs[d].picture;
+    for (std::size_t d = 0; d < zoned.size(); ++d) {
+      Picture& picture = *zoned[d].picture;
       const Mask before = std::exchange(picture.mask, given[d]);
       picture.mask = fitted_pixels(picture, result.theta);
-      if (count(picture.mask) == 0) return result;  // the disc has left the picture
+      if (count(picture.mask) == 0) return result;  // the sample has left the picture
       for (std::size_t i = 0; i < before.size(); ++i)
         changed += picture.mask.values()[i] != before.values()[i], pixels += picture.mask.values()[i] != 0;
     }
@@ -124,8 +124,8 @@ FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(c
     result = fit(now);
   }
   result.evaluations += evaluations, result.seconds += seconds;
-  for (std::size_t d = 0; d < discs.size(); ++d)
-    result.micrographs[discs[d].sight].outside = static_cast<int>(count(given[d]) - count(discs[d].picture->mask));
+  for (std::size_t d = 0; d < zoned.size(); ++d)
+    result.micrographs[zoned[d].sight].outside = static_cast<int>(count(given[d]) - count(zoned[d].picture->mask));
   for (ParameterEstimate& estimate : result.parameters)
     if (const ParameterRef ref = job.parameters.find(estimate.name)) estimate.start = job.parameters[ref].value;
   if (depends && changed > kSettled && !result.interrupted) {

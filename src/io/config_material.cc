@@ -6,9 +6,10 @@
 
 #include "io/described.h"
 #include "io/material_file.h"
-#include "medium/build.h"
+#include "medium/indices.h"
 #include "medium/materials/presets.h"
 #include "medium/validity.h"
+#include "samples/kind.h"
 
 namespace birefit {
 namespace {
@@ -341,7 +342,7 @@ void check_material_ranges(ConfigReader& reader, const Block& root, const Scene&
   }
   const auto* law = std::get_if<LawIndices>(&scene.material);
   if (law) {
-    for (ParameterRef t : temperatures(scene.sample, *law)) {
+    for (ParameterRef t : temperatures(scene)) {
       const Parameter& at = reader.table[t];
       const Where where = at.where.line > 0 || !material ? at.where : material->where;
       double lowest_clearing = 1e9;

@@ -11,21 +11,21 @@
 
 namespace birefit {
 
-/// Visits what structs describe for their references alone.
+/// Visits what structs describe for their references and what those may be.
 template <class F>
 struct ReferenceVisitor {
   F& f;
   template <class Ref>
-  void number(const char* /*key*/, Ref& ref, const NumberSpec&, const char* /*words*/) {
-    f(ref);
+  void number(const char* /*key*/, Ref& ref, const NumberSpec& spec, const char* /*words*/) {
+    f(ref, spec);
   }
   template <class Refs>
-  void vector(const char* /*key*/, Refs& refs, const NumberSpec&, const char* /*words*/) {
-    for (auto& ref : refs) f(ref);
+  void vector(const char* /*key*/, Refs& refs, const NumberSpec& spec, const char* /*words*/) {
+    for (auto& ref : refs) f(ref, spec);
   }
   template <class Refs>
-  void list(const char* /*key*/, Refs& refs, const NumberSpec&, const char* /*words*/) {
-    for (auto& ref : refs) f(ref);
+  void list(const char* /*key*/, Refs& refs, const NumberSpec& spec, const char* /*words*/) {
+    for (auto& ref : refs) f(ref, spec);
   }
   template <class Part>
   void inside(const char* key, Part& part) {
@@ -41,12 +41,17 @@ struct ReferenceVisitor {
   }
 };
 
-/// Calls f(ParameterRef&), of a const scene f(const ParameterRef&), for every reference of the scene, the empty ones
-/// included.
+/// Calls f(ParameterRef&, const NumberSpec&), of a const scene f(const ParameterRef&, ..), for every reference of the
+/// scene, the empty ones included.
 template <class SceneOrConst, class F>
-void for_each_ref(SceneOrConst& scene, F&& f) {
+void for_each_number(SceneOrConst& scene, F&& f) {
   ReferenceVisitor<std::remove_reference_t<F>> visit{f};
   Scene::describe(scene, visit);
+}
+/// The same without what they may be.
+template <class SceneOrConst, class F>
+void for_each_ref(SceneOrConst& scene, F&& f) {
+  for_each_number(scene, [&](auto& ref, const NumberSpec&) { f(ref); });
 }
 
 }  // namespace birefit

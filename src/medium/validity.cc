@@ -35,20 +35,7 @@ std::vector<ParameterRef> clearing_points(const LawIndices& law) {
   return refs;
 }
 
-std::vector<ParameterRef> temperatures(const Sample& sample, const LawIndices& law) {
-  std::vector<ParameterRef> refs;
-  if (clearing_points(law).empty()) return refs;
-  const Plate* plate = std::get_if<Plate>(&sample);
-  const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
-  if (heat)
-    refs = {heat->cold_k, heat->hot_k, heat->initial_k ? heat->initial_k : heat->cold_k};
-  else if (law.temperature_k)
-    refs = {law.temperature_k};
-  if (law.haller) refs.push_back(law.haller->reference_k);
-  return refs;
-}
-
-void check_validity(const Scene& scene, const Theta& theta) {
+void check_validity(const Scene& scene, const std::vector<ParameterRef>& temperatures, const Theta& theta) {
   const auto value = [&](ParameterRef ref) { return theta.at(static_cast<std::size_t>(ref.index)); };
   if (const auto range = wavelengths_um(scene.material, scene.surround_dispersion)) {
     const double nm = value(scene.microscope.wavelength_nm), slack = 1e-9 * nm;
@@ -61,10 +48,7 @@ void check_validity(const Scene& scene, const Theta& theta) {
   }
   const auto* law = std::get_if<LawIndices>(&scene.material);
   if (!law) return;
-  const Plate* plate = std::get_if<Plate>(&scene.sample);
-  if (plate && std::holds_alternative<HeatStep>(plate->heat) && clearing_points(*law).empty())
-    throw UserError(Where{}, "the material of a heated plate needs a law of temperature", "add haller to the material");
-  for (ParameterRef t : temperatures(scene.sample, *law)) {
+  for (ParameterRef t : temperatures) {
     for (ParameterRef tc : clearing_points(*law))
       if (value(t) > value(tc) - kClearingMargin_k)
         throw UserError(

@@ -17,12 +17,11 @@ struct WavelengthRange {
 };
 /// The wavelengths (um) for which all dispersions of the scene hold; nothing where there is none.
 std::optional<WavelengthRange> wavelengths_um(const Material& material, const std::optional<Dispersion>& surround);
-/// The references to temperatures that the indices of this scene are computed at.
-std::vector<ParameterRef> temperatures(const Sample& sample, const LawIndices& law);
 /// The references to clearing points.
 std::vector<ParameterRef> clearing_points(const LawIndices& law);
 
-/// Throws UserError when theta is outside what the material's law covers: wavelength, temperature, clearing point.
-void check_validity(const Scene& scene, const Theta& theta);
+/// Throws UserError when theta is outside what the material's law covers: wavelength, clearing point and, of those that
+/// `temperatures` (samples/kind.h) refers to, temperature.
+void check_validity(const Scene& scene, const std::vector<ParameterRef>& temperatures, const Theta& theta);
 
 }  // namespace birefit

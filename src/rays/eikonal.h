@@ -13,7 +13,7 @@
 namespace birefit {
 
 /// Radial droplets without twist, shells whose core is in the middle, droplets in a field along the view.
-bool rays_stay_meridional(const Sample& sample);
+bool rays_stay_meridional(const Droplet& droplet);
 
 /// A droplet in units of its radius and of its ordinary index. Radial (a shell where core > 0) unless there is a field.
 template <class T>
@@ -48,9 +48,11 @@ struct MeridionalRay {
 /// counts as lost.
 ///
 /// In a field the extraordinary ray obeys Hamilton's equations of H = w^2 + (n_e^2 - 1) (n.w)^2 - n_e^2, w the
-/// wavevector: the geodesics of n_e^2 I - (n_e^2 - 1) n n. Boost.Odeint, Dormand-Prince, each step to 1e-8.
+/// wavevector: the geodesics of n_e^2 I - (n_e^2 - 1) n n. Boost.Odeint, Dormand-Prince, each step to 1e-8. `equator`,
+/// where given, becomes the distance from the axis at which such a ray crosses the plane z = 0, if it does.
 template <class T>
-MeridionalRay<T> meridional_ray(const MeridionalDroplet<T>& droplet, bool extraordinary, const T& psi);
+MeridionalRay<T> meridional_ray(const MeridionalDroplet<T>& droplet, bool extraordinary, const T& psi,
+                                T* equator = nullptr);
 
 /// Field of one mode at an image radius when it runs on its own rays.
 template <class S>

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "medium/build.h"
+#include "medium/indices.h"
 #include "transport/method.h"
 
 namespace birefit {
@@ -122,7 +122,7 @@ DropletOptics<S> droplet_optics(const Scene& scene, const Values<S>& value, Cont
                                     : o.radius_um * value(axial.local_field_factor) * value(axial.field_v_per_um) /
                                           value(axial.coherence_voltage_v);
     o.axial = std::make_shared<const AxialField<S>>(e, value.get(axial.ring_radius, 0.0),
-                                                    static_cast<bool>(axial.ring_radius));
+                                                    static_cast<bool>(axial.ring_radius), value.memo());
   }
   o.continuity = continuity;
   return o;

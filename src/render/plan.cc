@@ -8,18 +8,22 @@
 #include <fmt/format.h>
 
 #include "birefit/error.h"
+#include "birefit/memo.h"
 #include "birefit/render.h"
 #include "instrument/exposure.h"
 #include "medium/validity.h"
-#include "rays/eikonal.h"
 #include "samples/kind.h"
-#include "samples/sphere/ball.h"
-#include "samples/waves/series.h"
+#include "samples/tables/polar_table.h"
 #include "samples/waves/wave.h"
 #include "transport/method.h"
 
 namespace birefit {
 namespace {
+
+bool has_series(const Scene& scene) {
+  const SampleWaves* const waves = kind_of(scene).waves;
+  return waves && waves->has_series && waves->has_series(scene);
+}
 
 void check_method(const Scene& scene, const Demand& demand) {
   if (demand.method == "auto") return;
@@ -49,17 +53,15 @@ void check_method(const Scene& scene, const Demand& demand) {
         "leave transport.method at auto");
 }
 
-std::vector<double> phases(const Scene& scene, const Theta& theta) {
-  const Values<double> value(theta, {});
+std::vector<double> phases(const Scene& scene, const Values<double>& value) {
   std::vector<double> phases = kind_of(scene).phases_rad(scene, value);
   const std::vector<double> of_parts = part_phases(scene.microscope, value);
   phases.insert(phases.end(), of_parts.begin(), of_parts.end());
   return phases;
 }
-double largest_phase(const Scene& scene, const Theta& theta) {
+double largest_phase(const Scene& scene, const Values<double>& value) {
   double largest = 0;
-  for (const double phase : kind_of(scene).phases_rad(scene, Values<double>(theta, {})))
-    largest = std::max(largest, std::abs(phase));
+  for (const double phase : kind_of(scene).phases_rad(scene, value)) largest = std::max(largest, std::abs(phase));
   return largest;
 }
 
@@ -75,10 +77,10 @@ Symmetry symmetry_of(const SampleKind& kind, const Scene& scene, const RenderPla
 }
 
 /// What the literature's birefringence is off by.
-void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
+void note_material(const Scene& scene, const Values<double>& value, RenderPlan& plan) {
   const auto* law = std::get_if<LawIndices>(&scene.material);
   if (!law || law->birefringence_uncertainty <= 0) return;
-  const double largest = largest_phase(scene, theta), unsure = largest * law->birefringence_uncertainty;
+  const double largest = largest_phase(scene, value), unsure = largest * law->birefringence_uncertainty;
   plan.model_error = std::hypot(plan.model_error, 0.5 * std::min(1.0, unsure));  // the steepest slope of sin^2(phase/2)
   plan.left_out.push_back(fmt::format(
       "The material's birefringence is known to {:.2g} % only (standard deviation): the largest retardance, {:.3g} "
@@ -89,10 +91,12 @@ void note_material(const Scene& scene, const Theta& theta, RenderPlan& plan) {
 
 }  // namespace
 
-RenderPlan plan(const Scene& scene, const Demand& demand, const Theta& theta, const Observable& observable) {
-  check_method(scene, demand);
-  check_validity(scene, theta);
-  const Values<double> value(theta, {});
+RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, const Observable& observable) {
+  check_method(scene, asked);
+  check_validity(scene, temperatures(scene), theta);
+  Demand demand = asked;
+  if (!demand.memo) demand.memo = std::make_shared<Memo>();
+  const Values<double> value(theta, {}, demand.memo.get());
   const SampleKind& kind = kind_of(scene, observable);
   const Exposure exposure = exposure_of(scene.microscope);
   const BeamMaker& light = exposure.directions.front();
@@ -107,14 +111,14 @@ RenderPlan plan(const Scene& scene, const Demand& demand, const Theta& theta, co
                           picture_of};
   RenderPlan result;
   if (demand.ceiling == Ceiling::wave) {
-    result = has_series(scene) && demand.method != "split_step" ? plan_series(scene, demand, value, light)
+    result = has_series(scene) && demand.method != "split_step" ? kind.waves->plan_series(scene, demand, value, light)
                                                                 : plan_wave(planning);
-    note_illumination(scene, value, largest_phase(scene, theta), result);
+    note_illumination(scene, value, largest_phase(scene, value), result);
   } else {
     result = kind.plan(planning);
   }
   result.observable = observable;
-  note_material(scene, theta, result);
+  note_material(scene, value, result);
   if (kind.note) kind.note(scene, value, result);
   const Symmetry symmetry = symmetry_of(kind, scene, result, value, light);
   if (symmetry == Symmetry::half_turn)
@@ -145,7 +149,10 @@ double march_error(const Scene& scene, const Theta& theta, int threads) {
   return march_error_on_twin(scene, exposure_of(scene.microscope).directions.front(), theta, threads, picture_of);
 }
 
-bool has_curved_rays(const Scene& scene) { return rays_stay_meridional(scene.sample); }
+bool has_curved_rays(const Scene& scene) {
+  const SampleKind& kind = kind_of(scene);
+  return kind.curved_rays && kind.curved_rays(scene);
+}
 
 WaveChoice wave_choice(const Scene& scene, Demand demand, const Theta& theta) {
   demand.ceiling = Ceiling::wave;
@@ -162,16 +169,17 @@ WaveChoice wave_choice(const Scene& scene, Demand demand, const Theta& theta) {
 
 double ripple_period(const Scene& scene, const Demand& demand, const Theta& theta, int index) {
   if (demand.ceiling != Ceiling::wave || !has_series(scene) || demand.method == "split_step") return 0;
-  return series_ripple_period(scene, Values<double>(theta, {}), index);
+  return kind_of(scene).waves->series_ripple_period(scene, Values<double>(theta, {}, demand.memo.get()), index);
 }
 
-double fringe_phase_per_unit(const Scene& scene, const Theta& theta, int index) {
+double fringe_phase_per_unit(const Scene& scene, const Demand& demand, const Theta& theta, int index) {
   const std::size_t i = static_cast<std::size_t>(index);
   const double h = std::max(1e-6, 1e-5 * std::abs(theta[i]));
   Theta up = theta, down = theta;
   up[i] += h;
   down[i] -= h;
-  const std::vector<double> a = phases(scene, up), b = phases(scene, down);
+  const std::vector<double> a = phases(scene, Values<double>(up, {}, demand.memo.get())),
+                            b = phases(scene, Values<double>(down, {}, demand.memo.get()));
   double largest_change = 0;
   for (std::size_t k = 0; k < a.size(); ++k) largest_change = std::max(largest_change, std::abs(a[k] - b[k]));
   const double slope = largest_change / (2 * h);

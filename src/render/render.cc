@@ -320,7 +320,7 @@ class BandPainter {
 template <class S>
 void render_planes(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
                    const std::vector<int>& active, int threads, const std::vector<Image*>& images) {
-  const Values<S> value(theta, active);
+  const Values<S> value(theta, active, plan.demand.memo.get());
   const std::unique_ptr<SampleImage<S>> model = make_image<S>(scene, plan, value, light);
   model->tabulate(SampleImage<S>::Wanted::picture, threads);
   const int w = scene.view.width, h = scene.view.height;
@@ -338,7 +338,7 @@ template <class S>
 void render_list(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
                  const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active, int threads,
                  PixelRendering& out, int first_column) {
-  const Values<S> value(theta, active);
+  const Values<S> value(theta, active, plan.demand.memo.get());
   const std::unique_ptr<SampleImage<S>> model = make_image<S>(scene, plan, value, light);
   model->tabulate(SampleImage<S>::Wanted::points, threads);
   const int n = static_cast<int>(pixels.size());
@@ -441,7 +441,7 @@ void in_chunks(const std::vector<int>& active, std::size_t most, const Body& bod
 /// What light of one direction brings.
 void render_direction(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
                       const std::vector<int>& active, int threads, Rendering& into) {
-  if (plan.wave) return render_wave(scene, *plan.wave, light, theta, active, threads, into);
+  if (plan.wave) return render_wave(scene, plan, light, theta, active, threads, into);
   into.derivatives.resize(active.size());
   if (active.empty()) {
     render_planes<Pack>(scene, plan, light, theta, {}, threads, {&into.intensity});
@@ -463,7 +463,7 @@ void render_direction(const Scene& scene, const RenderPlan& plan, const BeamMake
   if (pixels.empty()) return;
   if (plan.wave) {  // there is no part of such a picture
     Rendering all;
-    render_wave(scene, *plan.wave, light, theta, active, threads, all);
+    render_wave(scene, plan, light, theta, active, threads, all);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const auto [column, row] = pixels[i];
       into.intensity[static_cast<long>(i)] = all.intensity(column, row);
@@ -583,7 +583,7 @@ bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::v
 }
 
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
-  const Values<double> value(theta, {});
+  const Values<double> value(theta, {}, plan.demand.memo.get());
   if (plan.demand.ceiling == Ceiling::wave)
     throw UserError(Where{}, "under ceiling: wave a point of the image has no Jones matrix of its own ray",
                     "use `render`, or ceiling: one_way");

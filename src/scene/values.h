@@ -11,11 +11,15 @@
 
 namespace birefit {
 
+class Memo;  // birefit/memo.h
+
 /// Theta as scalars S: entry active[j] carries derivative j.
 template <class S>
 class Values {
  public:
-  Values(const Theta& theta, std::vector<int> active) : theta_(theta), active_(std::move(active)) {}
+  /// `memo`: of what is worked out from them; may be null.
+  Values(const Theta& theta, std::vector<int> active, Memo* memo = nullptr)
+      : theta_(theta), active_(std::move(active)), memo_(memo) {}
   S operator()(ParameterRef ref) const {
     S value(theta_.at(static_cast<std::size_t>(ref.index)));
     if constexpr (ScalarTraits<S>::derivatives > 0) {
@@ -26,10 +30,11 @@ class Values {
   }
   const Theta& theta() const { return theta_; }
   const std::vector<int>& active() const { return active_; }
+  Memo* memo() const { return memo_; }
   /// The same values as another scalar.
   template <class T>
   Values<T> as() const {
-    return {theta_, active_};
+    return {theta_, active_, memo_};
   }
   S get(ParameterRef ref, double fallback) const { return ref ? (*this)(ref) : S(fallback); }
   S radians(ParameterRef ref, double fallback_deg = 0) const {
@@ -39,6 +44,7 @@ class Values {
  private:
   const Theta& theta_;
   std::vector<int> active_;
+  Memo* memo_;
 };
 
 template <class S>

@@ -1,7 +1,6 @@
 #include "wave/fft.h"
 
 #include <algorithm>
-#include <map>
 #include <mutex>
 #include <utility>
 
@@ -22,15 +21,6 @@ int fast_fft_size(int n) {
     while (left % 5 == 0) left /= 5, ++fives;
     if ((left == 1 && fives <= 2) || (left == 3 && fives == 0 && size < 100)) return size;
   }
-}
-
-std::shared_ptr<const Fft2> shared_fft(int width, int height) {
-  static std::mutex guard;
-  static std::map<std::pair<int, int>, std::shared_ptr<const Fft2>> known;
-  const std::lock_guard lock(guard);
-  std::shared_ptr<const Fft2>& fft = known[{width, height}];
-  if (!fft) fft = std::make_shared<const Fft2>(width, height);
-  return fft;
 }
 
 #ifdef BIREFIT_KISSFFT

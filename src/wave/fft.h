@@ -58,9 +58,6 @@ class Fft2 {
   std::unique_ptr<Plans> plans_;
 };
 
-/// One for all who want this size: planning takes as long as many transforms.
-std::shared_ptr<const Fft2> shared_fft(int width, int height);
-
 /// The cheapest good size >= n; even.
 int fast_fft_size(int n);
 

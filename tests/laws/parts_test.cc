@@ -16,32 +16,6 @@ namespace {
 using testing::Kind;
 using Setting = std::function<void(Microscope&, Kind&)>;
 
-/// The kind's picture on few pixels.
-constexpr int kSide = 8;
-Kind small(Kind kind) {
-  View& view = kind.scene.view;
-  const double share = static_cast<double>(view.width) / kSide;
-  const auto place = [&](ParameterRef& ref) {
-    if (ref) ref = kind.number("place", (kind.table.values()[static_cast<std::size_t>(ref.index)] + 0.5) / share - 0.5);
-  };
-  place(view.center_x_px), place(view.center_y_px);
-  if (auto* crystal = std::get_if<Crystal>(&kind.scene.sample))
-    place(crystal->electrode_low_px), place(crystal->electrode_high_px);
-  view.width = view.height = kSide;
-  double pixel_um = share * kind.table.values()[static_cast<std::size_t>(view.pixel_size_um.index)];
-  // Waves are sent through a box as large as the droplet: half of it costs an eighth.
-  if (auto* droplet = std::get_if<Droplet>(&kind.scene.sample); droplet && kind.demand.ceiling == Ceiling::wave)
-    droplet->diameter_um = kind.number("diameter", 4), pixel_um *= 0.5;
-  view.pixel_size_um = kind.number("pixel_size_um", pixel_um);
-  return kind;
-}
-
-std::vector<Kind> all_kinds() {
-  std::vector<Kind> all;
-  for (Kind& kind : testing::every_kind()) all.push_back(small(std::move(kind)));
-  return all;
-}
-
 ParameterRef azimuth(Kind& kind, double deg) { return kind.number("azimuth", deg); }
 void set_polarizers(Microscope& m, Kind& kind, double polarizer_deg, double analyzer_deg) {
   m.polarizer_deg = azimuth(kind, polarizer_deg), m.analyzer_deg = azimuth(kind, analyzer_deg);
@@ -72,7 +46,7 @@ struct Term {
 };
 /// max |sum of factor x picture|
 double residual(const Kind& kind, const RenderPlan& plan, const std::vector<Term>& terms) {
-  Image sum(kSide, kSide);
+  Image sum(testing::kSmallSide, testing::kSmallSide);
   for (const Term& term : terms) {
     const Image image = picture(kind, plan, term.setting);
     for (std::size_t i = 0; i < sum.size(); ++i) sum.values()[i] += term.factor * image.values()[i];
@@ -94,7 +68,7 @@ class Parts : public ::testing::Test {
   template <class F>
   void for_every_kind(const F& what) {
     std::mt19937_64 random(7);
-    for (const Kind& kind : all_kinds()) {
+    for (const Kind& kind : testing::every_kind_small()) {
       SCOPED_TRACE(kind.name);
       what(kind, plan_of(kind),
            [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); });

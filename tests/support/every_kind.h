@@ -192,4 +192,29 @@ inline std::vector<Kind> every_kind() {
   return all;
 }
 
+inline constexpr int kSmallSide = 8;
+/// The kind's picture on so many pixels a side.
+inline Kind small(Kind kind) {
+  View& view = kind.scene.view;
+  const double share = static_cast<double>(view.width) / kSmallSide;
+  const auto place = [&](ParameterRef& ref) {
+    if (ref) ref = kind.number("place", (kind.table.values()[static_cast<std::size_t>(ref.index)] + 0.5) / share - 0.5);
+  };
+  place(view.center_x_px), place(view.center_y_px);
+  if (auto* crystal = std::get_if<Crystal>(&kind.scene.sample))
+    place(crystal->electrode_low_px), place(crystal->electrode_high_px);
+  view.width = view.height = kSmallSide;
+  double pixel_um = share * kind.table.values()[static_cast<std::size_t>(view.pixel_size_um.index)];
+  // Waves are sent through a box as large as the droplet: half of it costs an eighth.
+  if (auto* droplet = std::get_if<Droplet>(&kind.scene.sample); droplet && kind.demand.ceiling == Ceiling::wave)
+    droplet->diameter_um = kind.number("diameter", 4), pixel_um *= 0.5;
+  view.pixel_size_um = kind.number("pixel_size_um", pixel_um);
+  return kind;
+}
+inline std::vector<Kind> every_kind_small() {
+  std::vector<Kind> all;
+  for (Kind& kind : every_kind()) all.push_back(small(std::move(kind)));
+  return all;
+}
+
 }  // namespace birefit::testing

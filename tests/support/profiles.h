@@ -5,7 +5,8 @@
 #include <memory>
 #include <numbers>
 
-#include "medium/build.h"
+#include "medium/families/planar.h"
+#include "medium/families/profile.h"
 #include "samples/layers/planar.h"
 #include "transport/methods.h"
 

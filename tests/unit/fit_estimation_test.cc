@@ -630,7 +630,7 @@ TEST(Scan, NoStepIsLongerThanARadian) {
       theta[static_cast<std::size_t>(index)] = 0.5 * (scan.value[i] + scan.value[i - 1]);
       // The rate in the middle for the step. It may be a little larger between two of the 17 places where the scan asks
       // for it.
-      EXPECT_LT(fringe_phase_per_unit(m.scene, theta, index) * step, 1.05)
+      EXPECT_LT(fringe_phase_per_unit(m.scene, {}, theta, index) * step, 1.05)
           << scan.name << ' ' << theta[static_cast<std::size_t>(index)];
       widest = std::max(widest, step), narrowest = std::min(narrowest, step);
     }

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "birefit/io.h"
-#include "medium/build.h"
+#include "medium/indices.h"
 #include "reference_table.h"
 
 namespace birefit {

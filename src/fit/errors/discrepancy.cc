@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fit/errors/statistics.h"
+#include "samples/kind.h"
 #include "scene/values.h"
 
 namespace birefit::estimation {
@@ -122,7 +123,7 @@ Sums sums_of(const Task& task, const Optimum& optimum, const Patterns& patterns,
   const Scene& scene = task.picture(0).scene;
   const Values<double> value(optimum.theta, {});
   const double center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px),
-               radius_px = 0.5 * value(std::get<Droplet>(scene.sample).diameter_um) / value(scene.view.pixel_size_um),
+               radius_px = 0.5 * value(traits_of(scene).sphere_diameter_um) / value(scene.view.pixel_size_um),
                from = value.radians(scene.microscope.polarizer_deg),
                half_side = 0.5 * std::max(scene.view.width, scene.view.height);
   const ModelLight light(problem, scene.view, center_x, center_y);
@@ -250,7 +251,7 @@ Eigen::VectorXd by_parts(const std::vector<Sums::Part>& parts, const Eigen::Matr
 Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum) {
   constexpr double kFactor = 1.5;
   const bool spheres = task.frames() == 1 && task.observable(0).quantity == Quantity::intensity &&
-                       std::holds_alternative<Droplet>(task.picture(0).scene.sample);
+                       traits_of(task.picture(0).scene).sphere_diameter_um;
   if (!spheres || task.unknowns.size() == 0 || optimum.stopped) return {};
   const LeastSquares& problem = *optimum.problem;
   const double pixels = static_cast<double>(problem.pixel_rows()), chi_square = problem.frame_misfit(0).chi_square;

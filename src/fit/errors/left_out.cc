@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "fit/problem/light.h"
+#include "samples/kind.h"
 #include "samples/waves/wave.h"
 
 namespace birefit::estimation {
@@ -174,7 +175,7 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
 void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {
   const auto has_waves = [](const Sight& sight) {
     const Scene& scene = sight.picture->scene;
-    return std::holds_alternative<Droplet>(scene.sample) && scene.microscope.objective_na;
+    return traits_of(scene).sphere_diameter_um && scene.microscope.objective_na;
   };
   const FitJob& job = task.job;
   if (optimum.stopped || job.demand.ceiling != Ceiling::one_way || task.unknowns.searched.empty() ||

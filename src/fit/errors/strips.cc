@@ -9,23 +9,12 @@
 
 #include "core/robust.h"
 #include "fit/errors/report.h"
+#include "samples/kind.h"
 
 namespace birefit::estimation {
 namespace {
 
 constexpr int kStrips = 16;
-
-/// Along which axis strips follow each other: the field's in a bar (a bar's field varies along itself), else rows.
-/// Nothing where a sample has no parts that are alike.
-std::optional<bool> strips_of_rows(const Sample& sample) {
-  if (const auto* crystal = std::get_if<Crystal>(&sample)) {
-    if (!crystal->field_legendre.empty()) return std::nullopt;  // the variation is the model's own
-    return crystal->field_along_y;
-  }
-  if (const auto* plate = std::get_if<Plate>(&sample); plate && !plate->screen_distance_um) return true;
-  if (std::holds_alternative<StressedDisc>(sample)) return true;
-  return std::nullopt;
-}
 
 /// Ends of strips that hold alike numbers of the first frame's pixels.
 std::vector<int> strip_ends(const Pixels& pixels, bool rows) {
@@ -140,13 +129,14 @@ std::string range(const std::vector<Strip>& strips, double Strip::*measure, cons
 
 void compare_strips(const Task& task, const Optimum& optimum, FitResult& result) {
   if (task.unknowns.searched.empty() || task.interrupted() || optimum.stopped) return;
-  const std::optional<bool> rows = strips_of_rows(task.picture(0).scene.sample);
+  const Traits::Strips strips_are = traits_of(task.picture(0).scene).strips;
+  const bool rows = strips_are == Traits::Strips::rows;
   constexpr double kDescribed = 2;  // a model that describes the image leaves strips nothing to differ by
-  if (!rows || !(result.reduced_chi_square > kDescribed)) return;
+  if (strips_are == Traits::Strips::none || !(result.reduced_chi_square > kDescribed)) return;
   std::vector<Strip> strips;
-  const std::vector<int> ends = strip_ends(optimum.frames.front().pixels, *rows);
+  const std::vector<int> ends = strip_ends(optimum.frames.front().pixels, rows);
   for (std::size_t i = 1; i < ends.size(); ++i)
-    if (std::optional<Strip> strip = fitted_strip(task, optimum, *rows, ends[i - 1], ends[i])) strips.push_back(*strip);
+    if (std::optional<Strip> strip = fitted_strip(task, optimum, rows, ends[i - 1], ends[i])) strips.push_back(*strip);
   if (strips.size() < 4) return;
   std::size_t worst = 0;
   for (std::size_t j = 1; j < task.unknowns.searched.size(); ++j)
@@ -166,8 +156,8 @@ void compare_strips(const Task& task, const Optimum& optimum, FitResult& result)
   const auto run = longest_run(steady), trusted = longest_run(both);
   const bool stands_out = run[1] - run[0] >= kFewestSteady;
   if (between < kBeyondChance && !stands_out) return;
-  const std::string what = *rows ? "rows" : "columns";
-  const std::size_t side = *rows ? 1 : 0;
+  const std::string what = rows ? "rows" : "columns";
+  const std::size_t side = rows ? 1 : 0;
   const Parameter& parameter = task.searched(worst);
   std::string words;
   for (const Strip& s : strips)

@@ -5,6 +5,7 @@
 
 #include "fit/search/optimum.h"
 #include "fit/search/search.h"
+#include "samples/kind.h"
 
 namespace birefit::estimation {
 namespace {
@@ -21,8 +22,8 @@ FitJob job_by_rays(const FitJob& job) {
 }
 
 bool is_diameter(const Task& task, int g, std::size_t j) {
-  const auto* droplet = std::get_if<Droplet>(&task.picture(g).scene.sample);
-  return droplet && droplet->diameter_um.index == task.unknowns.searched[j];
+  const ParameterRef diameter = traits_of(task.picture(g).scene).sphere_diameter_um;
+  return diameter && diameter.index == task.unknowns.searched[j];
 }
 
 /// Wave plans for all of the places to look at: a grid for the largest droplet among them, as a larger one than it was
@@ -101,7 +102,8 @@ Minima search_near_rays(const Task& task, const Start& start) {
   for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)
     for_each_scene(by_rays.measurements, [&](const Scene& scene) {
       double& rate = rates[static_cast<Eigen::Index>(j)];
-      rate = std::max(rate, std::abs(fringe_phase_per_unit(scene, rays.theta, task.unknowns.searched[j])));
+      rate = std::max(rate,
+                      std::abs(fringe_phase_per_unit(scene, task.job.demand, rays.theta, task.unknowns.searched[j])));
     });
   task.say("neighbouring fringe orders by wave optics");
   const auto problem_for = [&](const std::vector<Eigen::VectorXd>& places) {

@@ -19,9 +19,9 @@ double inverse_of(const std::vector<double>& x, const std::vector<double>& y, do
 
 /// 0 where the bounds leave what the model can do (no equilibrium, beyond a clearing point): there is no image to look
 /// at either.
-double rate_at(const Scene& scene, const Theta& theta, int index) {
+double rate_at(const Task& task, int frame, const Theta& theta, int index) {
   try {
-    const double rate = fringe_phase_per_unit(scene, theta, index);
+    const double rate = fringe_phase_per_unit(task.picture(frame).scene, task.job.demand, theta, index);
     return std::isfinite(rate) ? rate : 0;
   } catch (const UserError&) {
     return 0;
@@ -59,7 +59,7 @@ PicturePhase fringe_phase(const Task& task, const Theta& theta, int index) {
       probe[static_cast<std::size_t>(index)] = phase.value.back();
       for (int g = 0; g < frames; g += stride)
         if (task.observable(g).quantity == Quantity::intensity)  // nothing else has fringes
-          fastest = std::max(fastest, rate_at(task.picture(g).scene, probe, index));
+          fastest = std::max(fastest, rate_at(task, g, probe, index));
     }
     rates.push_back(fastest);
   }

@@ -11,6 +11,7 @@
 
 #include "birefit/error.h"
 #include "fit/errors/statistics.h"
+#include "samples/kind.h"
 
 namespace birefit::estimation {
 namespace {
@@ -66,12 +67,9 @@ std::size_t product_of(const std::vector<Axis>& axes) {
   return product;
 }
 
-/// A cell's picture is one number, of a director that no field has to be found for.
 bool costs_microseconds(const Task& task) {
-  return std::all_of(task.sights.begin(), task.sights.end(), [](const Sight& sight) {
-    const Cell* cell = std::get_if<Cell>(&sight.picture->scene.sample);
-    return cell && !std::holds_alternative<FreederickszDirector>(cell->director);
-  });
+  return std::all_of(task.sights.begin(), task.sights.end(),
+                     [](const Sight& sight) { return traits_of(sight.picture->scene).quick; });
 }
 
 /// What has several valleys, and what has one as long as the grid stays small: it moves the others' minima. `fineness`:
@@ -84,8 +82,8 @@ std::vector<Axis> axes_of(const Task& task, const std::vector<PicturePhase>& pha
       const Parameter& parameter = task.searched(j);
       double longest = (parameter.upper - parameter.lower) / (of_fringes ? kFewestPointsOfFringes : kFewestPoints);
       for (const Sight& sight : task.sights)
-        if (const Droplet* droplet = std::get_if<Droplet>(&sight.picture->scene.sample);
-            droplet && droplet->diameter_um.index == task.unknowns.searched[j])
+        if (const ParameterRef diameter = traits_of(sight.picture->scene).sphere_diameter_um;
+            diameter && diameter.index == task.unknowns.searched[j])
           longest = std::min(longest, kDiameterStep * parameter.upper);
       Axis axis = axis_along(static_cast<int>(j), phases[j], (of_fringes ? kStepOfFringes : kStep) / fineness, longest);
       const bool needed = of_fringes || phases[j].total() > kOneValley;

@@ -5,6 +5,7 @@
 
 #include "fit/problem/constant.h"
 #include "fit/search/centre.h"
+#include "samples/kind.h"
 
 namespace birefit::estimation {
 namespace {
@@ -43,8 +44,7 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
 }
 
 bool has_own_rays(const Task& task, const Frame& frame, int g) {
-  return std::holds_alternative<Droplet>(task.picture(g).scene.sample) && frame.plan.radial_panels == 0 &&
-         !frame.plan.wave;
+  return traits_of(task.picture(g).scene).sphere_diameter_um && frame.plan.radial_panels == 0 && !frame.plan.wave;
 }
 
 /// How many pixels of a frame the search looks at: where every pixel is rays of its own, no more than it takes.
@@ -52,7 +52,7 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
   const std::size_t share =
       static_cast<std::size_t>(std::max(50, task.job.options.scan_pixels / std::max(1, task.frames())));
   const Frame& frame = frames[static_cast<std::size_t>(g)];
-  const bool own_rays = std::holds_alternative<Droplet>(task.picture(g).scene.sample) && frame.plan.radial_panels == 0;
+  const bool own_rays = traits_of(task.picture(g).scene).sphere_diameter_um && frame.plan.radial_panels == 0;
   if (!own_rays) return share;
   // kEnough: units of chi-square by which a constant image is then off; a wrong order is by a good part of that.
   // kFewest: pixels that lie where the image is not flat, however much of it is background.
@@ -71,10 +71,8 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
   return needed < static_cast<double>(share) ? static_cast<std::size_t>(needed) : share;
 }
 
-/// A cell's picture is one number: the mean of its pixels tells all of it, and has a row instead of hundreds.
-bool is_one_number(const Picture& micrograph) {
-  return std::holds_alternative<Cell>(micrograph.scene.sample) && micrograph.uneven.empty();
-}
+/// Where a picture is one number the mean of its pixels tells all of it, and has a row instead of hundreds.
+bool is_one_number(const Picture& micrograph) { return traits_of(micrograph.scene).even && micrograph.uneven.empty(); }
 PixelSet mean_of(const Picture& micrograph, const Frame& frame) {
   double weights = 0, sum = 0;
   for (const auto& [x, y] : frame.pixels) {

@@ -26,12 +26,14 @@ template <class S>
 class AxialField {
  public:
   using P = PlainOf<S>;
-  AxialField(const S& e, const S& ring, bool has_ring)
+  /// `memo` may be null.
+  AxialField(const S& e, const S& ring, bool has_ring, Memo* memo = nullptr)
       : e_(e),
         ring_(ring),
         has_ring_(has_ring),
-        table_(*known_axial_equilibrium(lane(plain(e), 0), has_ring ? lane(plain(ring), 0) : 0.0, kDerivatives > 0),
-               has_ring, kDerivatives > 0) {}
+        table_(
+            *known_axial_equilibrium(lane(plain(e), 0), has_ring ? lane(plain(ring), 0) : 0.0, kDerivatives > 0, memo),
+            has_ring, kDerivatives > 0) {}
   const S& e() const { return e_; }
   bool has_ring() const { return has_ring_; }
   const S& ring() const { return ring_; }

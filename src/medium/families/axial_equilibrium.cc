@@ -4,13 +4,11 @@
 #include <algorithm>
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
-#include <deque>
-#include <map>
-#include <mutex>
 #include <numbers>
 #include <stdexcept>
 #include <string>
 
+#include "birefit/memo.h"
 #include "medium/families/axial_angle.h"
 
 namespace birefit {
@@ -93,14 +91,8 @@ Line make_line(const AxialGrid& grid, const std::vector<double>& edges, const We
   return line;
 }
 
-}  // namespace
-
-const LobattoRule& lobatto_rule(int degree) {
-  static std::map<int, LobattoRule> rules;
-  static std::mutex guard;
-  const std::lock_guard lock(guard);
-  LobattoRule& rule = rules[degree];
-  if (!rule.x.empty()) return rule;
+LobattoRule make_lobatto_rule(int degree) {
+  LobattoRule rule;
   const int p = degree, n = p + 1;
   rule.x.resize(n), rule.w.resize(n);
   std::vector<double> legendre(n);
@@ -127,6 +119,18 @@ const LobattoRule& lobatto_rule(int degree) {
                               : i == p ? p * n / 4.0
                                        : 0.0;
   return rule;
+}
+
+}  // namespace
+
+const LobattoRule& lobatto_rule(int degree) {
+  constexpr int kMost = 20;
+  static const std::vector<LobattoRule> rules = [] {
+    std::vector<LobattoRule> all(1);  // there is none of degree 0
+    for (int p = 1; p <= kMost; ++p) all.push_back(make_lobatto_rule(p));
+    return all;
+  }();
+  return rules.at(static_cast<std::size_t>(degree));
 }
 
 namespace {
@@ -310,42 +314,44 @@ struct Rung {
   Slopes slopes;
   Factors factors;
 };
+using EquilibriumKey = std::array<double, 3>;  // e, ring, whether with slopes
+struct Ladder : Recent<EquilibriumKey, Rung> {
+  // reduced fields up to 100 with a hedgehog: a scan that goes through more than are kept would find none. 20 MB
+  Ladder() : Recent(48) {}
+};
+struct KnownEquilibria : Recent<EquilibriumKey, AxialEquilibrium> {
+  KnownEquilibria() : Recent(1024) {}  // what a scan of bounds several orders wide asks for, place after place. 10 MB
+};
+struct KnownBalances : Recent<EquilibriumKey, RingBalance> {
+  KnownBalances() : Recent(16) {}  // several plans of the same place, one after the other
+};
+
 /// The rung nearest to (e, ring), of a ladder that is fixed, so that what is found from it does not depend on what was
 /// asked before. Rungs are so close that a step with the factors of one leaves a tenth of the error.
-std::shared_ptr<const Rung> rung_near(double e, double ring) {
+std::shared_ptr<const Rung> rung_near(double e, double ring, Memo* memo) {
   constexpr double kStep = 0.08;
   const double rung_e = 3 * std::expm1(kStep * std::round(std::log1p(e / 3) / kStep));
   const double rung_ring = ring > 0 ? 1 - std::exp(kStep * std::round(std::log(1 - ring) / kStep)) : 0.0;
-  static std::deque<std::shared_ptr<const Rung>> known;
-  static std::mutex guard;
-  {
-    const std::lock_guard lock(guard);
-    for (const auto& one : known)
-      if (one->e == rung_e && one->ring == rung_ring) return one;
-  }
-  const AxialGrid grid = axial_production_grid(ring);
-  const Equations equations(rung_e, rung_ring, grid);
-  auto fresh = std::make_shared<Rung>();
-  fresh->e = rung_e, fresh->ring = rung_ring;
-  fresh->change = equations.start(rung_e, rung_ring);
-  solve_by_newton(equations, rung_e, rung_ring, fresh->factors, fresh->change);
-  factorize(fresh->factors, equations, fresh->change);
-  fresh->slopes = slopes_of(rung_e, rung_ring, grid, fresh->change,
-                            [&](const Field& right) { return solve(fresh->factors, right); });
-  const std::lock_guard lock(guard);
-  known.push_front(fresh);
-  // reduced fields up to 100 with a hedgehog: a scan that goes through more than are kept would find none. 20 MB
-  constexpr std::size_t kMost = 48;
-  if (known.size() > kMost) known.pop_back();
-  return fresh;
+  return remembered<Ladder>(memo, EquilibriumKey{rung_e, rung_ring, 1}, [&] {
+    const AxialGrid grid = axial_production_grid(ring);
+    const Equations equations(rung_e, rung_ring, grid);
+    auto fresh = std::make_shared<Rung>();
+    fresh->e = rung_e, fresh->ring = rung_ring;
+    fresh->change = equations.start(rung_e, rung_ring);
+    solve_by_newton(equations, rung_e, rung_ring, fresh->factors, fresh->change);
+    factorize(fresh->factors, equations, fresh->change);
+    fresh->slopes = slopes_of(rung_e, rung_ring, grid, fresh->change,
+                              [&](const Field& right) { return solve(fresh->factors, right); });
+    return fresh;
+  });
 }
 
 /// axial_equilibrium() on the production grid, from the nearest rung: no factors of its own, a quarter of the time.
-AxialEquilibrium from_rung(double e, double ring, bool slopes) {
+AxialEquilibrium from_rung(double e, double ring, bool slopes, Memo* memo) {
   constexpr int kMostSteps = 20;  // 5 are usual: each leaves 2 to 10 percent
   constexpr double kSmallStep = 1e-9;
   const AxialGrid grid = axial_production_grid(ring);
-  const auto rung = rung_near(e, ring);
+  const auto rung = rung_near(e, ring, memo);
   const Equations equations(e, ring, grid);
   // `x` such that residual(x) vanishes, to kSmallStep of its size or of 1.
   const auto refine = [&](Field& x, const auto& residual) {
@@ -377,20 +383,12 @@ AxialEquilibrium from_rung(double e, double ring, bool slopes) {
 
 }  // namespace
 
-std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring, bool slopes) {
-  static std::deque<std::shared_ptr<const AxialEquilibrium>> known;
-  static std::mutex guard;
-  {
-    const std::lock_guard lock(guard);
-    for (const auto& one : known)
-      if (one->e == e && one->ring == ring && (!slopes || one->by_e.size() > 0)) return one;
-  }
-  auto fresh = std::make_shared<const AxialEquilibrium>(from_rung(e, ring, slopes));
-  const std::lock_guard lock(guard);
-  known.push_front(fresh);
-  constexpr std::size_t kMost = 1024;  // what a scan of bounds several orders wide asks for, place after place. 10 MB
-  if (known.size() > kMost) known.pop_back();
-  return fresh;
+std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring, bool slopes, Memo* memo) {
+  if (!slopes && memo)
+    if (auto known = memo->of<KnownEquilibria>().find({e, ring, 1})) return known;
+  return remembered<KnownEquilibria>(memo, EquilibriumKey{e, ring, slopes ? 1.0 : 0.0}, [&] {
+    return std::make_shared<AxialEquilibrium>(from_rung(e, ring, slopes, memo));
+  });
 }
 
 double AxialEquilibrium::theta(double rho, double z) const {
@@ -474,22 +472,15 @@ double AxialEquilibrium::energy() const {
   return 4 * std::numbers::pi * sum + energy_of_boundary_angle(ring);  // both halves
 }
 
-RingBalance ring_balance(double e, double ring) {
-  static std::mutex guard;
-  static double known_e = -1, known_ring = -1;
-  static RingBalance known{};
-  {
-    const std::lock_guard lock(guard);
-    if (known_e == e && known_ring == ring) return known;
-  }
+RingBalance ring_balance(double e, double ring, Memo* memo) {
   const double step = 0.05 * (1 - ring), below = std::max(0.2, ring - step), above = std::min(0.995, ring + step),
                half = 0.5 * (above - below);
-  const auto energy = [&](double at) { return known_axial_equilibrium(e, at, false)->energy(); };
-  const double low = energy(below), here = energy(below + half), high = energy(above);
-  const RingBalance fresh{-(high - low) / (std::numbers::pi * std::numbers::pi * half), high - 2 * here + low > 0};
-  const std::lock_guard lock(guard);
-  known_e = e, known_ring = ring, known = fresh;
-  return fresh;
+  return *remembered<KnownBalances>(memo, EquilibriumKey{e, ring, 0}, [&] {
+    const auto energy = [&](double at) { return known_axial_equilibrium(e, at, false, memo)->energy(); };
+    const double low = energy(below), here = energy(below + half), high = energy(above);
+    return std::make_shared<RingBalance>(
+        RingBalance{-(high - low) / (std::numbers::pi * std::numbers::pi * half), high - 2 * here + low > 0});
+  });
 }
 
 }  // namespace birefit

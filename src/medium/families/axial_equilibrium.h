@@ -14,6 +14,8 @@
 
 namespace birefit {
 
+class Memo;  // birefit/memo.h
+
 /// theta - axial_boundary_angle() on the quarter disc r in [0, 1], polar angle in [0, pi/2]: a tensor grid of elements,
 /// polynomials of degree `degree` on each through Gauss-Lobatto points. Elements are finer where the field makes layers
 /// of thickness 1/e (sphere, equator) and around the ring.
@@ -35,6 +37,7 @@ struct LobattoRule {
   std::vector<double> x, w;
   Eigen::MatrixXd derivative;  ///< (i, j): slope at x_i of the polynomial that is 1 at x_j
 };
+/// 1 <= degree <= 20.
 const LobattoRule& lobatto_rule(int degree);
 
 struct AxialEquilibrium {
@@ -59,9 +62,8 @@ struct RingBalance {
   double core_length;
   bool stable;
 };
-/// On the production grid, by differences of the energy over a tenth of the way to the sphere; the last one is
-/// remembered.
-RingBalance ring_balance(double e, double ring);
+/// On the production grid, by differences of the energy over a tenth of the way to the sphere. `memo` may be null.
+RingBalance ring_balance(double e, double ring, Memo* memo = nullptr);
 
 /// Newton's method from a closed-form start, always the same: equal arguments give equal bits. e in [0, 60], ring 0 or
 /// in [0.2, 0.995]. Throws std::domain_error where Newton does not converge, which no e and ring in range do.
@@ -71,9 +73,10 @@ AxialEquilibrium axial_equilibrium(double e, double ring, const AxialGrid& grid 
 /// (tests/cross/axial_droplet_test.cc).
 inline AxialGrid axial_production_grid(double ring) { return {ring > 0 ? 10 : 8, 5}; }
 /// The same on the production grid to 1e-8 rad, in a few steps from the nearest of a fixed ladder of equilibria, which
-/// are made when first needed: equal arguments give equal bits whatever was asked before. The last few are remembered,
-/// for images that differ in other parameters.
-std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring, bool slopes);
+/// are made when first needed: equal arguments give equal bits whatever was asked before. Both are remembered by
+/// `memo`, for images that differ in other parameters; without one the ladder's is made for this call.
+std::shared_ptr<const AxialEquilibrium> known_axial_equilibrium(double e, double ring, bool slopes,
+                                                                Memo* memo = nullptr);
 
 // ---- the edges -----------------------------------------------------------------------------------------------------
 

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <deque>
-#include <map>
-#include <mutex>
 #include <numbers>
 
 #include <Eigen/Dense>
 
 #include "birefit/error.h"
+#include "birefit/memo.h"
 
 namespace birefit {
 namespace {
@@ -531,46 +529,23 @@ DirectorSolution solve_from_start(const CellForces<double>& p, const DirectorMes
   return solve<true>(p, mesh, std::move(t), std::move(f));
 }
 
-/// Solutions of the latest few thousand forces. Plans, passes over groups of derivatives and changes of anything but
-/// the director ask for the same one again and again; what is kept is what would be computed.
-class SolutionCache {
- public:
-  using Key = std::array<double, 9>;
-  bool find(const Key& key, DirectorSolution& solution) {
-    const std::lock_guard lock(mutex_);
-    const auto found = solutions_.find(key);
-    if (found == solutions_.end()) return false;
-    solution = found->second;
-    return true;
-  }
-  void keep(const Key& key, const DirectorSolution& solution) {
-    constexpr std::size_t kMost = 4096;  // 10 to 20 MB
-    const std::lock_guard lock(mutex_);
-    if (!solutions_.emplace(key, solution).second) return;
-    order_.push_back(key);
-    if (order_.size() <= kMost) return;
-    solutions_.erase(order_.front());
-    order_.pop_front();
-  }
-
- private:
-  std::mutex mutex_;
-  std::map<Key, DirectorSolution> solutions_;
-  std::deque<Key> order_;
+/// Plans, passes over groups of derivatives and changes of anything but the director ask for the same one again and
+/// again.
+struct KnownDirectors : Recent<std::array<double, 9>, DirectorSolution> {
+  KnownDirectors() : Recent(4096) {}  // 10 to 20 MB
 };
 
 }  // namespace
 
-DirectorSolution solve_director(const CellForces<double>& p, const DirectorMesh& mesh) {
-  if (&mesh != &cell_mesh()) return solve_from_start(p, mesh);
-  static SolutionCache cache;
-  const SolutionCache::Key key{
+DirectorSolution solve_director(const CellForces<double>& forces, const DirectorMesh& mesh) {
+  return solve_from_start(forces, mesh);
+}
+
+std::shared_ptr<const DirectorSolution> known_director(const CellForces<double>& p, Memo* memo) {
+  const std::array<double, 9> key{
       p.k33, p.k22, p.gamma, p.drive, p.chirality, p.tilt_entry, p.tilt_exit, p.twist, p.twisted ? 1.0 : 0.0};
-  DirectorSolution solution;
-  if (cache.find(key, solution)) return solution;
-  solution = solve_from_start(p, mesh);
-  cache.keep(key, solution);
-  return solution;
+  return remembered<KnownDirectors>(
+      memo, key, [&] { return std::make_shared<DirectorSolution>(solve_from_start(p, cell_mesh())); });
 }
 
 template <int N>

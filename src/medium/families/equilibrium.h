@@ -17,6 +17,8 @@
 
 namespace birefit {
 
+class Memo;  // birefit/memo.h
+
 /// Everything the equilibrium depends on, without dimensions; angles in radians.
 template <class S>
 struct CellForces {
@@ -73,6 +75,9 @@ struct DirectorSolution {
 /// of one elastic constant and a uniform field, on the side of the pretilt. Collocation order: halving all elements
 /// divides the error of the profile by 2^(degree + 1). Throws UserError when no equilibrium is found.
 DirectorSolution solve_director(const CellForces<double>& forces, const DirectorMesh& mesh = cell_mesh());
+
+/// The same on the mesh of all cells, remembered by `memo` if there is one.
+std::shared_ptr<const DirectorSolution> known_director(const CellForces<double>& forces, Memo* memo);
 
 /// d(tilt), d(azimuth) at the nodes for each of N directions in which the forces change (the .d of `forces`): the
 /// implicit-function theorem at a solution, exact for the discrete equations.

@@ -61,13 +61,14 @@ struct DirectorProfile {
 /// Solved in plain numbers; derivatives, where S has them, by the implicit-function theorem. All lanes of S must be
 /// equal.
 template <class S>
-std::shared_ptr<const DirectorProfile<S>> make_director_profile(const CellForces<S>& forces) {
+std::shared_ptr<const DirectorProfile<S>> make_director_profile(const CellForces<S>& forces, Memo* memo) {
   const auto number = [](const S& x) { return lane(plain(x), 0); };
   const DirectorMesh& mesh = cell_mesh();
-  const DirectorSolution solution = solve_director(
+  const std::shared_ptr<const DirectorSolution> known = known_director(
       {number(forces.k33), number(forces.k22), number(forces.gamma), number(forces.drive), number(forces.chirality),
        number(forces.tilt_entry), number(forces.tilt_exit), number(forces.twist), forces.twisted},
-      mesh);
+      memo);
+  const DirectorSolution& solution = *known;
   std::vector<S> tilt(solution.tilt.begin(), solution.tilt.end()),
       azimuth(solution.azimuth.begin(), solution.azimuth.end());
   constexpr int kDerivatives = ScalarTraits<S>::derivatives;

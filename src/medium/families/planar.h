@@ -15,6 +15,13 @@ BIREFIT_INLINE Vec3<S> axis_from_angles(const S& tilt_rad, const S& azimuth_rad)
   sin_cos(azimuth_rad, sa, ca);
   return {ct * ca, ct * sa, st};
 }
+/// The axis turned about z by the sample's rotation in the image.
+template <class S>
+Vec3<S> rotated(const Vec3<S>& axis, const S& angle_rad) {
+  S s, c;
+  sin_cos(angle_rad, s, c);
+  return {c * axis.x - s * axis.y, s * axis.x + c * axis.y, axis.z};
+}
 
 /// One axis, constant indices.
 template <class S>

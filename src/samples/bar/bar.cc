@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "instrument/exposure.h"
+#include "samples/kind.h"
 
 namespace birefit {
 namespace {
@@ -62,8 +63,6 @@ class BarImage final : public SampleImage<S> {
   std::vector<S> legendre_;
 };
 
-}  // namespace
-
 RenderPlan plan_bar(const Planning& planning) {
   check_closed_form(planning.demand, "a crystal bar");
   RenderPlan plan = planning.start();
@@ -77,6 +76,7 @@ RenderPlan plan_bar(const Planning& planning) {
   return plan;
 }
 
+/// The retardance where the field is largest (rad).
 std::vector<double> bar_phases(const Scene& scene, const Values<double>& value) {
   std::vector<double> result;
   const Crystal& crystal = std::get<Crystal>(scene.sample);
@@ -87,6 +87,17 @@ std::vector<double> bar_phases(const Scene& scene, const Values<double>& value) 
   return result;
 }
 
+/// A bar's field varies along itself: strips follow each other across it.
+Traits bar_traits(const Scene& scene) {
+  const Crystal& crystal = std::get<Crystal>(scene.sample);
+  Traits traits;
+  if (crystal.field_legendre.empty())  // else the variation is the model's own
+    traits.strips = crystal.field_along_y ? Traits::Strips::rows : Traits::Strips::columns;
+  return traits;
+}
+
+}  // namespace
+
 template <class S>
 std::unique_ptr<SampleImage<S>> make_bar_image(const Scene& scene, const RenderPlan&, const Values<S>& value,
                                                const BeamMaker& light) {
@@ -96,5 +107,8 @@ std::unique_ptr<SampleImage<S>> make_bar_image(const Scene& scene, const RenderP
   template std::unique_ptr<SampleImage<S>> make_bar_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
                                                              const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+const SampleKind kBar{
+    .name = "bar", .is = is_sample<Crystal>, .plan = plan_bar, .phases_rad = bar_phases, .traits = bar_traits};
 
 }  // namespace birefit

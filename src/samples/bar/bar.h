@@ -5,10 +5,11 @@
 
 namespace birefit {
 
-RenderPlan plan_bar(const Planning&);
-/// The retardance where the field is largest (rad).
-std::vector<double> bar_phases(const Scene&, const Values<double>&);
+struct SampleKind;  // samples/kind.h
+
 template <class S>
 std::unique_ptr<SampleImage<S>> make_bar_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
+/// What the list of kinds (samples/kinds.def) holds of it.
+extern const SampleKind kBar;
 
 }  // namespace birefit

@@ -36,6 +36,8 @@ DiscZone::DiscZone(const Scene& scene, const Theta& theta) {
   const auto value = [&](ParameterRef ref, double otherwise = 0) {
     return ref ? theta[static_cast<std::size_t>(ref.index)] : otherwise;
   };
+  lengths_ = {disc.diameter_um, scene.view.pixel_size_um, scene.view.center_x_px, scene.view.center_y_px};
+  azimuths_ = {disc.load_azimuth_deg, scene.view.rotation_deg};
   const double radius_um = 0.5 * value(disc.diameter_um);
   margins_ = disc_margins(disc, radius_um);
   radius_px_ = radius_um / value(scene.view.pixel_size_um);
@@ -48,6 +50,15 @@ bool DiscZone::fitted(double column, double row) const {
   const double x = (column - center_x_px_) / radius_px_, y = (center_y_px_ - row) / radius_px_;
   const double to_force = std::min(std::hypot(x - load_cos_, y - load_sin_), std::hypot(x + load_cos_, y + load_sin_));
   return std::hypot(x, y) <= 1 - margins_.rim && to_force >= margins_.contact;
+}
+
+std::vector<Zone::Mover> DiscZone::movers() const {
+  std::vector<Mover> movers;
+  for (const ParameterRef length : lengths_)
+    if (length) movers.push_back({length});
+  for (const ParameterRef azimuth : azimuths_)
+    if (azimuth) movers.push_back({azimuth, 0.5 * margins_.contact * 180 / std::numbers::pi, 180});
+  return movers;
 }
 
 namespace {

@@ -5,8 +5,11 @@
 
 #include "medium/families/disc.h"
 #include "samples/planning.h"
+#include "samples/zone.h"
 
 namespace birefit {
+
+struct SampleKind;  // samples/kind.h
 
 template <class S>
 struct DiscOptics {
@@ -41,24 +44,25 @@ struct DiscMargins {
 DiscMargins disc_margins(const StressedDisc& disc, double radius_um);
 
 /// Which pixels of a disc's image a fit uses, the disc being where `theta` puts it.
-class DiscZone {
+class DiscZone final : public Zone {
  public:
   /// `scene` holds a StressedDisc.
   DiscZone(const Scene& scene, const Theta& theta);
   const DiscMargins& margins() const { return margins_; }
   double radius_px() const { return radius_px_; }
   /// Inside of the rim and clear of both forces.
-  bool fitted(double column, double row) const;
+  bool fitted(double column, double row) const override;
+  std::vector<Mover> movers() const override;
 
  private:
+  std::vector<ParameterRef> lengths_, azimuths_;
   DiscMargins margins_;
   double radius_px_, center_x_px_, center_y_px_, load_cos_, load_sin_;
 };
 
-RenderPlan plan_disc(const Planning&);
-/// Retardances at a few places (rad), by both components of the stress.
-std::vector<double> disc_phases(const Scene&, const Values<double>&);
 template <class S>
 std::unique_ptr<SampleImage<S>> make_disc_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
+/// What the list of kinds (samples/kinds.def) holds of it.
+extern const SampleKind kDisc;
 
 }  // namespace birefit

@@ -7,6 +7,7 @@
 
 #include "birefit/error.h"
 #include "samples/disc/disc.h"
+#include "samples/kind.h"
 #include "samples/pixels/sampling.h"
 
 namespace birefit {
@@ -21,8 +22,7 @@ double disc_phase(const DiscOptics<double>& o, double x, double y) {
   return std::hypot(p.normal, p.shear);
 }
 
-}  // namespace
-
+/// Retardances at a few places (rad), by both components of the stress.
 std::vector<double> disc_phases(const Scene& scene, const Values<double>& value) {
   std::vector<double> result;
   const DiscOptics<double> o(scene, value);
@@ -86,5 +86,20 @@ RenderPlan plan_disc(const Planning& planning) {
   note_illumination(one_colour, value, largest_phase, plan);
   return plan;
 }
+
+Traits disc_traits(const Scene&) { return {.strips = Traits::Strips::rows, .isoclinics = true}; }
+
+std::unique_ptr<Zone> disc_zone(const Scene& scene, const Theta& theta) {
+  return std::make_unique<DiscZone>(scene, theta);
+}
+
+}  // namespace
+
+const SampleKind kDisc{.name = "disc",
+                       .is = is_sample<StressedDisc>,
+                       .plan = plan_disc,
+                       .phases_rad = disc_phases,
+                       .traits = disc_traits,
+                       .zone = disc_zone};
 
 }  // namespace birefit

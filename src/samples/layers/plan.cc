@@ -9,7 +9,8 @@
 
 #include "birefit/error.h"
 #include "core/threads.h"
-#include "medium/build.h"
+#include "medium/validity.h"
+#include "samples/kind.h"
 #include "samples/layers/cone_view.h"
 #include "samples/layers/planar.h"
 #include "samples/pixels/sampling.h"
@@ -420,8 +421,6 @@ void plan_cone_pixels(const Planning& planning, const PlanarOptics<double>& o, R
   }
 }
 
-}  // namespace
-
 RenderPlan plan_planar(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
@@ -455,5 +454,42 @@ RenderPlan plan_planar(const Planning& planning) {
   note_illumination(scene, value, largest_phase, plan);
   return plan;
 }
+
+bool is_layers(const Scene& scene, const Observable&) {
+  return std::holds_alternative<Cell>(scene.sample) || std::holds_alternative<Slab>(scene.sample) ||
+         std::holds_alternative<Plate>(scene.sample);
+}
+bool has_cone(const Scene& scene) { return cone_half_angle(scene).has_value(); }
+
+Traits layers_traits(const Scene& scene) {
+  Traits traits;
+  if (const Cell* cell = std::get_if<Cell>(&scene.sample)) {
+    traits.even = true;
+    traits.quick = !std::holds_alternative<FreederickszDirector>(cell->director);
+  }
+  if (std::holds_alternative<Plate>(scene.sample)) traits.strips = Traits::Strips::rows;
+  return traits;
+}
+
+}  // namespace
+
+std::vector<ParameterRef> heat_temperatures(const Scene& scene) {
+  const Plate* plate = std::get_if<Plate>(&scene.sample);
+  const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
+  if (!heat) return {};
+  if (const auto* law = std::get_if<LawIndices>(&scene.material); law && clearing_points(*law).empty())
+    throw UserError(Where{}, "the material of a heated plate needs a law of temperature", "add haller to the material");
+  return {heat->cold_k, heat->hot_k, heat->initial_k ? heat->initial_k : heat->cold_k};
+}
+
+const SampleKind kLayers{.name = "layer",
+                         .is = is_layers,
+                         .plan = plan_planar,
+                         .pilots = planar_pilots,
+                         .phases_rad = planar_phases,
+                         .jones = add_planar_jones,
+                         .symmetric = has_cone,
+                         .traits = layers_traits,
+                         .temperatures = heat_temperatures};
 
 }  // namespace birefit

@@ -4,9 +4,9 @@
 #include <mutex>
 
 #include "instrument/exposure.h"
-#include "medium/build.h"
 #include "medium/references.h"
 #include "samples/image.h"
+#include "samples/layers/column.h"
 #include "samples/layers/cone_view.h"
 #include "samples/layers/planar.h"
 #include "samples/tables/fringe_table.h"
@@ -17,8 +17,7 @@ namespace birefit {
 template <class S>
 PlanarOptics<S> planar_optics(const Scene& scene, const Values<S>& value, Continuity continuity) {
   PlanarOptics<S> o;
-  o.column = std::make_unique<CachedColumn<S>>(make_planar_column<S>(
-      scene.sample, scene.material, value, value.radians(scene.view.rotation_deg), wavelength_um(scene, value)));
+  o.column = std::make_unique<CachedColumn<S>>(make_planar_column(scene, value));
   o.k0 = wavenumber_per_um(scene, value);
   o.n_host = host_index(scene, value);
   o.continuity = continuity;
@@ -240,7 +239,7 @@ class PlanarImage final : public SampleImage<S> {
   std::vector<int> known_inside(const std::vector<int>& changing) const {
     std::vector<int> inside;
     if constexpr (ScalarTraits<R>::derivatives > 0) {
-      const Values<R> value(value_.theta(), changing);
+      const Values<R> value(value_.theta(), changing, value_.memo());
       const PlanarOptics<R> optics = planar_optics(scene_, value);
       const ConeView<R> cone(scene_, value);
       const auto corner = cone.at(P(0.0), P(0.0)),
@@ -262,8 +261,8 @@ class PlanarImage final : public SampleImage<S> {
   template <class R, class T>
   void fill_table(const std::vector<int>& changing, const std::vector<int>& inside,
                   const std::vector<std::size_t>& places, int threads) {
-    const Values<R> value(value_.theta(), changing);
-    const Values<T> value_inside(value_.theta(), std::is_same_v<R, T> ? changing : inside);
+    const Values<R> value(value_.theta(), changing, value_.memo());
+    const Values<T> value_inside(value_.theta(), std::is_same_v<R, T> ? changing : inside, value_.memo());
     Raise<T, R> raise;
     if constexpr (!std::is_same_v<R, T>)
       for (std::size_t j = 0; j < inside.size(); ++j)

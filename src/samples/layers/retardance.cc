@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "medium/build.h"
+#include "samples/kind.h"
+#include "samples/layers/plan.h"
 #include "samples/layers/planar.h"
 #include "transport/one_way.h"
 #include "transport/quadrature.h"
@@ -39,8 +40,8 @@ class RetardanceImage final : public SampleImage<S> {
   S value_;
 };
 
-}  // namespace
-
+/// Nodes that hold the retardance to rounding. Throws UserError where the axis turns about the light: there it is not
+/// one number.
 RenderPlan plan_retardance(const Planning& planning) {
   const Scene& scene = planning.scene;
   const Values<double>& value = planning.value;
@@ -65,6 +66,10 @@ RenderPlan plan_retardance(const Planning& planning) {
   return plan;
 }
 
+bool is_retardance(const Scene&, const Observable& observable) { return observable.quantity != Quantity::intensity; }
+
+}  // namespace
+
 template <class S>
 std::unique_ptr<SampleImage<S>> make_retardance_image(const Scene& scene, const RenderPlan& plan,
                                                       const Values<S>& value, const BeamMaker&) {
@@ -74,5 +79,8 @@ std::unique_ptr<SampleImage<S>> make_retardance_image(const Scene& scene, const 
   template std::unique_ptr<SampleImage<S>> make_retardance_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
                                                                     const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+const SampleKind kRetardance{
+    .name = "retardance", .is = is_retardance, .plan = plan_retardance, .phases_rad = planar_phases};
 
 }  // namespace birefit

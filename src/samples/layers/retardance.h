@@ -5,11 +5,12 @@
 
 namespace birefit {
 
-/// Nodes that hold the retardance to rounding. Throws UserError where the axis turns about the light: there it is not
-/// one number.
-RenderPlan plan_retardance(const Planning&);
+struct SampleKind;  // samples/kind.h
+
 template <class S>
 std::unique_ptr<SampleImage<S>> make_retardance_image(const Scene&, const RenderPlan&, const Values<S>&,
                                                       const BeamMaker&);
+/// What the list of kinds (samples/kinds.def) holds of it.
+extern const SampleKind kRetardance;
 
 }  // namespace birefit

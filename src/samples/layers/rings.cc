@@ -5,7 +5,9 @@
 #include <algorithm>
 
 #include "birefit/error.h"
-#include "medium/build.h"
+#include "medium/indices.h"
+#include "samples/kind.h"
+#include "samples/layers/plan.h"
 #include "transport/method.h"
 
 namespace birefit {
@@ -47,8 +49,6 @@ class RingImage final : public SampleImage<S> {
   S n_host_, n_o_, n_e_, thickness_um_, distance_um_, offset_, path_per_order_;
 };
 
-}  // namespace
-
 RenderPlan plan_rings(const Planning& planning) {
   check_closed_form(planning.demand, "a table of rings");
   if (planning.observable.ring_numbers.empty())
@@ -62,11 +62,17 @@ RenderPlan plan_rings(const Planning& planning) {
   return plan;
 }
 
+/// One that nothing changes: radii grow steadily with everything, there is no fringe order to lose.
 std::vector<double> ring_phases(const Scene&, const Values<double>&) { return {0.0}; }
 
+/// Radii come of no matrix.
 void refuse_ring_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&) {
   throw UserError(Where{}, "a table of rings has no Jones matrices", "give the plate view: {half_angle_deg} instead");
 }
+
+bool is_rings(const Scene& scene, const Observable&) { return is_ring_table(scene); }
+
+}  // namespace
 
 template <class S>
 std::unique_ptr<SampleImage<S>> make_rings_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
@@ -77,5 +83,12 @@ std::unique_ptr<SampleImage<S>> make_rings_image(const Scene& scene, const Rende
   template std::unique_ptr<SampleImage<S>> make_rings_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
                                                                const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
+
+const SampleKind kRings{.name = "ring table",
+                        .is = is_rings,
+                        .plan = plan_rings,
+                        .phases_rad = ring_phases,
+                        .jones = refuse_ring_jones,
+                        .temperatures = heat_temperatures};
 
 }  // namespace birefit

@@ -6,6 +6,8 @@
 
 namespace birefit {
 
+struct SampleKind;  // samples/kind.h
+
 /// kappa^2 (squared tangential wavevector, units of k0) of the direction where the two waves leave a plate cut normal
 /// to its axis with a path difference of `path` = order x wavelength / thickness. From n_o sqrt(1 - k/n_e^2) -
 /// sqrt(n_o^2 - k) = path, squared twice; exact, the same for both signs of n_e - n_o, which must not be 0.
@@ -29,12 +31,9 @@ inline bool is_ring_table(const Scene& scene) {
   const auto* plate = std::get_if<Plate>(&scene.sample);
   return plate && plate->screen_distance_um;
 }
-RenderPlan plan_rings(const Planning&);
-/// One that nothing changes: radii grow steadily with everything, there is no fringe order to lose.
-std::vector<double> ring_phases(const Scene&, const Values<double>&);
-/// Throws UserError: radii come of no matrix.
-void refuse_ring_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);
 template <class S>
 std::unique_ptr<SampleImage<S>> make_rings_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
+/// What the list of kinds (samples/kinds.def) holds of it.
+extern const SampleKind kRings;
 
 }  // namespace birefit

@@ -26,8 +26,6 @@ class StepsByPlace {
   const RenderPlan& plan_;
   DiscMap map_;
 };
-/// See outgrown().
-bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before);
 
 template <class S>
 std::unique_ptr<SampleImage<S>> make_ball_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);

@@ -1,6 +1,6 @@
 #include "samples/sphere/ball_optics.h"
 
-#include "medium/build.h"
+#include "medium/families/planar.h"
 
 namespace birefit {
 

@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "instrument/exposure.h"
-#include "medium/build.h"
 #include "samples/image.h"
 #include "samples/sphere/droplet.h"
 #include "transport/method.h"

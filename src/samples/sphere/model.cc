@@ -1,12 +1,13 @@
-// The picture of a sphere, in whatever way it is planned.
+// What a sphere can do, and its picture in whatever way it is planned.
 
 #include <stdexcept>
 
 #include "samples/curved/eikonal_image.h"
+#include "samples/kind.h"
 #include "samples/sphere/ball.h"
 #include "samples/sphere/droplet.h"
 #include "samples/sphere/plan.h"
-#include "samples/waves/series.h"
+#include "samples/sphere/series.h"
 
 namespace birefit {
 
@@ -26,5 +27,25 @@ std::unique_ptr<SampleImage<S>> make_sphere_image(const Scene& scene, const Rend
   template std::unique_ptr<SampleImage<S>> make_sphere_image<S>(const Scene&, const RenderPlan&, const Values<S>&, \
                                                                 const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
+
+namespace {
+
+bool sphere_has_curved_rays(const Scene& scene) { return rays_stay_meridional(std::get<Droplet>(scene.sample)); }
+Traits sphere_traits(const Scene& scene) { return {.sphere_diameter_um = std::get<Droplet>(scene.sample).diameter_um}; }
+
+}  // namespace
+
+const SampleKind kSphere{.name = "sphere",
+                         .is = is_sample<Droplet>,
+                         .plan = plan_sphere,
+                         .pilots = sphere_pilots,
+                         .phases_rad = sphere_phases,
+                         .note = note_sphere,
+                         .jones = add_sphere_jones,
+                         .symmetric = always,
+                         .passes_axis = true,
+                         .curved_rays = sphere_has_curved_rays,
+                         .waves = &kSphereWaves,
+                         .traits = sphere_traits};
 
 }  // namespace birefit

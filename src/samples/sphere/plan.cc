@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "birefit/error.h"
-#include "medium/build.h"
 #include "samples/curved/eikonal_image.h"
 #include "samples/pixels/pixel_plan.h"
 #include "samples/pixels/sampling.h"
@@ -329,7 +328,7 @@ void note_sphere(const Scene& scene, const Values<double>& value, RenderPlan& pl
   if (!axial || !axial->ring_radius) return;
   const DropletOptics<double> o = droplet_optics(scene, value);
   const double e = o.axial->e(), ring = o.axial->ring();
-  const RingBalance balance = ring_balance(e, ring);
+  const RingBalance balance = ring_balance(e, ring, value.memo());
   // Cores of 5 to 10 nm, with up to one more for what they cost themselves.
   const double least = std::log(o.radius_um / 0.010), most = std::log(o.radius_um / 0.005) + 1;
   const std::string where =

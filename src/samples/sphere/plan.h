@@ -7,6 +7,9 @@
 
 namespace birefit {
 
+struct SampleKind;   // samples/kind.h
+struct SampleWaves;  // samples/waves/object.h
+
 RenderPlan plan_sphere(const Planning&);
 /// Retardance phases at points fixed relative to the sphere, as if modes did not couple (rad).
 std::vector<double> sphere_phases(const Scene&, const Values<double>&);
@@ -20,5 +23,9 @@ void add_sphere_jones(const Scene&, const RenderPlan&, const Values<double>&, Jo
 /// The picture by the exact series, each mode on its own curved ray, or straight rays, as planned.
 template <class S>
 std::unique_ptr<SampleImage<S>> make_sphere_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
+/// What the list of kinds (samples/kinds.def) holds of it.
+extern const SampleKind kSphere;
+/// How waves go through it.
+extern const SampleWaves kSphereWaves;
 
 }  // namespace birefit

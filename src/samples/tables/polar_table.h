@@ -84,6 +84,22 @@ class DiscMap {
   std::vector<int> at_;
 };
 
+/// See outgrown() of birefit/render.h.
+inline bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before) {
+  if (now.empty() || before.empty()) return now.empty() != before.empty();
+  for (const bool of_core : {false, true}) {
+    const DiscMap now_at(now, of_core), before_at(before, of_core);
+    for (std::size_t i = 0; i < now_at.cells().size(); ++i) {
+      const int new_one = now_at.cells()[i], old_one = before_at.cells()[i];
+      if ((new_one < 0) != (old_one < 0)) return true;  // the core has come to be a disc of its own
+      if (new_one < 0) break;
+      const DiscSquare &a = now[static_cast<std::size_t>(new_one)], &b = before[static_cast<std::size_t>(old_one)];
+      if (a.steps > 1.25 * b.steps + 1 || (b.smooth && (!a.smooth || a.level > b.level))) return true;
+    }
+  }
+  return false;
+}
+
 /// f(value, lanes that have it) for every value among the lanes where `here`, from the smallest on.
 template <class P, class Mask, class F>
 void for_each_value(const P& values, const Mask& here, const F& f) {

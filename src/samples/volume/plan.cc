@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "birefit/error.h"
+#include "samples/kind.h"
 #include "samples/pilots.h"
 #include "samples/pixels/pixel_mean.h"
 #include "samples/pixels/sampling.h"
@@ -102,8 +103,6 @@ Effort cheapest_steps(const Pilots& pilots, int cells, double target, const std:
   return best;
 }
 
-}  // namespace
-
 Pilots volume_pilots(const Scene& scene, const Demand& demand, const Values<double>& value) {
   Pilots pilots;
   const auto o = std::make_shared<const VolumeOptics<double>>(scene, value, continuity_of(demand));
@@ -131,6 +130,12 @@ Pilots volume_pilots(const Scene& scene, const Demand& demand, const Values<doub
     return volume_samples(*o, method, mesh);
   };
   return pilots;
+}
+
+/// Retardances of rays spread over the box (rad).
+std::vector<double> volume_phases_of(const Scene& scene, const Values<double>& value) {
+  constexpr int kRays = 24;
+  return volume_phases(VolumeOptics<double>(scene, value), kRays);
 }
 
 RenderPlan plan_volume(const Planning& planning) {
@@ -193,11 +198,6 @@ RenderPlan plan_volume(const Planning& planning) {
   return plan;
 }
 
-std::vector<double> volume_phases_of(const Scene& scene, const Values<double>& value) {
-  constexpr int kRays = 24;
-  return volume_phases(VolumeOptics<double>(scene, value), kRays);
-}
-
 void add_volume_jones(const Scene& scene, const RenderPlan& plan, const Values<double>& value, JonesTable& table) {
   const VolumeOptics<double> optics(scene, value, continuity_of(plan.demand));
   const Mesh layers = plan.mesh.empty() ? uniform_mesh(plan.steps, optics.breaks) : plan.mesh;
@@ -205,5 +205,16 @@ void add_volume_jones(const Scene& scene, const RenderPlan& plan, const Values<d
     for (int c = 0; c < scene.view.width; ++c)
       table.add(volume_jones(optics, c, r, transport_method<double>(plan.method), layers), 0, {.row = r, .column = c});
 }
+
+}  // namespace
+
+const SampleKind kVolume{.name = "volume",
+                         .is = is_sample<SampledVolume>,
+                         .plan = plan_volume,
+                         .pilots = volume_pilots,
+                         .phases_rad = volume_phases_of,
+                         .jones = add_volume_jones,
+                         .passes_axis = true,
+                         .waves = &kVolumeWaves};
 
 }  // namespace birefit

@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "instrument/exposure.h"
-#include "medium/build.h"
 #include "medium/counting_column.h"
 #include "medium/families/volume.h"
+#include "medium/indices.h"
 
 namespace birefit {
 

@@ -12,6 +12,9 @@
 
 namespace birefit {
 
+struct SampleKind;   // samples/kind.h
+struct SampleWaves;  // samples/waves/object.h
+
 template <class S>
 struct VolumeOptics {
   std::shared_ptr<const VolumeGrid> grid;
@@ -49,14 +52,12 @@ std::vector<double> volume_phases(const VolumeOptics<double>&, int rays, double 
 /// Points of the medium that one ray takes.
 int volume_samples(const VolumeOptics<double>&, const TransportMethod<double>&, const Mesh&);
 
-RenderPlan plan_volume(const Planning&);
-Pilots volume_pilots(const Scene&, const Demand&, const Values<double>&);
-/// Retardances of rays spread over the box (rad).
-std::vector<double> volume_phases_of(const Scene&, const Values<double>&);
-
 template <class S>
 std::unique_ptr<SampleImage<S>> make_volume_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 
-void add_volume_jones(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&);
+/// How waves go through it.
+extern const SampleWaves kVolumeWaves;
+/// What the list of kinds (samples/kinds.def) holds of it.
+extern const SampleKind kVolume;
 
 }  // namespace birefit

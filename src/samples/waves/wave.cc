@@ -6,112 +6,32 @@
 
 #include <fmt/format.h>
 
-#include "birefit/volume.h"
+#include "birefit/memo.h"
 #include "instrument/exposure.h"
-#include "medium/build.h"
 #include "medium/references.h"
-#include "samples/sphere/ball.h"
-#include "samples/volume/volume.h"
+#include "samples/kind.h"
+#include "samples/waves/object.h"
 #include "samples/waves/objective.h"
-#include "samples/waves/series.h"
 #include "wave/march.h"
-#include "wave/sampled.h"
-#include "wave/sphere.h"
 
 namespace birefit {
 namespace {
 
 template <class S>
-SphereOptics<S> sphere_optics(const Scene& scene, const Values<S>& value) {
-  const Droplet& droplet = std::get<Droplet>(scene.sample);
-  SphereOptics<S> o;
-  const auto take = [&](const DropletOptics<S>& d) {
-    o.radius_um = d.radius_um, o.n_o = d.n_o, o.n_e = d.n_e, o.n_host = d.n_host;
-  };
-  if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) {
-    take(droplet_optics(scene, value));
-    o.field = RadialField<S>{static_cast<bool>(radial->twist_deg), value.radians(radial->twist_deg)};
-    return o;
-  }
-  if (const auto* axial = std::get_if<AxialDirector>(&droplet.director); axial && !axial->field_azimuth_deg) {
-    const DropletOptics<S> d = droplet_optics(scene, value);
-    take(d);
-    o.field = TiltedAxialField<S>{{S(0.0), S(0.0), S(1.0)}, d.axial};
-    return o;
-  }
-  if (const auto* shell = std::get_if<ShellDirector>(&droplet.director)) {
-    o.has_core = true;
-    const DropletOptics<S> d = droplet_optics(scene, value);
-    o.core_um = d.radius_um - value(shell->wall_um);
-    o.core_index = shell->core_index ? value(shell->core_index) : d.n_host;
-    if (!shell->offset_um[0]) {
-      take(d);
-      o.field = RadialField<S>{false, S(0.0)};
-      return o;
-    }
-  }
-  const BallOptics<S> ball = ball_optics(scene, value);
-  take(ball.sphere);
-  std::visit([&](const auto& field) { o.field = field; }, ball.field);
-  if (const auto* nested = std::get_if<NestedField<S>>(&ball.field))
-    o.core_offset_um = {o.radius_um * nested->offset.x, o.radius_um * nested->offset.y, o.radius_um * nested->offset.z};
-  return o;
-}
-
-template <class S>
-SampledOptics<S> sampled_optics(const Scene& scene, const Values<S>& value) {
-  const VolumeOptics<S> v(scene, value);
-  SampledOptics<S> o;
-  o.grid = v.grid.get();
-  o.scale = value.get(std::get<SampledVolume>(scene.sample).scale, 1.0);
-  o.cos_turn = v.cos_turn, o.sin_turn = v.sin_turn;
-  o.n_o = v.n_o, o.n_e = v.n_o + v.birefringence, o.n_host = host_index(scene, value);
-  return o;
-}
-
-template <class S>
 std::unique_ptr<WaveMedium<S>> wave_medium(const Scene& scene, const Values<S>& value, double ramp_um) {
-  if (std::holds_alternative<SampledVolume>(scene.sample))
-    return std::make_unique<SampledMedium<S>>(sampled_optics(scene, value), ramp_um);
-  return std::make_unique<SphereMedium<S>>(sphere_optics(scene, value), ramp_um);
+  return std::get<MakeWaveMedium<S>>(kind_of(scene).waves->medium)(scene, value, ramp_um);
 }
 
-/// What planning needs to know of a sphere or box.
-struct WaveObject {
-  double n_o, n_e, n_host, core_index;
-  double radius_um;  ///< of WavePlan
-  WaveGrid grid;
-  std::string what;
-};
 WaveObject wave_object(const Scene& scene, const Values<double>& value) {
-  const double k0 = wavenumber_per_um(scene, value), na = value.get(scene.microscope.objective_na, 0.0);
   if (!scene.surround_index && !scene.surround_dispersion)
     throw UserError(Where{}, "ceiling: wave needs sample.surround",
                     "the index of what is around the sample, and in a sampled box where there is no liquid crystal");
   check_objective(scene, value, host_index(scene, value));
-  if (std::holds_alternative<SampledVolume>(scene.sample)) {
-    const SampledOptics<double> o = sampled_optics(scene, value);
-    const VolumeGrid& v = *o.grid;
-    const auto side = [&](int nodes, std::size_t i) { return o.scale * v.spacing_um[i] * (nodes - 1); };
-    return {o.n_o,
-            o.n_e,
-            o.n_host,
-            o.n_host,
-            0.5 * std::max({side(v.nx, 0), side(v.ny, 1), side(v.nz, 2)}),
-            sampled_grid(o, k0, na),
-            fmt::format("box of {:.3g} x {:.3g} x {:.3g} um", side(v.nx, 0), side(v.ny, 1), side(v.nz, 2))};
-  }
-  if (!std::holds_alternative<Droplet>(scene.sample))
+  const SampleWaves* const waves = kind_of(scene).waves;
+  if (!waves)
     throw UserError(Where{}, "ceiling: wave is for droplets, shells and sampled fields",
                     "use one_way or, for cells and slabs, reflections");
-  const SphereOptics<double> o = sphere_optics(scene, value);
-  return {o.n_o,
-          o.n_e,
-          o.n_host,
-          o.has_core ? o.core_index : o.n_host,
-          o.radius_um,
-          sphere_grid(o, k0, na),
-          fmt::format("sphere of {:.3g} um", 2 * o.radius_um)};
+  return waves->object(scene, value);
 }
 
 WaveImaging imaging_of(const Scene& scene, const Values<double>& value, const WaveGrid& grid) {
@@ -126,71 +46,9 @@ WaveImaging imaging_of(const Scene& scene, const Values<double>& value, const Wa
 
 }  // namespace
 
-namespace {
-
-int add_constant(Theta& theta, double value) {
-  theta.push_back(value);
-  return static_cast<int>(theta.size()) - 1;
-}
-
-/// Radius of a ball of as much liquid crystal as there is in a box, in its units; none where that is all of the box, or
-/// the ball does not fit in.
-std::optional<double> radius_of_ball(const VolumeGrid& g) {
-  const auto crystal = std::count_if(g.nodes.begin(), g.nodes.end(), is_crystal);
-  const double radius = std::cbrt(static_cast<double>(crystal) * g.spacing_um[0] * g.spacing_um[1] * g.spacing_um[2] *
-                                  0.75 / std::numbers::pi);
-  const auto fits = [&](int nodes, std::size_t i) { return radius < 0.5 * (nodes - 1) * g.spacing_um[i]; };
-  if (crystal == 0 || crystal == std::ssize(g.nodes) || !fits(g.nx, 0) || !fits(g.ny, 1) || !fits(g.nz, 2))
-    return std::nullopt;
-  return radius;
-}
-
-/// Of that radius, in a box `share` times as wide as another, its nodes as far apart.
-std::shared_ptr<const VolumeGrid> sampled_ball(const VolumeGrid& like, double radius, double share = 1) {
-  auto ball = std::make_shared<VolumeGrid>();
-  const auto nodes = [&](int n) { return std::max(2, static_cast<int>(std::ceil(share * (n - 1))) + 1); };
-  ball->nx = nodes(like.nx), ball->ny = nodes(like.ny), ball->nz = nodes(like.nz);
-  ball->spacing_um = like.spacing_um;
-  ball->nodes.resize(static_cast<std::size_t>(ball->nx) * static_cast<std::size_t>(ball->ny) *
-                     static_cast<std::size_t>(ball->nz));
-  for (int k = 0; k < ball->nz; ++k)
-    for (int j = 0; j < ball->ny; ++j)
-      for (int i = 0; i < ball->nx; ++i) {
-        const double x = (i - 0.5 * (ball->nx - 1)) * ball->spacing_um[0],
-                     y = (j - 0.5 * (ball->ny - 1)) * ball->spacing_um[1],
-                     z = (k - 0.5 * (ball->nz - 1)) * ball->spacing_um[2];
-        const double r = std::sqrt(x * x + y * y + z * z);
-        ball->nodes[ball->at(i, j, k)] = r > radius ? std::array<double, 6>{}
-                                         : r > 0    ? director_tensor(x / r, y / r, z / r)
-                                                    : director_tensor(0, 0, 1);
-      }
-  return ball;
-}
-
-}  // namespace
-
-std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta) {
-  RadialTwin twin{{scene, scene}, theta};
-  Scene &exact = twin.scenes[0], &propagated = twin.scenes[1];
-  if (std::holds_alternative<Droplet>(scene.sample)) {
-    Droplet& droplet = std::get<Droplet>(exact.sample);
-    if (auto* shell = std::get_if<ShellDirector>(&droplet.director))
-      shell->offset_um = {};
-    else
-      droplet.director = RadialDirector{};
-    propagated.sample = droplet;
-    return twin;
-  }
-  if (const auto* volume = std::get_if<SampledVolume>(&scene.sample))
-    if (const std::optional<double> radius = radius_of_ball(*volume->grid)) {
-      const double scale = Values<double>(theta, {}).get(volume->scale, 1.0);
-      exact.sample = propagated.sample = Droplet{{add_constant(twin.theta, 2 * scale * *radius)}, RadialDirector{}};
-      Scene sampled = propagated;
-      sampled.sample = SampledVolume{sampled_ball(*volume->grid, *radius), volume->scale};
-      twin.scenes.push_back(std::move(sampled));
-      return twin;
-    }
-  return std::nullopt;
+std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta, double scale) {
+  const SampleWaves* const waves = kind_of(scene).waves;
+  return waves ? waves->radial_twin(scene, theta, scale) : std::nullopt;
 }
 
 double picture_error(const Image& image, const Image& exact) {
@@ -204,45 +62,30 @@ double picture_error(const Image& image, const Image& exact) {
 
 namespace {
 
-/// picture_error of a model of the radial twin's last scene, all lengths of which are `scale` times the scene's; in a
-/// view of its own.
+/// picture_error of a model of the twin's last scene, in a view of its own; `scale`: what the twin was made with.
 template <class Model>
 double error_on_twin(RadialTwin twin, const BeamMaker& light, double scale, const RenderPicture& picture,
                      const Model& model) {
-  const auto resize = [&](ParameterRef& length, double from) { length.index = add_constant(twin.theta, scale * from); };
-  for (Scene& scene : twin.scenes) {
-    const Theta before = twin.theta;
-    const Values<double> value(before, {});
-    if (auto* droplet = std::get_if<Droplet>(&scene.sample)) {
-      resize(droplet->diameter_um, value(droplet->diameter_um));
-      if (auto* shell = std::get_if<ShellDirector>(&droplet->director)) resize(shell->wall_um, value(shell->wall_um));
-    } else {
-      // Fewer nodes as far apart: what sampling errs by goes with their distance.
-      auto& volume = std::get<SampledVolume>(scene.sample);
-      // of the front one, which is resized already
-      const double diameter =
-          value(std::get<Droplet>(twin.scenes.front().sample).diameter_um) / value.get(volume.scale, 1.0);
-      if (scale < 1) volume.grid = sampled_ball(*volume.grid, 0.5 * diameter, scale);
-    }
-    if (scene.microscope.focus_um) resize(scene.microscope.focus_um, value(scene.microscope.focus_um));
-  }
   const Theta before = twin.theta;
-  const Values<double> value(before, {});
-  const double diameter = value(std::get<Droplet>(twin.scenes.front().sample).diameter_um);
+  const Values<double> value(before, {});  // of spheres without a field: nothing to remember
   for (Scene& scene : twin.scenes) {
+    if (ParameterRef& focus = scene.microscope.focus_um) focus = twin.constant(scale * value(focus));
     // Pixels as large as the scene's, where 64 of them suffice: what is left out need not have the sign of what is
     // seen, and large pixels average.
     View& view = scene.view;
-    const int pixels = std::clamp(static_cast<int>((diameter + 4) / (scale * value(view.pixel_size_um))), 2, 64);
+    const double side_um = twin.diameter_um + 4;
+    const int pixels = std::clamp(static_cast<int>(side_um / (scale * value(view.pixel_size_um))), 2, 64);
     view.width = view.height = pixels;
-    view.pixel_size_um.index = add_constant(twin.theta, (diameter + 4) / pixels);
-    view.center_x_px.index = view.center_y_px.index = add_constant(twin.theta, 0.5 * (pixels - 1));
+    view.pixel_size_um = twin.constant(side_um / pixels);
+    view.center_x_px = view.center_y_px = twin.constant(0.5 * (pixels - 1));
   }
   const Scene& exact = twin.scenes.front();
   Demand demand = RadialTwin::demand(0, {});
   demand.intensity_accuracy = 1e-8;  // nearly dark pictures, too
-  return picture_error(model(twin.scenes.back(), twin.theta),
-                       picture(exact, plan_series(exact, demand, Values<double>(twin.theta, {}), light), twin.theta));
+  return picture_error(
+      model(twin.scenes.back(), twin.theta),
+      picture(exact, kind_of(exact).waves->plan_series(exact, demand, Values<double>(twin.theta, {}), light),
+              twin.theta));
 }
 
 std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<double>& value, const WaveObject& object) {
@@ -262,16 +105,17 @@ std::shared_ptr<const WavePlan> plan_grids(const Scene& scene, const Values<doub
   return wave;
 }
 
-/// picture_error of propagation on the radial twin; where that takes longer than half a second, on a smaller one.
-double propagation_error_on_twin(const RadialTwin& of, const BeamMaker& light, double seconds,
-                                 const RenderPicture& picture) {
-  return error_on_twin(
-      of, light, std::min(1.0, std::cbrt(0.5 / seconds)), picture, [&](const Scene& twin, const Theta& theta) {
-        const Values<double> values(theta, {});
-        Rendering rendering;
-        render_wave(twin, *plan_grids(twin, values, wave_object(twin, values)), light, theta, {}, 1, rendering);
-        return rendering.intensity;
-      });
+/// picture_error of propagation on a radial twin of that scale.
+double propagation_error_on(const RadialTwin& twin, const BeamMaker& light, double scale,
+                            const RenderPicture& picture) {
+  return error_on_twin(twin, light, scale, picture, [&](const Scene& scene, const Theta& theta) {
+    const Values<double> values(theta, {});
+    RenderPlan plan;
+    plan.wave = plan_grids(scene, values, wave_object(scene, values));
+    Rendering rendering;
+    render_wave(scene, plan, light, theta, {}, 1, rendering);
+    return rendering.intensity;
+  });
 }
 
 }  // namespace
@@ -299,13 +143,13 @@ RenderPlan plan_wave(const Planning& planning) {
   // tests/cross/split_step_test.cc): it grows with the contrast, with the square of the aperture, and where light must
   // leave a wall into a thinner medium. 0.01 is the grid's; half its step and slabs take no more away.
   const double contrast = std::abs(o.n_e - o.n_o) + 2 * std::abs((2 * o.n_o + o.n_e) / 3 - o.n_host);
-  const bool shell = std::holds_alternative<Droplet>(scene.sample) &&
-                     std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
-  const double step_out = shell ? std::max(0.0, std::max(o.n_o, o.n_e) - std::min(o.n_host, o.core_index)) : 0;
+  const double step_out = o.has_core ? std::max(0.0, std::max(o.n_o, o.n_e) - std::min(o.n_host, o.core_index)) : 0;
   plan.numerical_error = 0.01;
   plan.model_error = (0.018 + 0.068 * na * na) * std::clamp(contrast / 0.4, 0.15, 1.6) + 0.15 * na * step_out;
   plan.reasons.push_back("what is left out are reflections and the third order in the wave's slope");
-  const std::optional<RadialTwin> twin = radial_twin(scene, value.theta());
+  // Where the scene's takes longer than half a second, a smaller one.
+  const double scale = std::min(1.0, std::cbrt(0.5 / plan.cost_seconds));
+  const std::optional<RadialTwin> twin = radial_twin(scene, value.theta(), scale);
   if (!twin) {
     plan.warnings.push_back(
         fmt::format("That wave propagation errs by {:.2g} of the picture's RMS was measured on spheres with bright "
@@ -316,7 +160,7 @@ RenderPlan plan_wave(const Planning& planning) {
     return plan;
   }
   // A picture may be nearly dark, and what is left out is not: then the twin knows.
-  const double on_twin = propagation_error_on_twin(*twin, planning.light, plan.cost_seconds, planning.picture);
+  const double on_twin = propagation_error_on(*twin, planning.light, scale, planning.picture);
   const double more = std::max(1.0, 1.5 * on_twin / (plan.numerical_error + plan.model_error));
   plan.numerical_error *= more;
   plan.model_error *= more;
@@ -398,10 +242,10 @@ std::vector<bool> move_only_pictures(const Scene& scene, const std::vector<int>&
 WaveField flux_field(MarchedField marched, const WaveGrid& g, double k0, double n_host) {
   WaveField field;
   field.a[0] = std::move(marched.ex), field.a[1] = std::move(marched.ey);
-  const std::shared_ptr<const Fft2> fft = shared_fft(g.nx, g.ny);
-  for (Plane& plane : field.a) fft->forward(plane);
-  const std::complex<double> back = std::polar(1.0 / static_cast<double>(fft->size()), -k0 * n_host * g.exit_um);
-  for (std::size_t i = 0; i < fft->size(); ++i) {
+  const Fft2 fft(g.nx, g.ny);
+  for (Plane& plane : field.a) fft.forward(plane);
+  const std::complex<double> back = std::polar(1.0 / static_cast<double>(fft.size()), -k0 * n_host * g.exit_um);
+  for (std::size_t i = 0; i < fft.size(); ++i) {
     const auto wavevector = [&](int m, int n) {
       return 2 * std::numbers::pi / (n * g.step_um * k0) * (m < n - m ? m : m - n);
     };
@@ -419,14 +263,16 @@ WaveField flux_field(MarchedField marched, const WaveGrid& g, double k0, double 
     ex = px * p - py * s;
     ey = py * p + px * s;
   }
-  for (Plane& plane : field.a) fft->inverse(plane);
+  for (Plane& plane : field.a) fft.inverse(plane);
   return field;
 }
 
 }  // namespace
 
-void render_wave(const Scene& scene, const WavePlan& plan, const BeamMaker& light, const Theta& theta,
+void render_wave(const Scene& scene, const RenderPlan& chosen, const BeamMaker& light, const Theta& theta,
                  const std::vector<int>& active, int threads, Rendering& into) {
+  const WavePlan& plan = *chosen.wave;
+  Memo* const memo = chosen.demand.memo.get();
   // What moves only the picture needs no light sent through the sample again.
   struct Part {
     std::vector<int> parameters;
@@ -457,7 +303,7 @@ void render_wave(const Scene& scene, const WavePlan& plan, const BeamMaker& ligh
   };
   SentFields base;  // without derivatives
   const auto send = [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
-    const Values<S> value(theta, chunk);
+    const Values<S> value(theta, chunk, memo);
     const Line<S> line = light.in(value).line;
     const auto medium = wave_medium(scene, value, plan.ramp_um);
     SentFields fields;
@@ -472,14 +318,15 @@ void render_wave(const Scene& scene, const WavePlan& plan, const BeamMaker& ligh
   else
     in_chunks(of_light, send);
   in_chunks(of_picture, [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
-    const Values<S> value(theta, chunk);
+    const Values<S> value(theta, chunk, memo);
     picture(scene, light.in(value).line, plan.grid, plan.imaging, value, base, threads, images);
   });
 }
 
 Image marched_picture(const Scene& scene, const BeamMaker& light, const Theta& theta, int threads) {
-  const Values<double> value(theta, {});
-  const Values<Pack> lanes(theta, {});
+  Memo memo;
+  const Values<double> value(theta, {}, &memo);
+  const Values<Pack> lanes = value.as<Pack>();
   const WaveObject o = wave_object(scene, value);
   const double k0 = wavenumber_per_um(scene, value);
   // As wide as propagation asks, points and slabs where halving them changes less than what reflections leave

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "samples/planning.h"
+#include "samples/waves/object.h"
 #include "wave/imaging.h"
 
 namespace birefit {
@@ -17,23 +17,11 @@ struct WavePlan {
   double objective_na = 0;
 };
 
-/// A sphere as it is seen: exactly, by the series; by propagation; and, of sampled fields, by propagation through
-/// samples.
-struct RadialTwin {
-  std::vector<Scene> scenes;  ///< in that order
-  Theta theta;                ///< of all of them: the scene's, constants of the twin behind it
-
-  /// Of scenes[i], all else as in `of`.
-  static Demand demand(std::size_t i, Demand of) {
-    of.ceiling = Ceiling::wave, of.rays = Rays::straight;
-    of.method = i == 0 ? "series" : "split_step";
-    return of;
-  }
-};
 /// Of a sphere, one of the same size and indices whose axis is radial (shells: concentric). Of a sampled field with
 /// host in its box, a ball of as much liquid crystal of full order in the box's middle, sampled at the same nodes. None
 /// of anything else.
-std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta);
+/// All lengths `scale` times the scene's, the focus (where it is given) excepted.
+std::optional<RadialTwin> radial_twin(const Scene& scene, const Theta& theta, double scale = 1);
 
 /// RMS of the difference from the exact picture over the RMS of that; where it is darker than 1e-12 of the incident
 /// light, which nothing tells from darkness, over 1e-12.
@@ -48,8 +36,9 @@ double march_error_on_twin(const Scene& scene, const BeamMaker& light, const The
 /// is missing or above the host's index, or the propagation would need more memory than there should be.
 RenderPlan plan_wave(const Planning&);
 
-/// The whole picture and its derivatives by `active` (indices of theta), images and all resized to fit.
-void render_wave(const Scene& scene, const WavePlan& plan, const BeamMaker& light, const Theta& theta,
+/// The whole picture by a plan of propagation and its derivatives by `active` (indices of theta), images and all
+/// resized to fit.
+void render_wave(const Scene& scene, const RenderPlan& plan, const BeamMaker& light, const Theta& theta,
                  const std::vector<int>& active, int threads, Rendering& into);
 
 }  // namespace birefit

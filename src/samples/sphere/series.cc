@@ -1,4 +1,4 @@
-#include "samples/waves/series.h"
+#include "samples/sphere/series.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "instrument/exposure.h"
-#include "medium/build.h"
 #include "samples/pixels/pixel_mean.h"
 #include "samples/sphere/droplet.h"
 #include "samples/tables/radial_table.h"
@@ -148,10 +147,9 @@ class SeriesImage final : public SampleImage<S> {
 }  // namespace
 
 bool has_series(const Scene& scene) {
-  const auto* droplet = std::get_if<Droplet>(&scene.sample);
-  if (!droplet) return false;
-  if (const auto* radial = std::get_if<RadialDirector>(&droplet->director)) return !radial->twist_deg;
-  const auto* shell = std::get_if<ShellDirector>(&droplet->director);
+  const Droplet& droplet = std::get<Droplet>(scene.sample);
+  if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) return !radial->twist_deg;
+  const auto* shell = std::get_if<ShellDirector>(&droplet.director);
   return shell && !shell->offset_um[0];
 }
 

@@ -5,7 +5,7 @@
 
 namespace birefit {
 
-/// Radial without twist, or a concentric shell.
+/// Of a sphere: radial without twist, or a concentric shell.
 bool has_series(const Scene& scene);
 /// Throws UserError like plan_wave, which serves the other spheres.
 RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<double>& value, const BeamMaker& light);
