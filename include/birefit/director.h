@@ -113,6 +113,7 @@ struct HelixDirector {
 /// twist_deg (1 - r/R): homeotropic at the surface, twisted inside (no equilibrium, a fully coupled test scene).
 struct RadialDirector {
   static constexpr const char* kKey = "radial";
+  static constexpr bool kMayBeEmpty = true;  // as a key with nothing behind it
   ParameterRef twist_deg;
 
   template <class Self, class Visit>
@@ -152,6 +153,7 @@ struct AxialDirector {
 /// Tangential anchoring: the director follows the circles through two poles (Williams, J. Phys. A 19, 3211 (1986)).
 struct BipolarDirector {
   static constexpr const char* kKey = "bipolar";
+  static constexpr bool kMayBeEmpty = true;  // as a key with nothing behind it
   ParameterRef azimuth_deg, tilt_deg, pole_distance;
 
   template <class Self, class Visit>

@@ -23,7 +23,8 @@ void check_pitch(ConfigReader& reader, const Block& block, ParameterRef ref) {
 
 }  // namespace
 
-FreederickszDirector read_freedericksz(ConfigReader& reader, const Block& parent) {
+template <>
+FreederickszDirector read_director<FreederickszDirector>(ConfigReader& reader, const Block& parent) {
   using Anchoring = FreederickszDirector::Anchoring;
   FreederickszDirector d;
   using D = FreederickszDirector;
@@ -130,7 +131,8 @@ FreederickszDirector read_freedericksz(ConfigReader& reader, const Block& parent
   return d;
 }
 
-HelixDirector read_helix(ConfigReader& reader, const Block& parent) {
+template <>
+HelixDirector read_director<HelixDirector>(ConfigReader& reader, const Block& parent) {
   HelixDirector d;
   const Block block = reader.block(parent, HelixDirector::kKey, described_keys<HelixDirector>(), true);
   read_numbers(reader, block, d);
@@ -138,7 +140,8 @@ HelixDirector read_helix(ConfigReader& reader, const Block& parent) {
   return d;
 }
 
-UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
+template <>
+UniformDirector read_director<UniformDirector>(ConfigReader& reader, const Block& parent) {
   UniformDirector director;
   const Block block = reader.block(parent, UniformDirector::kKey, described_keys<UniformDirector>(), true);
   const YamlNode* axis = block.find("axis");
@@ -170,7 +173,8 @@ UniformDirector read_uniform(ConfigReader& reader, const Block& parent) {
 }
 
 /// The reduced field, or the applied one with the two numbers that reduce it.
-AxialDirector read_axial(ConfigReader& reader, const Block& parent) {
+template <>
+AxialDirector read_director<AxialDirector>(ConfigReader& reader, const Block& parent) {
   AxialDirector axial;
   std::vector<std::string> keys = described_keys<AxialDirector>();
   keys.push_back("branch");

@@ -59,27 +59,7 @@ Droplet read_droplet(ConfigReader& reader, const Block& parent) {
   const std::vector<std::string> kinds = KindsOf<decltype(Droplet::director)>::keys();
   const Block director = reader.block(block, "director", kinds, true);
   const auto kind = one_kind(reader, director, kinds);
-  if (kind == "axial") {
-    droplet.director = read_axial(reader, director);
-    return droplet;
-  }
-  if (kind == "bipolar") {
-    BipolarDirector bipolar;
-    if (director.find("bipolar")->kind != YamlNode::Kind::null) {
-      read_numbers(reader, reader.block(director, "bipolar", described_keys<BipolarDirector>(), true), bipolar);
-    }
-    droplet.director = bipolar;
-    return droplet;
-  }
-  if (kind == "radial") {
-    // `radial:` with nothing behind it is as clear as `radial: {}`.
-    const YamlNode* node = director.find("radial");
-    if (node->kind == YamlNode::Kind::null) return droplet;
-  }
-  // No twist is a simpler scene, not a twist of zero: its transport is diagonal.
-  RadialDirector radial;
-  read_numbers(reader, reader.block(director, "radial", described_keys<RadialDirector>(), false), radial);
-  droplet.director = radial;
+  read_one_of(reader, director, kind, droplet.director);
   return droplet;
 }
 
@@ -137,17 +117,7 @@ Cell read_cell(ConfigReader& reader, const Block& parent) {
   const std::vector<std::string> kinds = KindsOf<decltype(Cell::director)>::keys();
   const Block director = reader.block(block, "director", kinds, true);
   const auto kind = one_kind(reader, director, kinds);
-  if (kind == "uniform") {
-    cell.director = read_uniform(reader, director);
-  } else if (kind == "twisted") {
-    TwistedDirector field;
-    read_numbers(reader, reader.block(director, "twisted", described_keys<TwistedDirector>(), true), field);
-    cell.director = field;
-  } else if (kind == "freedericksz") {
-    cell.director = read_freedericksz(reader, director);
-  } else if (kind == "helix") {
-    cell.director = read_helix(reader, director);
-  }
+  read_one_of(reader, director, kind, cell.director);
   return cell;
 }
 
@@ -174,7 +144,7 @@ Plate read_plate(ConfigReader& reader, const Block& parent, View& shown) {
   const Block block = reader.block(parent, "plate", {"thickness_um", "director", "heat", "view"}, true);
   plate.thickness_um = read_described<Plate>(reader, block, "thickness_um");
   const Block director = reader.block(block, "director", {"uniform"}, true);
-  if (one_kind(reader, director, {"uniform"})) plate.director = read_uniform(reader, director);
+  if (one_kind(reader, director, {"uniform"})) plate.director = read_director<UniformDirector>(reader, director);
   if (block.find("heat")) {
     const Block heat = reader.block(block, "heat", described_keys<HeatStep>(), true);
     HeatStep step;

@@ -6,6 +6,7 @@
 
 #include "birefit/render.h"
 #include "independent_droplet.h"
+#include "medium/families/radial.h"
 #include "profiles.h"
 #include "reference_table.h"
 #include "scene_builder.h"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "birefit/fit.h"
+#include "medium/families/radial.h"
 #include "profiles.h"
 #include "reference_table.h"
 #include "scene_builder.h"

@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "birefit/render.h"
+#include "medium/families/radial.h"
 #include "profiles.h"
 #include "reference_table.h"
 #include "scene_builder.h"
