@@ -142,6 +142,13 @@ struct StatedNumber {
   /// Standard deviations by which pictures want it elsewhere.
   double away() const { return fitted && known_to > 0 ? (value - stated) / known_to : 0; }
 };
+/// A departure of the picture from the model that was fitted since something was left over: blur, a camera that is not
+/// linear, uneven light. In units of the gain.
+struct Departure {
+  std::string name, unit;
+  double value = 0, stderr_ = 0;
+  double expected = 0;  ///< standard deviation among pictures that are nearly the model
+};
 /// Beyond so many standard deviations pictures contradict what was stated.
 inline constexpr double kContradicted = 3;
 
@@ -223,7 +230,8 @@ struct FitResult {
   std::vector<InputEffect> inputs;
   /// What is stated and not known exactly, and is in the errors; those that matter most first.
   std::vector<StatedNumber> stated;
-  std::vector<Strip> strips;  ///< empty where strips agree, or the sample has none
+  std::vector<Departure> departures;  ///< empty unless something was left over
+  std::vector<Strip> strips;          ///< empty where strips agree, or the sample has none
   /// columns and rows as Strip::roi_px: strips in which frames agree far better than elsewhere and the model no worse;
   /// a proposal
   std::optional<std::array<int, 4>> trusted_px;

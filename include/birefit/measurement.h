@@ -33,6 +33,21 @@ struct UnevenLight {
   bool of_intensity = false;  ///< added to the gain
 };
 
+/// What lenses, cameras and resampling do to a picture beside gain and offset: `coefficient`, in units of the values
+/// per unit of the effect, times how the model's light changes by it.
+struct PictureEffect {
+  enum class Kind {
+    blur,              ///< by its variance (px^2); < 0: sharpened
+    gamma,             ///< light to the power of 1 + gamma, of the brightest
+    curve,             ///< light times 1 + curve (light / brightest - 1)
+    stretch_x,         ///< about the centre, wider by it and as much lower
+    stretch_diagonal,  ///< the same along the diagonals
+    growth,            ///< about the centre, wider and higher by it
+  };
+  ParameterRef coefficient;
+  Kind kind = Kind::blur;
+};
+
 /// One micrograph. Values are counts, or transmission when calibration frames were given.
 struct Picture {
   std::string name;  ///< for reports: the file name
@@ -41,9 +56,10 @@ struct Picture {
   Mask mask;  ///< 1 = usable; dead, saturated, non-finite, user-masked and out-of-ROI pixels are 0
   /// calibration: variance of a value per variance of a count, (1/(parallel - dark))^2; else empty
   Image variance_scale;
-  ParameterRef gain, offset;        ///< linear: value = gain * intensity + offset; several pictures may share one
-  std::vector<UnevenLight> uneven;  ///< linear as well
-  std::optional<NoiseModel> noise;  ///< in counts; else estimated from the image
+  ParameterRef gain, offset;           ///< linear: value = gain * intensity + offset; several pictures may share one
+  std::vector<UnevenLight> uneven;     ///< linear as well
+  std::vector<PictureEffect> effects;  ///< to first order linear as well
+  std::optional<NoiseModel> noise;     ///< in counts; else estimated from the image
   /// Pixel counts by reason, for the report.
   int masked_by_user = 0, outside_roi = 0, saturated = 0, dead = 0, non_finite = 0;
 };

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "fit/errors/catalogue.h"
 #include "fit/errors/left_out.h"
 #include "fit/errors/report.h"
 #include "fit/errors/stated.h"
@@ -77,19 +78,32 @@ Outcome concluded(const Task& task, const Minima& minima, Optimum optimum, bool 
   return outcome;
 }
 
+/// Where something is left over, all that pictures are known to depart by is fitted at once.
+Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
+  if (beaten || !asks_catalogue(task, optimum)) return concluded(task, minima, std::move(optimum), beaten);
+  task.say("something is left over: what pictures depart by is fitted as well");
+  const FitJob job = with_catalogue(task, optimum);
+  const Task wider(job);
+  Theta before = optimum.theta;
+  Optimum with_all = settle(wider, best_with_nuisances(wider, task, optimum, minima));
+  if (with_all.stopped) return concluded(task, minima, std::move(optimum), beaten);
+  with_all.came_from = std::move(before);
+  return concluded(wider, minima, std::move(with_all), beaten);
+}
+
 /// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
 Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   if (minima.hopeless && !beaten)
     if (std::optional<Outcome> outcome = given_up(task, minima)) return std::move(*outcome);
   Optimum optimum = settle(task, best_minimum(task, minima, beaten));
   const WorthFitting told = worth_fitting(task, optimum);
-  if (told.numbers.empty()) return concluded(task, minima, std::move(optimum), beaten);
+  if (told.numbers.empty()) return with_what_is_left(task, minima, std::move(optimum), beaten);
   task.say("what is stated and not known exactly is fitted as well");
   const FitJob job = with_nuisances(task.job, told.numbers);
   const Task wider(job);
   optimum = told.better ? settle(wider, best_with_nuisances(wider, task, optimum, minima))
                         : with_settled_misfit(wider, with_nuisances_from(wider, task, std::move(optimum)));
-  return concluded(wider, minima, std::move(optimum), beaten);
+  return with_what_is_left(wider, minima, std::move(optimum), beaten);
 }
 
 }  // namespace

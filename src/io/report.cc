@@ -79,6 +79,7 @@ std::string report_html(const Config& config, const FitResult& result) {
 
   out += "<h2>Parameters</h2>\n" + parameter_table(result) + statistics_section(config, result);
   out += stated_table(result);
+  out += departures_table(result);
   out += input_table(result);
   out += branch_table(result);
   out += coverage_table(result);

@@ -58,6 +58,17 @@ Json parameter_json(const ParameterEstimate& p) {
   return json;
 }
 
+Json departures_json(const FitResult& result) {
+  Json list = Json::array();
+  for (const Departure& d : result.departures)
+    list.push_back({{"name", d.name},
+                    {"unit", d.unit},
+                    {"value", number(d.value)},
+                    {"stderr", number(d.stderr_)},
+                    {"usual", number(d.expected)}});
+  return list;
+}
+
 Json stated_json(const FitResult& result) {
   Json list = Json::array();
   for (const StatedNumber& n : result.stated) {
@@ -253,6 +264,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["directions"] = directions_json(result);
   json["inputs"] = inputs_json(result);
   json["stated"] = stated_json(result);
+  json["departures"] = departures_json(result);
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
   json["coverage"] = coverage_json(result);

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "fit/errors/statistics.h"
@@ -246,28 +248,48 @@ Eigen::VectorXd by_parts(const std::vector<Sums::Part>& parts, const Eigen::Matr
   return variance;
 }
 
-}  // namespace
-
-Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum) {
-  constexpr double kFactor = 1.5;
+/// What there is to say of a fit's residual; nothing where it is not one picture of a sphere, or where noise explains
+/// it.
+struct LeftOver {
+  Sums sums;
+  Eigen::MatrixXd information;
+  Inverse inverse;
+  Discrepancy found;
+  double pixels = 0;
+};
+std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
   const bool spheres = task.frames() == 1 && task.observable(0).quantity == Quantity::intensity &&
                        traits_of(task.picture(0).scene).sphere_diameter_um;
-  if (!spheres || task.unknowns.size() == 0 || optimum.stopped) return {};
+  if (!spheres || task.unknowns.size() == 0 || optimum.stopped) return std::nullopt;
   const LeastSquares& problem = *optimum.problem;
   const double pixels = static_cast<double>(problem.pixel_rows()), chi_square = problem.frame_misfit(0).chi_square;
   const Patterns patterns;
   constexpr double kPixels = 40000;  // they tell a discrepancy as well as all of them
   const Eigen::Index stride = static_cast<Eigen::Index>(std::ceil(pixels / kPixels));
-  const Sums sums = sums_of(task, optimum, patterns, stride);
+  Sums sums = sums_of(task, optimum, patterns, stride);
   const Eigen::MatrixXd all = problem.factor(true), data = problem.factor(false);
-  const Eigen::MatrixXd information = sums.jj + (all.transpose() * all - data.transpose() * data);
-  const Inverse inverse = invert_normal_equations(Eigen::MatrixXd(information.llt().matrixU()));
-  if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return {};
-  const Discrepancy found = by_patterns(patterns, sums, inverse.covariance);
+  Eigen::MatrixXd information = sums.jj + (all.transpose() * all - data.transpose() * data);
+  Inverse inverse = invert_normal_equations(Eigen::MatrixXd(information.llt().matrixU()));
+  if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return std::nullopt;
+  Discrepancy found = by_patterns(patterns, sums, inverse.covariance);
   constexpr double kEvidence = 15;  // clean pictures stay below it (NoDiscrepancyIsSeenInCleanPictures)
-  if (!(chi_square / pixels > 1 + 3 * std::sqrt(2 / pixels)) && !(found.evidence > kEvidence)) return {};
-  Eigen::VectorXd variance = (found.white * sums.pixels / pixels * inverse.covariance + found.covariance).diagonal();
-  for (const auto* parts : {&sums.sectors, &sums.rings}) variance = variance.cwiseMax(by_parts(*parts, information));
+  if (!(chi_square / pixels > 1 + 3 * std::sqrt(2 / pixels)) && !(found.evidence > kEvidence)) return std::nullopt;
+  return LeftOver{std::move(sums), std::move(information), std::move(inverse), std::move(found), pixels};
+}
+
+}  // namespace
+
+bool leaves_discrepancy(const Task& task, const Optimum& optimum) { return left_over(task, optimum).has_value(); }
+
+Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum) {
+  constexpr double kFactor = 1.5;
+  const std::optional<LeftOver> left = left_over(task, optimum);
+  if (!left) return {};
+  Eigen::VectorXd variance =
+      (left->found.white * left->sums.pixels / left->pixels * left->inverse.covariance + left->found.covariance)
+          .diagonal();
+  for (const auto* parts : {&left->sums.sectors, &left->sums.rings})
+    variance = variance.cwiseMax(by_parts(*parts, left->information));
   return variance.allFinite() ? Eigen::VectorXd(kFactor * variance.cwiseMax(0).cwiseSqrt()) : Eigen::VectorXd();
 }
 

@@ -17,5 +17,7 @@ namespace birefit::estimation {
 /// Standard deviations of all unknowns, searched first; empty where nothing is left over, or where the job is not one
 /// picture of a droplet or shell.
 Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum);
+/// Whether it is not empty.
+bool leaves_discrepancy(const Task& task, const Optimum& optimum);
 
 }  // namespace birefit::estimation

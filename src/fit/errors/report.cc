@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "fit/errors/catalogue.h"
 #include "fit/errors/discrepancy.h"
 #include "fit/errors/verdict.h"
 
@@ -143,6 +144,17 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
 }
 
 void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances) {
+  if (optimum.came_from) {
+    // What the fit without the catalogue would have answered: no explanation is sure enough to make it impossible.
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(task.unknowns.size());
+    for (int j = 0; j < task.unknowns.size(); ++j)
+      if (const auto index = static_cast<std::size_t>(task.unknowns.table_index(j));
+          index < optimum.came_from->size() && !task.job.parameters[task.unknowns.table_index(j)].nuisance)
+        step[j] = optimum.theta[index] - (*optimum.came_from)[index];
+    covariances.with_misfit.covariance += step * step.transpose();
+    const Eigen::VectorXd aspect = shift_by_aspect(task, optimum, covariances.of_noise.covariance);
+    if (aspect.size() > 0) covariances.with_misfit.covariance += aspect * aspect.transpose();
+  }
   const Eigen::VectorXd sd = sd_of_discrepancy(task, optimum);
   if (sd.size() == 0) return;
   covariances.by_discrepancy = sd;
@@ -214,6 +226,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.evaluations = optimum.evaluations + optimum.problem->evaluations();
   // Since then, too: profiles and warnings may be half done.
   if (task.interrupted()) result.interrupted = true, result.converged = false;
+  result.departures = departures_of(task, result);
   leave_nuisances(task, result);
   judge_misfit(task, optimum, covariances, result);
   result.verdict = (misfit.empty() ? "" : misfit + " ") + verdict(result, signal);

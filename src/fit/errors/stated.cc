@@ -27,6 +27,15 @@ double beyond_noise(const Optimum& optimum) {
   return largest;
 }
 
+/// Numbers of which pictures have this share of what their priors have, `units` times the information they are said to.
+std::vector<int> numbers_told(const Stated& stated, double units) {
+  constexpr double kTold = 0.05;
+  std::vector<int> told;
+  for (Eigen::Index i = 0; i < stated.sd.size(); ++i)
+    if (units * stated.information(i, i) > kTold) told.push_back(stated.index[static_cast<std::size_t>(i)]);
+  return told;
+}
+
 /// The depth of field of an objective on light of a wavelength in what is around the sample.
 double depth_of_field_um(const FitJob& job, const Scene& scene) {
   constexpr double kLeast = 0.3;  // by eye
@@ -96,6 +105,12 @@ Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::Mat
   return stated;
 }
 
+std::vector<int> told_numbers(const Task& task, const Optimum& optimum) {
+  const Inverse inverse = invert_normal_equations(optimum.problem->factor());
+  const Stated stated = linear_stated_numbers(task, *optimum.problem, optimum.theta, inverse.covariance);
+  return stated.information.allFinite() ? numbers_told(stated, beyond_noise(optimum)) : std::vector<int>{};
+}
+
 WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   if (optimum.stopped || task.unknowns.searched.empty()) return {};
   // Where the scatter of a few frames is what is known of a misfit, more unknowns would leave it no degrees of freedom:
@@ -109,13 +124,8 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   // By the problem's weights, which a misfit has made smaller, and by those of the noise: the misfit may be theirs.
   const double unit = beyond_noise(optimum);
   const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(k, k);
-  constexpr double kTold = 0.05, kBetter = 9, kOfExcess = 0.2, kWider = 1.2;
-  const auto told_by = [&](double units) {
-    std::vector<int> told;
-    for (Eigen::Index i = 0; i < k; ++i)
-      if (units * stated.information(i, i) > kTold) told.push_back(stated.index[static_cast<std::size_t>(i)]);
-    return told;
-  };
+  constexpr double kBetter = 9, kOfExcess = 0.2, kWider = 1.2;
+  const auto told_by = [&](double units) { return numbers_told(stated, units); };
   const auto gain_by = [&](double units) {
     const Eigen::VectorXd pull = units * stated.pull;
     return pull.dot((prior + units * stated.information).ldlt().solve(pull));

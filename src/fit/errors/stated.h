@@ -36,6 +36,9 @@ struct WorthFitting {
 };
 WorthFitting worth_fitting(const Task& task, const Optimum& optimum);
 
+/// Those that the pictures tell anything of, by the weights of noise alone.
+std::vector<int> told_numbers(const Task& task, const Optimum& optimum);
+
 /// The job with these free, about what is stated, as nuisances.
 FitJob with_nuisances(const FitJob& job, const std::vector<int>& numbers);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -19,6 +20,23 @@ void add_effect(const Parameter& of, double value, double known_to, const Eigen:
   const Eigen::VectorXd shift = effect.step * shift_per_unit;
   effect.shift.assign(shift.begin(), shift.end());
   if (effect.step > 0) result.inputs.push_back(std::move(effect));
+}
+
+std::string departure_words(const std::string& name) {
+  static const std::map<std::string, std::string> words{
+      {"blur", "a blur (variance) of"},
+      {"gamma", "a camera's gamma off by"},
+      {"curve", "a camera's curve bent by"},
+      {"stretch_x", "pixels wider than high by"},
+      {"stretch_diagonal", "a picture stretched along its diagonal by"},
+      {"light_x", "light that grows to the right by"},
+      {"light_y", "light that grows upwards by"},
+      {"light_square", "light that grows outwards by"},
+      {"background_x", "a background that grows to the right by"},
+      {"background_y", "a background that grows upwards by"},
+      {"background_square", "a background that grows outwards by"}};
+  const auto found = words.find(name);
+  return found == words.end() ? name : found->second;
 }
 
 /// The estimate of an unknown once nuisances have left; null of those.
@@ -145,6 +163,11 @@ void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& c
           "{} is fitted as {}{}, {:.2g} times what it was thought to be known to away from the {:.6g} that are stated",
           number.name, with_error(number.value, number.stderr_), number.unit.empty() ? "" : " " + number.unit,
           std::abs(number.away()), number.stated));
+  for (const Departure& d : result.departures)
+    if (std::abs(d.value) > kContradicted * d.expected && std::abs(d.value) > kContradicted * d.stderr_)
+      result.misfit.push_back(fmt::format("the picture looks like one with {} {:.2g}{}, {:.2g} times what is usual",
+                                          departure_words(d.name), d.value, d.unit.empty() ? "" : " " + d.unit,
+                                          std::abs(d.value) / d.expected));
   // A noise that is estimated a tenth too small is no misfit of the model, nor is a discrepancy that errors hardly
   // feel.
   constexpr double kOfNote = 1.2, kOfVariance = 0.2;

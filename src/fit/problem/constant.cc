@@ -24,7 +24,7 @@ double chi_square_of_level(const Task& task, const LeastSquares& problem, int of
       const auto [x, y] = set.pixels[static_cast<std::size_t>(i)];
       shape.setZero();
       for (const LightTerm& term : light_terms(m))
-        if (!term.of_intensity)
+        if (!term.of_intensity && !term.effect)
           shape[term.shape ? 1 + static_cast<int>(*term.shape) : 0] = term.shape_at(m.scene.view, x, y);
       const double weight = 1 / (set.sigma[i] * set.sigma[i]);
       gram += weight * shape * shape.transpose();

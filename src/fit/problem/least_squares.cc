@@ -13,34 +13,14 @@
 #include "birefit/render.h"
 #include "core/threads.h"
 #include "fit/errors/statistics.h"
+#include "fit/problem/effects.h"
+#include "fit/problem/small_systems.h"
 #include "medium/references.h"
 
 namespace birefit::estimation {
 namespace {
 
 constexpr Eigen::Index kTileRows = 4096;
-
-/// Symmetric square root rows R with R^T R = covariance^-1. Scaled to correlations first and the eigenvalues floored,
-/// so that parameters of very different size and correlations of -0.99999 keep their digits.
-Eigen::MatrixXd whitening_root(const Eigen::MatrixXd& covariance) {
-  constexpr double kFloor = 1e-13;
-  const Eigen::VectorXd inverse_sd = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse_sd.asDiagonal() * covariance *
-                                                             inverse_sd.asDiagonal());
-  const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(kFloor * eigen.eigenvalues().maxCoeff());
-  return values.cwiseSqrt().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose() * inverse_sd.asDiagonal();
-}
-
-/// Solution of a small positive semi-definite system; directions without information stay at zero.
-Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
-  constexpr double kUnseen = 1e-14;
-  const Eigen::VectorXd scale = matrix.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * matrix * scale.asDiagonal());
-  const double cut = kUnseen * std::max(eigen.eigenvalues().cwiseAbs().maxCoeff(), 1e-300);
-  const Eigen::VectorXd inverse = eigen.eigenvalues().unaryExpr([&](double v) { return v > cut ? 1 / v : 0.0; });
-  return scale.asDiagonal() * (eigen.eigenvectors() * (inverse.asDiagonal() * (eigen.eigenvectors().transpose() *
-                                                                               (scale.asDiagonal() * right))));
-}
 
 std::size_t parts_of(Eigen::Index rows) { return static_cast<std::size_t>((rows + kTileRows - 1) / kTileRows); }
 
@@ -52,17 +32,6 @@ void for_parts(Eigen::Index rows, int threads, const Body& body) {
     const Eigen::Index begin = part * kTileRows;
     body(static_cast<std::size_t>(part), begin, std::min(kTileRows, rows - begin));
   });
-}
-
-/// -2 ln of Student's t with four degrees of freedom where it is wider than the normal distribution, which it follows
-/// up to one standard deviation: its signed root, so that squares add up, and the root's derivative. A nuisance that
-/// pictures contradict is let go of; a normal prior would hold it and move all others.
-std::pair<double, double> student_root(double z) {
-  const double away = std::abs(z);
-  if (away <= 1) return {z, 1};
-  constexpr double kFreedom = 4;
-  const double root = std::sqrt(1 + (kFreedom + 1) * std::log((kFreedom + z * z) / (kFreedom + 1)));
-  return {std::copysign(root, z), (kFreedom + 1) * away / ((kFreedom + z * z) * root)};
 }
 
 int position(const std::vector<int>& indices, int index) {
@@ -124,7 +93,7 @@ void LeastSquares::set_misfit(const std::vector<Misfit>& misfit) {
     const int threads = thread_count(job_.options.threads);
     whiten(frame, value, threads);
     for (Term& term : frame.terms) {
-      if (term.of_intensity) continue;
+      if (term.of_intensity || term.effect) continue;  // with the light itself
       term.whitened = term.shape ? term.at_pixels : Eigen::VectorXd::Ones(frame.count);
       whiten(frame, term.whitened, threads);
     }
@@ -168,6 +137,7 @@ void LeastSquares::set_priors() {
     rows.push_back(Eigen::RowVectorXd::Unit(n, j) / *parameter.prior_sd);
     target.push_back(parameter.value / *parameter.prior_sd);
     student_.push_back(parameter.nuisance);
+    linear_prior_.push_back(j >= searched_size());
   }
   if (job_.prior && !job_.prior->names.empty()) {
     const JointPrior& prior = *job_.prior;
@@ -187,6 +157,7 @@ void LeastSquares::set_priors() {
       rows.push_back(row);
       target.push_back(mean);
       student_.push_back(false);
+      linear_prior_.push_back(false);
     }
   }
   prior_root_.resize(static_cast<Eigen::Index>(rows.size()), n);
@@ -248,6 +219,7 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
               [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
   frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
   frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
+  set_effects(frame, intensity);
   for (Term& term : frame.terms) {
     if (!term.of_intensity) continue;
     term.whitened.resize(frame.count);
@@ -257,6 +229,30 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
       if (term.shape) whitened.array() *= term.at_pixels.segment(begin, rows).array();
     });
     whiten(frame, term.whitened, threads);
+  }
+}
+
+/// How this light changes by the frame's effects.
+void LeastSquares::set_effects(Frame& frame, const Eigen::Ref<const Eigen::VectorXd>& intensity) const {
+  if (std::none_of(frame.terms.begin(), frame.terms.end(), [](const Term& term) { return term.effect.has_value(); }))
+    return;
+  const View& view = task_.picture(static_cast<int>(&frame - frames_.data())).scene.view;
+  KnownLight known(view.width, view.height);
+  for (Eigen::Index i = 0; i < frame.count; ++i) {
+    const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(i)];
+    known.set(x, y, intensity[i]);
+  }
+  if (view.center_x_px) known.center_x = theta_[static_cast<std::size_t>(view.center_x_px.index)];
+  if (view.center_y_px) known.center_y = theta_[static_cast<std::size_t>(view.center_y_px.index)];
+  for (Term& term : frame.terms) {
+    if (!term.effect) continue;
+    term.at_pixels.resize(frame.count);
+    for (Eigen::Index i = 0; i < frame.count; ++i) {
+      const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(i)];
+      term.at_pixels[i] = effect_at(*term.effect, known, x, y);
+    }
+    term.whitened = term.at_pixels;
+    whiten(frame, term.whitened, 1);
   }
 }
 
@@ -314,7 +310,7 @@ Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity, Eigen
   for (const Term& term : frame.terms) {
     if (term.of_intensity != of_intensity) continue;
     const double coefficient = term.coefficient_in(theta_);
-    if (term.shape)
+    if (term.shape || term.effect)
       sum += coefficient * term.at_pixels.segment(begin, rows);
     else
       sum.array() += coefficient;
@@ -395,8 +391,9 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
           },
           gram, cross);
     if (prior_root_.rows() > 0) {
-      gram += prior_root_.rightCols(l).transpose() * prior_root_.rightCols(l);
-      cross += prior_root_.rightCols(l).transpose() * prior_root_.leftCols(p);
+      const Eigen::MatrixXd rows = prior_slope_.asDiagonal() * prior_root_;
+      gram += rows.rightCols(l).transpose() * rows.rightCols(l);
+      cross += rows.rightCols(l).transpose() * rows.leftCols(p);
     }
     const Eigen::MatrixXd solved = solve_semidefinite(gram(moving, moving), cross(moving, Eigen::all));
     for (std::size_t j = 0; j < moving.size(); ++j)
@@ -423,38 +420,31 @@ void LeastSquares::solve_linear() {
         },
         gram, cross);
   }
-  Eigen::VectorXd right = cross.col(0);
-  Eigen::VectorXd searched(p);
+  Eigen::VectorXd searched(p), lower(l), upper(l);
   for (int j = 0; j < p; ++j) searched[j] = theta_[unknowns_.searched[j]];
-  if (prior_root_.rows() > 0 && l > 0) {
-    gram += prior_root_.rightCols(l).transpose() * prior_root_.rightCols(l);
-    right += prior_root_.rightCols(l).transpose() * (prior_target_ - prior_root_.leftCols(p) * searched);
+  for (int j = 0; j < l; ++j) {
+    const Parameter& parameter = job_.parameters[unknowns_.linear[j]];
+    lower[j] = parameter.lower, upper[j] = parameter.upper;
   }
-  // Bounds by an active set: what leaves its bounds furthest is held there and the rest solved again.
-  std::vector<int> moving(l);
-  for (int j = 0; j < l; ++j) moving[j] = j;
-  Eigen::VectorXd linear = Eigen::VectorXd::Zero(l);
-  while (!moving.empty()) {
-    std::vector<int> held;
-    for (int j = 0; j < l; ++j)
-      if (std::find(moving.begin(), moving.end(), j) == moving.end()) held.push_back(j);
-    Eigen::VectorXd target = right(moving);
-    if (!held.empty()) target -= gram(moving, held) * linear(held);
-    const Eigen::VectorXd solved = solve_semidefinite(gram(moving, moving), target);
-    int worst = -1;
-    double worst_excess = 0;
-    for (std::size_t j = 0; j < moving.size(); ++j) {
-      const Parameter& parameter = job_.parameters[unknowns_.linear[moving[j]]];
-      const double value = solved[static_cast<Eigen::Index>(j)];
-      linear[moving[j]] = value;
-      const double excess = std::max(parameter.lower - value, value - parameter.upper) *
-                            std::sqrt(std::max(gram(moving[j], moving[j]), 1e-300));
-      if (excess > worst_excess) worst = static_cast<int>(j), worst_excess = excess;
+  const Eigen::Index priors = prior_root_.rows();
+  const Eigen::VectorXd apart =
+      priors > 0 ? Eigen::VectorXd(prior_target_ - prior_root_.leftCols(p) * searched) : Eigen::VectorXd();
+  // Student's tails make a weight of each prior, which follows the solution.
+  constexpr int kTimes = 8;
+  Eigen::VectorXd linear = Eigen::VectorXd::Zero(l), weight = Eigen::VectorXd::Ones(priors);
+  for (int time = 0; time < kTimes; ++time) {
+    if (priors > 0 && l > 0) {
+      const Eigen::MatrixXd rows = weight.asDiagonal() * prior_root_.rightCols(l);
+      linear = solve_within_bounds(gram + prior_root_.rightCols(l).transpose() * rows,
+                                   cross.col(0) + rows.transpose() * apart, lower, upper);
+    } else {
+      linear = solve_within_bounds(gram, cross.col(0), lower, upper);
     }
-    if (worst < 0) break;
-    const Parameter& parameter = job_.parameters[unknowns_.linear[moving[worst]]];
-    linear[moving[worst]] = std::clamp(linear[moving[worst]], parameter.lower, parameter.upper);
-    moving.erase(moving.begin() + worst);
+    const Eigen::VectorXd before = weight;
+    for (Eigen::Index i = 0; i < priors; ++i)
+      if (student_[static_cast<std::size_t>(i)] && linear_prior_[static_cast<std::size_t>(i)])
+        weight[i] = student_weight(prior_root_.row(i).rightCols(l).dot(linear) - apart[i]);
+    if (priors == 0 || (weight - before).cwiseAbs().maxCoeff() <= 1e-3) break;
   }
   for (int j = 0; j < l; ++j) theta_[unknowns_.linear[j]] = linear[j];
 

@@ -122,7 +122,7 @@ class LeastSquares {
  private:
   struct Term : LightTerm {
     int unknown = -1;           ///< index among the linear unknowns, -1 = known
-    Eigen::VectorXd at_pixels;  ///< the shape; empty where it is 1
+    Eigen::VectorXd at_pixels;  ///< the shape, or what the effect does; empty where it is 1
     Eigen::VectorXd whitened;   ///< what the coefficient stands before
   };
   struct Frame {
@@ -148,6 +148,7 @@ class LeastSquares {
   void add_products(const Frame& frame, int threads, const Columns& columns, Eigen::MatrixXd& gram,
                     Eigen::MatrixXd& cross) const;
   void set_priors();
+  void set_effects(Frame& frame, const Eigen::Ref<const Eigen::VectorXd>& intensity) const;
   void solve_linear();
   /// Some thousand rows of one micrograph, or the priors'.
   struct Tile {
@@ -166,10 +167,11 @@ class LeastSquares {
   std::vector<Misfit> misfit_;
   std::vector<Tile> tiles_;
   Eigen::Index pixel_rows_ = 0;
-  Eigen::MatrixXd prior_root_;    ///< whitening of all unknowns' deviation from the prior means
-  Eigen::VectorXd prior_target_;  ///< prior_root_ * means
-  std::vector<bool> student_;     ///< of each of those rows: with the tails of Student's t
-  Eigen::VectorXd prior_slope_;   ///< d(residual of the row)/d(its deviation), at the last evaluated point; else 1
+  Eigen::MatrixXd prior_root_;      ///< whitening of all unknowns' deviation from the prior means
+  Eigen::VectorXd prior_target_;    ///< prior_root_ * means
+  std::vector<bool> student_;       ///< of each of those rows: with the tails of Student's t
+  std::vector<bool> linear_prior_;  ///< and about a linear unknown
+  Eigen::VectorXd prior_slope_;     ///< d(residual of the row)/d(its deviation), at the last evaluated point; else 1
 
   Theta theta_;
   Eigen::VectorXd intensity_;  ///< raw

@@ -29,6 +29,7 @@ struct Optimum {
   std::optional<Eigen::VectorXd> better;  ///< a lower place that was met after all
   std::vector<Outliers> left_out;         ///< of each micrograph
   MisfitFound misfit;
+  std::optional<Theta> came_from;  ///< the optimum without the catalogue of departures, where that was asked
 
   double per_pixel = 1;  ///< objective of the last solution over its pixels
   bool converged = false;

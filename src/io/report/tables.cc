@@ -193,6 +193,21 @@ std::string stated_table(const FitResult& result) {
          rows + "</table></div>\n";
 }
 
+std::string departures_table(const FitResult& result) {
+  std::string rows;
+  for (const Departure& d : result.departures)
+    rows += fmt::format("<tr><td class=\"name\">{}</td><td>{} \u00b1 {} {}</td><td>{}</td></tr>\n", escape_html(d.name),
+                        html_number(fmt::format("{:.2g}", d.value)), html_number(fmt::format("{:.2g}", d.stderr_)),
+                        escape_html(d.unit), html_number(fmt::format("{:.2g}", d.expected)));
+  if (rows.empty()) return {};
+  return "<h2>How the picture departs from the model</h2>\n<p>Noise did not explain what the model left over: what "
+         "pictures usually depart by was fitted along, all at once, in units of the gain. None of it is proven; the "
+         "last "
+         "column is its usual size.</p>\n<div class=\"scroll\"><table>\n<tr><th>departure</th><th>found</th>"
+         "<th>usual</th></tr>\n" +
+         rows + "</table></div>\n";
+}
+
 std::string coverage_table(const FitResult& result) {
   if (!result.coverage) return {};
   const Coverage& c = *result.coverage;

@@ -17,6 +17,7 @@ std::string branch_table(const FitResult& result);
 /// What the fit took as exact, and what that does to the estimates.
 std::string input_table(const FitResult& result);
 std::string stated_table(const FitResult& result);
+std::string departures_table(const FitResult& result);
 std::string coverage_table(const FitResult& result);
 std::string identifiability(const Config& config, const FitResult& result);
 std::string model_section(const Config& config, const FitResult& result);

@@ -1,0 +1,26 @@
+#pragma once
+// What pictures are known to depart from models by, fitted all at once where something is left over.
+
+#include "fit/errors/stated.h"
+#include "fit/search/optimum.h"
+
+namespace birefit::estimation {
+
+/// Whether noise does not explain what a fit of one picture of a sphere leaves over, so that the catalogue is asked.
+bool asks_catalogue(const Task& task, const Optimum& optimum);
+
+/// The job with a nuisance for each: light and background that are uneven, the blur of lenses and resampling, a camera
+/// that is not linear, pixels out of square, each with a prior of the size that such departures have (docs/methods.md,
+/// "Nearly the model"); and what is stated and not known exactly, as far as the pictures tell it. No single one is
+/// selected: an explanation that fits makes an interval narrow, right or wrong.
+FitJob with_catalogue(const Task& task, const Optimum& optimum);
+
+/// What of the catalogue's terms leaves no trace: where pixels are out of square, which of their sides is the one that
+/// is stated, so that the size is uncertain by as much. A standard deviation of every unknown, with its sign; empty
+/// where there is none. `covariance` by the problem's weights.
+Eigen::VectorXd shift_by_aspect(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);
+
+/// What the catalogue's terms came out as; `task` is of a job with_catalogue.
+std::vector<Departure> departures_of(const Task& task, const FitResult& result);
+
+}  // namespace birefit::estimation

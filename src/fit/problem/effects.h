@@ -1,0 +1,27 @@
+#pragma once
+// What lenses, cameras and resampling do to the model's light, to first order.
+
+#include <algorithm>
+
+#include "birefit/measurement.h"
+
+namespace birefit::estimation {
+
+/// The light of a picture where it is known, and what effects refer to.
+struct KnownLight {
+  Image light;
+  Mask known;
+  double brightest = 0;
+  double center_x = 0, center_y = 0;  ///< of the sample, px
+
+  KnownLight(int width, int height) : light(width, height), known(width, height) {}
+  void set(int x, int y, double value) {
+    light(x, y) = value, known(x, y) = 1;
+    brightest = std::max(brightest, value);
+  }
+};
+
+/// d(light of a pixel)/d(effect); 0 where it takes a neighbour that is not known.
+double effect_at(PictureEffect::Kind kind, const KnownLight& picture, int x, int y);
+
+}  // namespace birefit::estimation
