@@ -9,11 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
-
 #include "core/robust.h"
 #include "core/sub_grid.h"
+#include "io/libraries/table.h"
 
 namespace birefit {
 namespace {
@@ -133,14 +131,14 @@ int exclude_outliers(const Image& values, const PixelRect& area, double smallest
   const double fill = robust_spread(values, mask, area).median;
   if (!std::isfinite(fill)) return 0;
   // Differences to the overall median keep single precision exact enough for faint structure on a bright background.
-  cv::Mat counts(height, width, CV_32F), smooth;
+  Grid<float> counts(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const double value = values(frame.x0 + x, frame.y0 + y);
-      counts.at<float>(y, x) = std::isfinite(value) ? static_cast<float>(value - fill) : 0.0f;
+      counts(x, y) = std::isfinite(value) ? static_cast<float>(value - fill) : 0.0f;
     }
   }
-  cv::medianBlur(counts, smooth, 5);
+  const Grid<float> smooth = median_of_neighbours(counts);
 
   struct Pixel {
     float level, difference;
@@ -150,8 +148,8 @@ int exclude_outliers(const Image& values, const PixelRect& area, double smallest
   for (int y = area.y0; y < area.y1; ++y) {
     for (int x = area.x0; x < area.x1; ++x) {
       if (!mask(x, y)) continue;
-      const float level = smooth.at<float>(y - frame.y0, x - frame.x0);
-      pixels.push_back({level, counts.at<float>(y - frame.y0, x - frame.x0) - level, x, y});
+      const float level = smooth(x - frame.x0, y - frame.y0);
+      pixels.push_back({level, counts(x - frame.x0, y - frame.y0) - level, x, y});
     }
   }
   // Noise grows with brightness: the scatter is measured in groups of equal brightness.
@@ -180,14 +178,14 @@ int exclude_outliers(const Image& values, const PixelRect& area, double smallest
           for (int dx = -2; dx <= 2; ++dx) {
             if (dx == 0 && dy == 0) continue;
             const int yy = std::clamp(y + dy, 0, height - 1), xx = std::clamp(x + dx, 0, width - 1);
-            const float value = counts.at<float>(yy, xx);
+            const float value = counts(xx, yy);
             wide[w++] = value;
             if (std::abs(dx) <= 1 && std::abs(dy) <= 1) near[n++] = value;
           }
         }
         std::sort(near.begin(), near.end());
         std::sort(wide.begin(), wide.end());
-        const float value = counts.at<float>(y, x);
+        const float value = counts(x, y);
         const double beyond = pixel.difference > 0 ? value - near[6] : near[1] - value;
         if (!(beyond > std::max(0.5 * kOutlierSd * sd, 0.5 * (wide[22] - wide[1])))) continue;
       }

@@ -156,6 +156,8 @@ void write_files(const std::vector<FileContent>& files, const std::vector<fs::pa
 
 void write_file(const std::filesystem::path& path, const std::string& content) { write_files({{path, content}}); }
 
+void save_image(const Image& image, const std::filesystem::path& path) { write_file(path, encode_image(image, path)); }
+
 void end_by_signal(int signal) {
   g_ending = signal;
   if (g_writing == 0) die(signal);

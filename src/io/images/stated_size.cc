@@ -56,7 +56,7 @@ std::string imagej_value(const std::string& description, const std::string& key)
   return description.substr(at + start.size(), end == std::string::npos ? end : end - at - start.size());
 }
 
-double stated_pixel_size_um(const OIIO::ImageSpec& spec, const std::string& description,
+double stated_pixel_size_um(const StatedResolution& tags, const std::string& description,
                             std::vector<std::string>& notes, std::array<double, 2>& uneven_um) {
   const auto accept = [&](double x, double y, const std::string& source) -> double {
     if (y > 0 && std::abs(y / x - 1) > 0.01) {
@@ -90,15 +90,13 @@ double stated_pixel_size_um(const OIIO::ImageSpec& spec, const std::string& desc
     if (x > 0) return accept(x, y, "the file's OME metadata");
   }
 
-  const double x_resolution = spec.get_float_attribute("XResolution", 0);
-  const double y_resolution = spec.get_float_attribute("YResolution", 0);
-  const double x = x_resolution > 0 ? 1.0 / x_resolution : 0;
-  const double y = y_resolution > 0 ? 1.0 / y_resolution : 0;
+  const double x = tags.x > 0 ? 1.0 / tags.x : 0;
+  const double y = tags.y > 0 ? 1.0 / tags.y : 0;
   if (!(x > 0) || !std::isfinite(x)) return 0;
   if (const double um = micrometres_in(imagej_value(description, "unit")); um > 0)
     return accept(x * um, y * um, "the file's ImageJ metadata");
 
-  const double um = micrometres_in(spec.get_string_attribute("ResolutionUnit", ""));
+  const double um = micrometres_in(tags.unit);
   if (um > 0 && x * um < kLargestCrediblePixelUm) return accept(x * um, y * um, "the file's resolution tag");
   return 0;
 }

@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include <OpenImageIO/imageio.h>
-
 namespace birefit {
 
 /// A positive number, else 0.
@@ -15,9 +13,15 @@ double number_or_zero(const std::string& text);
 /// The value of `key=` on a line of its own in an ImageJ description.
 std::string imagej_value(const std::string& description, const std::string& key);
 
+/// What a file's tags say of its pixels: how many go into a unit of length along x and y; 0 = not stated.
+struct StatedResolution {
+  double x = 0, y = 0;
+  std::string unit;
+};
+
 /// Micrometres per pixel, 0 when the file does not state it credibly; says in `notes` where it comes from. Sizes along
 /// x and y that differ go to `uneven_um`.
-double stated_pixel_size_um(const OIIO::ImageSpec& spec, const std::string& description,
+double stated_pixel_size_um(const StatedResolution& tags, const std::string& description,
                             std::vector<std::string>& notes, std::array<double, 2>& uneven_um);
 
 }  // namespace birefit

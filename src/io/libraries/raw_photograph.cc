@@ -1,4 +1,4 @@
-#include "io/images/raw_photograph.h"
+#include "io/libraries/raw_photograph.h"
 
 #include <algorithm>
 #include <cstdint>

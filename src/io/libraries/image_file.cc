@@ -20,10 +20,10 @@
 #include "io/file.h"
 #include "io/images/npy_image.h"
 #include "io/images/pages.h"
-#include "io/images/raw_photograph.h"
 #include "io/images/signature.h"
 #include "io/images/stated_size.h"
 #include "io/images/tiff_tags.h"
+#include "io/libraries/raw_photograph.h"
 
 namespace birefit {
 namespace {
@@ -387,7 +387,10 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     if (!request.page) refuse(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
     loaded.notes.push_back("it " + found + ": the first is used");
   }
-  loaded.pixel_size_um = stated_pixel_size_um(spec, description, loaded.notes, loaded.uneven_pixel_um);
+  const StatedResolution resolution{spec.get_float_attribute("XResolution", 0),
+                                    spec.get_float_attribute("YResolution", 0),
+                                    spec.get_string_attribute("ResolutionUnit", "")};
+  loaded.pixel_size_um = stated_pixel_size_um(resolution, description, loaded.notes, loaded.uneven_pixel_um);
   return loaded;
 }
 
@@ -511,8 +514,6 @@ LoadedImage load_image(const ImageRequest& request) {
     refuse(request, "does not fit into memory", "crop it to the object, or bin it");
   }
 }
-
-void save_image(const Image& image, const fs::path& path) { write_file(path, encode_image(image, path)); }
 
 std::vector<unsigned char> encode_png(const std::vector<unsigned char>& samples, int width, int height, int channels) {
   if (samples.size() != static_cast<std::size_t>(width) * height * channels || (channels != 1 && channels != 3))

@@ -1,0 +1,30 @@
+#pragma once
+// All that needs OpenImageIO and OpenCV. They bring 240 shared libraries, which take longer to load than many a fit
+// takes, so the program opens them with the first image (src/app/image_libraries.cc): this folder is then a library of
+// its own, known by the table below. The library birefit::io has the same functions linked in.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "birefit/io.h"
+#include "io/file.h"
+
+namespace birefit {
+
+/// Median of the 5 x 5 neighbours of every pixel; beyond an edge its pixels go on.
+Grid<float> median_of_neighbours(const Grid<float>& values);
+
+struct ImageLibraries {
+  const char* version = BIREFIT_VERSION;  ///< of birefit; the rest is known only where it is the program's
+  decltype(&birefit::load_image) load_image = &birefit::load_image;
+  decltype(&birefit::encode_image) encode_image = &birefit::encode_image;
+  decltype(&birefit::encode_png) encode_png = &birefit::encode_png;
+  decltype(&birefit::find_disc) find_disc = &birefit::find_disc;
+  decltype(&birefit::median_of_neighbours) median_of_neighbours = &birefit::median_of_neighbours;
+};
+
+}  // namespace birefit
+
+/// The table of the library that the program opens.
+extern "C" const birefit::ImageLibraries* birefit_image_libraries();
