@@ -44,14 +44,25 @@ struct Parameter {
   Where where;  ///< where the config gives it
 };
 
+using Theta = std::vector<double>;
+
 /// Index into a ParameterTable. Default-constructed = "not given" (the scene part documents what that means).
 struct ParameterRef {
   int index = -1;
-  explicit operator bool() const { return index >= 0; }
-  friend bool operator==(ParameterRef a, ParameterRef b) { return a.index == b.index; }
-};
+  /// The scene has times * parameter + plus: places are stated in the pixels of a file, of which a picture may have a
+  /// part, or means of several.
+  double times = 1, plus = 0;
 
-using Theta = std::vector<double>;
+  explicit operator bool() const { return index >= 0; }
+  /// The same parameter, whatever the scene makes of it.
+  friend bool operator==(ParameterRef a, ParameterRef b) { return a.index == b.index; }
+  /// What the scene has.
+  double in(const Theta& theta) const { return times * theta.at(static_cast<std::size_t>(index)) + plus; }
+  /// The parameter of which the scene has this.
+  double stated(double in_scene) const { return (in_scene - plus) / times; }
+  /// A scene that has `by` times what this one has, and `more`.
+  ParameterRef seen(double by, double more) const { return {index, by * times, by * plus + more}; }
+};
 
 class ParameterTable {
  public:

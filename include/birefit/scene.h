@@ -29,14 +29,27 @@ struct SideCamera {
   }
 };
 
+/// Which pixels of a file a view's are: `bin` x `bin` of them each, from (x0, y0) on.
+struct FilePixels {
+  int x0 = 0, y0 = 0, bin = 1;
+  int width = 0, height = 0;  ///< of the file's image; 0: as large as the view
+};
+
 /// How pixels lie on the sample.
 struct View {
   int width = 0, height = 0;
+  FilePixels file;
   ParameterRef pixel_size_um;  ///< on the sample; none for conoscopic plates, cells and crystals, which need none
   ParameterRef center_x_px;    ///< sample centre; pixel centres are integers, (0, 0) the top left pixel's
   ParameterRef center_y_px;
   ParameterRef rotation_deg;         ///< of the sample, counter-clockwise as seen in the image
   std::optional<SideCamera> camera;  ///< of plates and slabs in a cone; none: it looks along the cone's axis
+
+  /// Of the file's whole image, in the view's pixels: its sides, the place of its middle.
+  double whole_width() const { return file.width > 0 ? static_cast<double>(file.width) / file.bin : width; }
+  double whole_height() const { return file.height > 0 ? static_cast<double>(file.height) / file.bin : height; }
+  double middle_x() const { return 0.5 * (whole_width() - 1) - static_cast<double>(file.x0) / file.bin; }
+  double middle_y() const { return 0.5 * (whole_height() - 1) - static_cast<double>(file.y0) / file.bin; }
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {

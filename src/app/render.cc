@@ -44,7 +44,7 @@ int run_render(const Arguments& arguments) {
     const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
     Rendering rendering = render(config.scene, chosen, theta, {}, arguments.threads);
     const ParameterRef size = config.scene.view.pixel_size_um;
-    const double pixel_size_um = size ? theta[static_cast<std::size_t>(size.index)] : 0;
+    const double pixel_size_um = size ? size.in(theta) : 0;
     write_file(arguments.out, encode_image(rendering.intensity, arguments.out, pixel_size_um));
     return std::pair(chosen, std::move(rendering));
   });

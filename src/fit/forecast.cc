@@ -18,29 +18,18 @@ using Clock = std::chrono::steady_clock;
 
 double pixels_of(const View& view) { return static_cast<double>(view.width) * view.height; }
 
-/// A scene with numbers of its own behind those of the table.
-struct Coarse {
-  Scene scene;
-  Theta theta;
-
-  void replace(ParameterRef& ref, double value) {
-    theta.push_back(value);
-    ref.index = static_cast<int>(theta.size()) - 1;
-  }
-  double value(ParameterRef ref) const { return theta[static_cast<std::size_t>(ref.index)]; }
-};
-
 /// The same scene in pixels k times as large, the last ones cut off.
-Coarse coarser(const Scene& scene, const Theta& theta, int k) {
-  Coarse coarse{scene, theta};
-  if (k == 1) return coarse;
-  View& view = coarse.scene.view;
+Scene coarser(Scene scene, int k) {
+  View& view = scene.view;
+  FilePixels& file = view.file;
+  if (file.width == 0) file.width = view.width, file.height = view.height;
+  file.bin *= k;
   view.width = std::max(1, view.width / k), view.height = std::max(1, view.height / k);
-  for_each_number(coarse.scene, [&](ParameterRef& place, const NumberSpec& spec) {
-    if (place && spec.unit == "px") coarse.replace(place, (coarse.value(place) - 0.5 * (k - 1)) / k);
+  for_each_number(scene, [&](ParameterRef& place, const NumberSpec& spec) {
+    if (spec.unit == "px") place = place.seen(1.0 / k, -0.5 * (k - 1) / k);
   });
-  if (view.pixel_size_um) coarse.replace(view.pixel_size_um, k * coarse.value(view.pixel_size_um));
-  return coarse;
+  view.pixel_size_um = view.pixel_size_um.seen(k, 0);
+  return scene;
 }
 
 /// Seconds of a picture on one thread: what all of it shares, and what each of its pixels adds.
@@ -59,12 +48,11 @@ Cost measure(const Scene& scene, const Demand& demand, const Theta& theta, const
   double before_seconds = 0, before_pixels = 0;
   Rendering image;
   for (int k = std::max(1, side / kSmallest);; k = std::max(1, k / 2)) {
-    const Coarse small = coarser(scene, theta, k);
-    const RenderPlan chosen = plan(small.scene, demand, small.theta, observable);
+    const Scene small = coarser(scene, k);
+    const RenderPlan chosen = plan(small, demand, theta, observable);
     const auto begin = Clock::now();
-    render(small.scene, chosen, small.theta, active, 1, image);
-    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count(),
-                 pixels = pixels_of(small.scene.view);
+    render(small, chosen, theta, active, 1, image);
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count(), pixels = pixels_of(small.view);
     const bool grown = before_pixels > 0 && pixels > before_pixels;
     cost.a_pixel = grown ? std::max(0.0, (seconds - before_seconds) / (pixels - before_pixels)) : seconds / pixels;
     cost.shared = std::max(0.0, seconds - cost.a_pixel * pixels);

@@ -21,10 +21,10 @@ class Values {
   Values(const Theta& theta, std::vector<int> active, Memo* memo = nullptr)
       : theta_(theta), active_(std::move(active)), memo_(memo) {}
   S operator()(ParameterRef ref) const {
-    S value(theta_.at(static_cast<std::size_t>(ref.index)));
+    S value(ref.in(theta_));
     if constexpr (ScalarTraits<S>::derivatives > 0) {
       for (std::size_t j = 0; j < active_.size(); ++j)
-        if (active_[j] == ref.index) value.d[j] = PlainOf<S>(1.0);
+        if (active_[j] == ref.index) value.d[j] = PlainOf<S>(ref.times);
     }
     return value;
   }

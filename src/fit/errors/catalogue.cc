@@ -80,8 +80,7 @@ Eigen::VectorXd shift_by_aspect(const Task& task, const Optimum& optimum, const 
   const PixelSet& set = optimum.problem->pixels(0);
   const View& view = picture.scene.view;
   KnownLight known(view.width, view.height);
-  known.center_x = optimum.theta[static_cast<std::size_t>(view.center_x_px.index)];
-  known.center_y = optimum.theta[static_cast<std::size_t>(view.center_y_px.index)];
+  known.center_x = view.center_x_px.in(optimum.theta), known.center_y = view.center_y_px.in(optimum.theta);
   const Eigen::VectorXd& light = optimum.problem->intensity();
   for (std::size_t i = 0; i < set.pixels.size(); ++i)
     known.set(set.pixels[i][0], set.pixels[i][1], light[static_cast<Eigen::Index>(i)]);

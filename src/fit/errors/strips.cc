@@ -50,7 +50,12 @@ std::optional<Strip> fitted_strip(const Task& task, const Optimum& optimum, bool
     sets.push_back(pixel_set(task.picture(g), frame.sigma, std::move(part)));
     plans.push_back(frame.plan);
   }
-  strip.roi_px = rows ? std::array{low, begin, high, end} : std::array{begin, low, end, high};
+  // Stated as the config states a region: in pixels of the file.
+  const FilePixels& file = task.picture(0).scene.view.file;
+  const auto column = [&](int x) { return file.x0 + file.bin * x; };
+  const auto row = [&](int y) { return file.y0 + file.bin * y; };
+  strip.roi_px = rows ? std::array{column(low), row(begin), column(high), row(end)}
+                      : std::array{column(begin), row(low), column(end), row(high)};
   LeastSquares problem(task, std::move(plans), std::move(sets));
   SolveOptions few;
   few.max_iterations = 5;  // next to linear

@@ -242,8 +242,8 @@ void LeastSquares::set_effects(Frame& frame, const Eigen::Ref<const Eigen::Vecto
     const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(i)];
     known.set(x, y, intensity[i]);
   }
-  if (view.center_x_px) known.center_x = theta_[static_cast<std::size_t>(view.center_x_px.index)];
-  if (view.center_y_px) known.center_y = theta_[static_cast<std::size_t>(view.center_y_px.index)];
+  if (view.center_x_px) known.center_x = view.center_x_px.in(theta_);
+  if (view.center_y_px) known.center_y = view.center_y_px.in(theta_);
   for (Term& term : frame.terms) {
     if (!term.effect) continue;
     term.at_pixels.resize(frame.count);

@@ -5,14 +5,14 @@
 namespace birefit::estimation {
 namespace {
 
-double centre_in(const Theta& theta, ParameterRef ref) { return ref ? theta[static_cast<std::size_t>(ref.index)] : 0; }
+double centre_in(const Theta& theta, ParameterRef ref) { return ref ? ref.in(theta) : 0; }
 
 }  // namespace
 
 double LightTerm::shape_at(const View& view, int column, int row) const {
   if (!shape) return 1;
-  const double half = 0.5 * std::max(view.width, view.height);
-  const double x = (column - 0.5 * (view.width - 1)) / half, y = (0.5 * (view.height - 1) - row) / half;
+  const double half = 0.5 * std::max(view.whole_width(), view.whole_height());
+  const double x = (column - view.middle_x()) / half, y = (view.middle_y() - row) / half;
   switch (*shape) {
     case UnevenLight::Shape::x:
       return x;

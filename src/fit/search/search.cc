@@ -32,14 +32,16 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
     at = here;
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const Parameter& parameter = task.searched(static_cast<std::size_t>(here[axis]));
-      if (!((*centre)[axis] > parameter.lower && (*centre)[axis] < parameter.upper)) return std::nullopt;
-      centred[here[axis]] = (*centre)[axis];
+      const double place = (axis == 0 ? view.center_x_px : view.center_y_px).stated((*centre)[axis]);
+      if (!(place > parameter.lower && place < parameter.upper)) return std::nullopt;
+      centred[here[axis]] = place;
     }
   }
   if (at[0] < 0) return std::nullopt;
   // What is found is good to a hundredth of an image: a start as near as that is no worse.
   const View& view = task.picture(0).scene.view;
-  if ((centred - start.searched).cwiseAbs().maxCoeff() < 0.01 * std::max(view.width, view.height)) return std::nullopt;
+  const double image = view.file.bin * std::max(view.width, view.height);
+  if ((centred - start.searched).cwiseAbs().maxCoeff() < 0.01 * image) return std::nullopt;
   return centred;
 }
 

@@ -64,7 +64,7 @@ struct Profile {
 
 std::optional<double> theta_of(const FitResult& result, ParameterRef ref) {
   if (!ref || ref.index >= std::ssize(result.theta)) return std::nullopt;
-  const double value = result.theta[ref.index];
+  const double value = ref.in(result.theta);
   return std::isfinite(value) ? std::optional<double>(value) : std::nullopt;
 }
 
@@ -74,6 +74,8 @@ Profile mean_profile(const Frame& frame, bool along_y) {
   profile.mean = true;
   const int width = frame.measured.width(), height = frame.measured.height();
   const int length = along_y ? height : width, across = along_y ? width : height;
+  const FilePixels& file = frame.scene->view.file;
+  const double bin = file.bin, first = along_y ? file.y0 : file.x0;
   profile.x_label = along_y ? "row (px)" : "column (px)";
   profile.words = along_y ? "mean over the columns of every row, along the field"
                           : "mean over the rows of every column, along the field";
@@ -86,7 +88,7 @@ Profile mean_profile(const Frame& frame, bool along_y) {
       measured += frame.measured(x, y), fitted += frame.result->fitted(x, y), residual += frame.normalised(x, y);
       ++count;
     }
-    profile.position.push_back(i);
+    profile.position.push_back(first + bin * (i + 0.5) - 0.5);
     profile.measured.push_back(count ? measured / count : kMissing);
     profile.fitted.push_back(count ? fitted / count : kMissing);
     profile.residual.push_back(count ? residual / count : kMissing);
@@ -225,8 +227,11 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
       "{}{}.</figcaption>\n",
       figure++, limit > 3 ? fmt::format(" (scale \u00b1{})", plain(limit)) : "",
       hatched ? " Hatched: pixels left out of the fit." : "", frame.measured.width(), frame.measured.height(),
-      factor > 1 ? fmt::format(", {0} \u00d7 {0} averaged for display", factor) : "", plain(frame.result->residual_rms),
-      frame.unit,
+      (frame.scene && frame.scene->view.file.bin > 1
+           ? fmt::format(" of {0} \u00d7 {0} of the file each", frame.scene->view.file.bin)
+           : "") +
+          (factor > 1 ? fmt::format(", {0} \u00d7 {0} averaged for display", factor) : ""),
+      plain(frame.result->residual_rms), frame.unit,
       frame.result->signal_range > 0
           ? fmt::format(" ({} of the signal range)",
                         format_percent(frame.result->residual_rms / frame.result->signal_range))

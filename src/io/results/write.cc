@@ -58,8 +58,8 @@ void write_results(const fs::path& folder, const Config& config, const FitResult
     const Picture* measured = picture_at(config.job.measurements, i);
     const ParameterRef size = measured ? measured->scene.view.pixel_size_um : ParameterRef{};
     const double pixel_size_um = !size                                   ? 0
-                                 : size.index < std::ssize(result.theta) ? result.theta[size.index]
-                                                                         : config.job.parameters[size].value;
+                                 : size.index < std::ssize(result.theta) ? size.in(result.theta)
+                                                                         : size.in(config.job.parameters.values());
     const auto add = [&](const std::string& name, const Image& image) {
       if (image.empty()) return;
       for (const std::string& format : picture_formats) {

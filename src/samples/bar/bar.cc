@@ -18,9 +18,10 @@ class BarImage final : public SampleImage<S> {
     const S across = value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0);
     phase_ = std::numbers::pi * across / value(crystal.half_wave_voltage_v);
     for (ParameterRef ref : crystal.field_legendre) legendre_.push_back(value(ref));
-    const int size = along_y_ ? scene.view.height : scene.view.width;
-    low_ = value.get(crystal.electrode_low_px, -0.5);
-    high_ = value.get(crystal.electrode_high_px, size - 0.5);
+    const double middle = along_y_ ? scene.view.middle_y() : scene.view.middle_x(),
+                 size = along_y_ ? scene.view.whole_height() : scene.view.whole_width();
+    low_ = value.get(crystal.electrode_low_px, middle - 0.5 * size);
+    high_ = value.get(crystal.electrode_high_px, middle + 0.5 * size);
     // A retarder cos(delta/2) + i sin(delta/2) sz in the frame of the induced axis. Between linear states this is Born
     // & Wolf 15.4.2, I = cos^2(A - P) - sin 2(A - f) sin 2(P - f) sin^2(delta/2), f the induced axis.
     const Line<S> light = maker.in(value).line;

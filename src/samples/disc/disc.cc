@@ -33,9 +33,7 @@ DiscMargins disc_margins(const StressedDisc& disc, double radius_um) {
 
 DiscZone::DiscZone(const Scene& scene, const Theta& theta) {
   const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
-  const auto value = [&](ParameterRef ref, double otherwise = 0) {
-    return ref ? theta[static_cast<std::size_t>(ref.index)] : otherwise;
-  };
+  const auto value = [&](ParameterRef ref, double otherwise = 0) { return ref ? ref.in(theta) : otherwise; };
   lengths_ = {disc.diameter_um, scene.view.pixel_size_um, scene.view.center_x_px, scene.view.center_y_px};
   azimuths_ = {disc.load_azimuth_deg, scene.view.rotation_deg};
   const double radius_um = 0.5 * value(disc.diameter_um);

@@ -38,9 +38,9 @@ class ConeView {
   /// Only of scenes with a cone_half_angle().
   ConeView(const Scene& scene, const Values<S>& value) {
     const S half = value.radians(*cone_half_angle(scene), 15), edge = sin(half) / cos(half);
-    tan_per_px = edge * (2.0 / std::min(scene.view.width, scene.view.height));
-    center_x = value.get(scene.view.center_x_px, 0.5 * (scene.view.width - 1));
-    center_y = value.get(scene.view.center_y_px, 0.5 * (scene.view.height - 1));
+    tan_per_px = edge * (2.0 / std::min(scene.view.whole_width(), scene.view.whole_height()));
+    center_x = value.get(scene.view.center_x_px, scene.view.middle_x());
+    center_y = value.get(scene.view.center_y_px, scene.view.middle_y());
     if (!scene.view.camera) return;
     const auto tangent = [&](ParameterRef ref) {
       const S angle = value.radians(ref);

@@ -35,8 +35,8 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
   } else if (half_angle) {
     const double edge = std::tan(value.radians(*half_angle, 15));
     // Pixels beyond the inscribed circle, up to the corners of the image.
-    const double corner =
-        std::hypot(scene.view.width, scene.view.height) / std::min(scene.view.width, scene.view.height);
+    const double corner = std::hypot(scene.view.whole_width(), scene.view.whole_height()) /
+                          std::min(scene.view.whole_width(), scene.view.whole_height());
     t.push_back({0.0, 0.0});
     for (int i = 0; i < 6; ++i)
       for (double f : {0.5, corner})

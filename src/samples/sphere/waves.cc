@@ -68,7 +68,7 @@ WaveObject sphere_object(const Scene& scene, const Values<double>& value) {
 /// Of the same indices, its axis radial; a shell's core in the middle.
 std::optional<RadialTwin> sphere_twin(const Scene& scene, const Theta& theta, double scale) {
   RadialTwin twin{{scene}, theta, 0};
-  const auto number = [&](ParameterRef ref) { return theta.at(static_cast<std::size_t>(ref.index)); };
+  const auto number = [&](ParameterRef ref) { return ref.in(theta); };
   Droplet& droplet = std::get<Droplet>(twin.scenes.front().sample);
   twin.diameter_um = scale * number(droplet.diameter_um);
   auto* shell = std::get_if<ShellDirector>(&droplet.director);

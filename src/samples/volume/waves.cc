@@ -83,7 +83,7 @@ std::optional<RadialTwin> volume_twin(const Scene& scene, const Theta& theta, do
   const SampledVolume& volume = std::get<SampledVolume>(scene.sample);
   const std::optional<double> radius = radius_of_ball(*volume.grid);
   if (!radius) return std::nullopt;
-  const double size = volume.scale ? theta.at(static_cast<std::size_t>(volume.scale.index)) : 1.0;
+  const double size = volume.scale ? volume.scale.in(theta) : 1.0;
   RadialTwin twin{{scene}, theta, 2 * scale * size * *radius};
   twin.scenes.front().sample = Droplet{{twin.constant(twin.diameter_um)}, RadialDirector{}};
   twin.scenes.push_back(twin.scenes.front());
