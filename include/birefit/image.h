@@ -1,6 +1,7 @@
 #pragma once
 // Images in memory: one channel, row-major, row 0 on top (docs/conventions.md). Nothing here knows about files.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -43,6 +44,15 @@ struct PixelRect {
   int width() const { return x1 - x0; }
   int height() const { return y1 - y0; }
   bool contains(int x, int y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
+  friend bool operator==(const PixelRect&, const PixelRect&) = default;
 };
+
+/// The samples of a rectangle within the grid.
+template <class T>
+Grid<T> cropped(const Grid<T>& whole, const PixelRect& part) {
+  Grid<T> samples(part.width(), part.height());
+  for (int y = 0; y < part.height(); ++y) std::copy_n(whole.row(part.y0 + y) + part.x0, part.width(), samples.row(y));
+  return samples;
+}
 
 }  // namespace birefit

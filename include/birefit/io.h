@@ -62,10 +62,14 @@ struct ImageRequest {
   Where where;              ///< of the config entry, for errors
   bool mask = false;        ///< black and white are all that is asked for: 1 bit will do
   bool cells = false;       ///< pixels may see different things in cells of 2 x 2 (a mosaic of filters)
+  /// What is wanted of the image: work and memory are of these pixels, as far as the format allows; none: all.
+  std::optional<PixelRect> region = {};
 };
 
 struct LoadedImage {
   Image values;                ///< as stored: counts for integers, values for floats; linear light not yet applied
+  int width = 0, height = 0;   ///< of the file's image
+  int x0 = 0, y0 = 0;          ///< where in it the first of `values` is; these are empty where the region is outside
   int bits = 0;                ///< 8 or 16 for integers, 32 for float
   double top_code = 0;         ///< 255, 65535, or 0 for floats
   double pixel_size_um = 0;    ///< 0 = the file does not state it

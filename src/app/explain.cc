@@ -104,9 +104,13 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
         expected ? (expected->identifiable ? "true" : "false") : "null", next, free);
     return kExitDone;
   }
-  std::cout << fmt::format("Image      {} x {} pixels", config.scene.view.width, config.scene.view.height);
-  if (const ParameterRef size = config.scene.view.pixel_size_um)
-    std::cout << fmt::format(" of {:g} um", table[size].value);
+  const View& view = config.scene.view;
+  std::cout << fmt::format("Image      {} x {} pixels", view.width, view.height);
+  if (const ParameterRef size = view.pixel_size_um) std::cout << fmt::format(" of {:g} um", size.in(table.values()));
+  if (view.file.bin > 1) std::cout << fmt::format(", each the mean of {0} x {0} pixels of the file", view.file.bin);
+  if (view.whole_width() >= view.width + 1 || view.whole_height() >= view.height + 1)
+    std::cout << fmt::format(", of the region from ({}, {}) on of the file's {} x {} pixels", view.file.x0,
+                             view.file.y0, view.file.width, view.file.height);
   std::cout << fmt::format("\nPhysics    {}\nMethod     {}\n", chosen.physics, chosen.method);
   for (const std::string& reason : chosen.reasons) std::cout << "           " << reason << "\n";
   std::cout << fmt::format("Errors     numerical {:.1e}, model {:.1e} ({})\n", chosen.numerical_error,

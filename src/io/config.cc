@@ -56,6 +56,13 @@ constexpr int kMaxImageSide = 16384;
   throw UserError(std::move(problems));
 }
 
+/// Does an image of this size have the region, and a pixel of it?
+bool fits_in(const MicrographSettings& settings, const std::array<int, 2>& size) {
+  const PixelRect roi = settings.roi.value_or(PixelRect{0, 0, size[0], size[1]});
+  return roi.x0 >= 0 && roi.y0 >= 0 && roi.x1 <= size[0] && roi.y1 <= size[1] &&
+         std::min(roi.width(), roi.height()) >= settings.bin;
+}
+
 /// `image` replaces the single micrograph's file; with `series` the micrograph is one of its frames. Without `starts`
 /// nothing is looked for in the image: enough to know that a config is sound.
 Config load(const std::filesystem::path& path, const std::string& text, const std::vector<std::string>& set,
@@ -266,6 +273,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     if (size) {
       set_view(reader, (*size)[0], (*size)[1], 0, name, scene);
       demand_pixel_size(scene);
+      if (use == ConfigUse::plan && fits_in(settings, *size)) take_part(settings, scene);
       resolve_automatic(reader, scene, nullptr, nullptr, name);
       if (reader.problems.empty()) check_overlap(reader, scene, "the image");
     } else if (image || item.image) {
@@ -274,7 +282,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
       if (const std::optional<LoadedImage> loaded = has_ring_table(scene)
                                                         ? load_ring_table(reader, file, where, scene, config.observable)
                                                         : try_load(reader, settings, file, item.page, where)) {
-        set_view(reader, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, name, scene);
+        set_view(reader, loaded->width, loaded->height, loaded->pixel_size_um, name, scene);
         demand_pixel_size(scene, loaded->uneven_pixel_um);
         if (reader.problems.empty()) {
           Mask all(loaded->values.width(), loaded->values.height(), 1);
@@ -304,8 +312,8 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     // Images are loaded although something else is wrong: their mistakes are reported in the same run.
     std::optional<Calibration> calibration;
     if (settings.calibrated() && signals.empty()) calibration = load_calibration(reader, settings);
-    const std::optional<Mask> user_mask =
-        signals.empty() ? load_user_mask(reader, settings) : std::optional<Mask>();  // tables have read theirs
+    const std::optional<LoadedMask> user_mask =
+        signals.empty() ? load_user_mask(reader, settings) : std::nullopt;  // tables have read theirs
     std::vector<Observable> observables(micrographs.size());
     std::vector<std::vector<Picture>> filled(micrographs.size());
     std::string of_colours;  // the first picture that is one colour of several
@@ -327,15 +335,20 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
                                               ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
                                               : try_load(reader, settings, file, item.page, where);
       if (!loaded) continue;
-      if (size && (loaded->values.width() != (*size)[0] || loaded->values.height() != (*size)[1]))
+      if (size && (loaded->width != (*size)[0] || loaded->height != (*size)[1]))
         reader.problems.add(root.find("image_size_px")->where,
                             "image_size_px differs from the size of " + micrograph.name + ", " +
-                                std::to_string(loaded->values.width()) + " x " +
-                                std::to_string(loaded->values.height()),
+                                std::to_string(loaded->width) + " x " + std::to_string(loaded->height),
                             "leave it out");
-      set_view(reader, loaded->values.width(), loaded->values.height(), loaded->pixel_size_um, micrograph.name,
-               micrograph.scene);
+      set_view(reader, loaded->width, loaded->height, loaded->pixel_size_um, micrograph.name, micrograph.scene);
       if (sound) demand_pixel_size(micrograph.scene, loaded->uneven_pixel_um);
+      if (!has_ring_table(micrograph.scene)) {
+        take_part(settings, micrograph.scene);
+      } else if (settings.roi || settings.bin > 1) {
+        reader.problems.add(settings.roi ? settings.roi_where : settings.bin_where,
+                            "a table of rings has no pixels to choose from or to bin", "leave roi_px and bin out");
+        continue;
+      }
       if (frames_missing || mask_missing) continue;
       if (loaded->colour || !settings.mosaic.bayer.empty())
         of_colours = of_colours.empty() ? micrograph.name : of_colours;

@@ -169,7 +169,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   const Block block = reader.block(
       root, "micrograph",
       {"image", "page", "channel", "mosaic", "bayer", "pixel_size_um", "transfer", "gain", "offset", "illumination",
-       "background", "center_px", "rotation_deg", "roi_px", "mask", "saturation_counts", "noise", "calibration"},
+       "background", "center_px", "rotation_deg", "roi_px", "bin", "mask", "saturation_counts", "noise", "calibration"},
       false);
   settings.where = block.where;
   const auto place = [&](const char* key) { return block.find(key) ? block.find(key)->where : block.where; };
@@ -213,6 +213,14 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   settings.rotation = read_described<View>(reader, block, "rotation_deg");
 
   settings.roi = read_roi(reader, block, settings.roi_where);
+  constexpr int kMostBin = 1000;
+  settings.bin = reader.integer(block, "bin", 1, kMostBin).value_or(1);
+  settings.bin_where = place("bin");
+  if (settings.bin > 1 && !settings.mosaic.parts.empty())
+    reader.problems.add(settings.bin_where,
+                        "bin is given beside " + std::string(settings.mosaic.bayer.empty() ? "mosaic" : "bayer") +
+                            ": neighbours see different things, and have no mean",
+                        "leave bin out; roi_px makes a fit of a mosaic smaller");
   settings.mask = reader.text(block, "mask");
   settings.mask_where = place("mask");
   NumberSpec counts;
@@ -234,6 +242,9 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
       reader.missing(noise, "read_counts or counts_per_photon", "leave noise out to estimate it");
     else if (noise.node && model.read_counts == 0 && model.counts_per_photon == 0)
       reader.problems.add(noise.where, "micrograph.noise is zero: no image is exact", "leave noise out to estimate it");
+    // Stated of a pixel of the file: the mean of so many has a smaller one.
+    model.read_counts /= settings.bin;
+    model.counts_per_photon /= settings.bin * settings.bin;
     settings.noise = model;
   }
   read_calibration(reader, root, block, settings);

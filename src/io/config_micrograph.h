@@ -27,6 +27,8 @@ struct MicrographSettings {
   bool offset_automatic = false;
   std::optional<PixelRect> roi;
   Where roi_where;
+  int bin = 1;  ///< pixels of the file along a side of one of the picture
+  Where bin_where;
   std::optional<std::string> mask;
   Where mask_where;
   std::optional<double> saturation_counts;

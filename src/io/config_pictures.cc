@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include <fmt/format.h>
 
-#include "io/images/mask.h"
 #include "io/images/mosaic.h"
 #include "medium/references.h"
 
@@ -15,16 +16,31 @@ namespace {
 /// A frame's pixel whose light is below this fraction of the typical one says nothing about transmission.
 constexpr double kLeastLightFraction = 0.05;
 
-PixelRect whole(const Image& image) { return {0, 0, image.width(), image.height()}; }
+/// What is read of a file for the region: two pixels more, by which broken ones at its border are known, from even
+/// columns and rows on, where cells of mosaics begin.
+std::optional<PixelRect> read_for(const MicrographSettings& settings) {
+  if (!settings.roi) return std::nullopt;
+  const PixelRect& roi = *settings.roi;
+  const auto before = [](int edge) { return std::max(edge - 2, 0) / 2 * 2; };
+  return PixelRect{before(roi.x0), before(roi.y0), roi.x1 + 2, roi.y1 + 2};
+}
 
-bool check_roi(ConfigReader& reader, const MicrographSettings& settings, const Image& image, const std::string& name) {
+/// The region among the pixels that were read.
+PixelRect region_in(const MicrographSettings& settings, const LoadedImage& image) {
+  if (!settings.roi) return {0, 0, image.values.width(), image.values.height()};
+  const PixelRect& roi = *settings.roi;
+  return {roi.x0 - image.x0, roi.y0 - image.y0, roi.x1 - image.x0, roi.y1 - image.y0};
+}
+
+bool check_roi(ConfigReader& reader, const MicrographSettings& settings, const LoadedImage& image,
+               const std::string& name) {
   if (!settings.roi) return true;
   const PixelRect& roi = *settings.roi;
-  if (roi.x0 >= 0 && roi.y0 >= 0 && roi.x1 <= image.width() && roi.y1 <= image.height()) return true;
+  if (roi.x0 >= 0 && roi.y0 >= 0 && roi.x1 <= image.width && roi.y1 <= image.height) return true;
   reader.problems.add(settings.roi_where, "roi_px = [" + std::to_string(roi.x0) + ", " + std::to_string(roi.y0) + ", " +
                                               std::to_string(roi.x1) + ", " + std::to_string(roi.y1) +
                                               "] reaches outside " + name + ", which is " +
-                                              std::to_string(image.width()) + " x " + std::to_string(image.height()) +
+                                              std::to_string(image.width) + " x " + std::to_string(image.height) +
                                               " pixels");
   return false;
 }
@@ -43,27 +59,66 @@ double smallest_step(const LoadedImage& image) {
   return std::max(1e-6 * largest, 1e-300);
 }
 
+/// Why a pixel is left out: the first reason that applies counts.
+enum class Left : std::uint8_t { not_of_part, masked, non_finite, saturated, dead, used };
+
+/// The picture of a region of the file, `bin` x `bin` of its pixels each: their mean, used where all of them are. What
+/// goes on alone behind the last whole one is left out.
+void take_region(const LoadedImage& image, const Image& variance_scale, const Grid<Left>& left, const PixelRect& area,
+                 int bin, Picture& picture) {
+  const int width = area.width() / bin, height = area.height() / bin;
+  picture.values = Image(width, height);
+  picture.mask = Mask(width, height, 0);
+  if (!variance_scale.empty()) picture.variance_scale = Image(width, height, 0);
+  int of_part = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      Left why = Left::used;
+      double sum = 0, scales = 0;
+      for (int j = 0; j < bin; ++j)
+        for (int i = 0; i < bin; ++i) {
+          const int column = area.x0 + bin * x + i, row = area.y0 + bin * y + j;
+          why = std::min(why, left(column, row));
+          sum += image.values(column, row);
+          if (!variance_scale.empty()) scales += variance_scale(column, row);
+        }
+      picture.values(x, y) = sum / (bin * bin);
+      if (!variance_scale.empty()) picture.variance_scale(x, y) = scales / (bin * bin);
+      picture.mask(x, y) = why == Left::used;
+      of_part += why != Left::not_of_part;
+      picture.masked_by_user += why == Left::masked;
+      picture.non_finite += why == Left::non_finite;
+      picture.saturated += why == Left::saturated;
+      picture.dead += why == Left::dead;
+    }
+  const double share = static_cast<double>(of_part) / (static_cast<double>(width) * height);
+  picture.outside_roi = static_cast<int>(
+      std::lround(share * (static_cast<double>(image.width / bin) * (image.height / bin) - 1.0 * width * height)));
+}
+
 /// Values, mask and the reasons for exclusion; false when a problem left nothing to work with. Of a mosaic only the
 /// pixels of a `part`.
 bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const Calibration* calibration,
-                 const Mask* user_mask, const MosaicPart* part, LoadedImage image, const Where& where,
+                 const LoadedMask* user_mask, const MosaicPart* part, LoadedImage image, const Where& where,
                  Picture& micrograph) {
-  const int width = image.values.width(), height = image.values.height();
   const std::string& name = micrograph.name;
   const std::size_t problems_before = reader.problems.all().size();
-  check_roi(reader, settings, image.values, name);
+  check_roi(reader, settings, image, name);
   const auto other_size = [&](int other_width, int other_height, const std::string& what, const Where& place) {
-    if (other_width == width && other_height == height) return;
+    if (other_width == image.width && other_height == image.height) return;
     reader.problems.add(place, what + " is " + std::to_string(other_width) + " x " + std::to_string(other_height) +
-                                   " pixels, " + name + " is " + std::to_string(width) + " x " +
-                                   std::to_string(height));
+                                   " pixels, " + name + " is " + std::to_string(image.width) + " x " +
+                                   std::to_string(image.height));
   };
-  if (user_mask) other_size(user_mask->width(), user_mask->height(), *settings.mask, settings.mask_where);
-  if (calibration)
-    other_size(calibration->usable.width(), calibration->usable.height(), calibration->name, calibration->where);
+  if (user_mask) other_size(user_mask->width, user_mask->height, *settings.mask, settings.mask_where);
+  if (calibration) other_size(calibration->width, calibration->height, calibration->name, calibration->where);
+  const PixelRect area = region_in(settings, image);
+  if (std::min(area.width(), area.height()) < settings.bin)
+    reader.problems.add(settings.bin_where, fmt::format("bin = {} is more than the {} x {} pixels of {}", settings.bin,
+                                                        area.width(), area.height(), name));
   if (reader.problems.all().size() > problems_before) return false;
 
-  const PixelRect area = settings.roi.value_or(whole(image.values));
+  const int width = image.values.width(), height = image.values.height();
   const Saturation saturation = find_saturation(image, area, settings.saturation_counts);
   if (saturation.pile_up)
     reader.warnings.push_back(name + ": " + std::to_string(saturation.pile_up_pixels) + " pixels pile up at " +
@@ -80,33 +135,30 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
         name, 100 * cut->share, cut->code));
   linearise(image.values, settings.transfer, image.top_code);
 
-  micrograph.mask = Mask(width, height, 0);
-  int frame_dead = 0;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
+  Grid<Left> left(width, height, Left::not_of_part);
+  Mask usable(width, height, 0);
+  for (int y = area.y0; y < area.y1; ++y) {
+    for (int x = area.x0; x < area.x1; ++x) {
       if (part && ((x - part->x0) % 2 != 0 || (y - part->y0) % 2 != 0)) continue;
-      if (!area.contains(x, y))
-        ++micrograph.outside_roi;
-      else if (user_mask && !(*user_mask)(x, y))
-        ++micrograph.masked_by_user;
-      else if (!std::isfinite(image.values(x, y)))
-        ++micrograph.non_finite;
-      else if (saturated(x, y) || (calibration && calibration->saturated(x, y)))
-        ++micrograph.saturated;
-      else if (calibration && !calibration->usable(x, y))
-        ++frame_dead;
-      else
-        micrograph.mask(x, y) = 1;
+      left(x, y) = user_mask && !user_mask->selected(x, y)                            ? Left::masked
+                   : !std::isfinite(image.values(x, y))                               ? Left::non_finite
+                   : saturated(x, y) || (calibration && calibration->saturated(x, y)) ? Left::saturated
+                   : calibration && !calibration->usable(x, y)                        ? Left::dead
+                                                                                      : Left::used;
+      usable(x, y) = left(x, y) == Left::used;
     }
   }
-  micrograph.dead = frame_dead + exclude_outliers(image.values, area, step, Smoothness::image, micrograph.mask);
+  exclude_outliers(image.values, area, step, Smoothness::image, usable);
+  for (std::size_t i = 0; i < left.size(); ++i)
+    if (left.values()[i] == Left::used && !usable.values()[i]) left.values()[i] = Left::dead;
 
+  Image variance_scale;
   if (calibration) {
     const bool subtract = !calibration->dark.empty(), divide = !calibration->light.empty();
-    if (divide) micrograph.variance_scale = Image(width, height, 0);
+    if (divide) variance_scale = Image(width, height, 0);
     for (std::size_t i = 0; i < image.values.size(); ++i) {
       double& value = image.values.values()[i];
-      if (!micrograph.mask.values()[i]) {
+      if (!usable.values()[i]) {
         value = std::numeric_limits<double>::quiet_NaN();
         continue;
       }
@@ -114,10 +166,10 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
       if (!divide) continue;
       const double light = calibration->light.values()[i];
       value /= light;
-      micrograph.variance_scale.values()[i] = 1 / (light * light);
+      variance_scale.values()[i] = 1 / (light * light);
     }
   }
-  micrograph.values = std::move(image.values);
+  take_region(image, variance_scale, left, area, settings.bin, micrograph);
   if (std::none_of(micrograph.mask.values().begin(), micrograph.mask.values().end(), [](auto used) { return used; })) {
     std::vector<std::string> reasons;
     const auto count = [&](int pixels, const std::string& why) {
@@ -141,9 +193,9 @@ bool is_unstated_mosaic(ConfigReader& reader, const MicrographSettings& settings
   // Frames with and without light take off what a camera's pixels have of their own, and a camera that was calibrated
   // so is none with a mosaic: its columns and rows may differ by as much.
   if (settings.calibrated()) return false;
-  PixelRect area = settings.roi.value_or(whole(image.values));
+  PixelRect area = region_in(settings, image);
   area.x1 = std::min(area.x1, image.values.width()), area.y1 = std::min(area.y1, image.values.height());
-  if (area.x0 < 0 || area.y0 < 0) return false;  // reported
+  if (area.x0 < 0 || area.y0 < 0 || area.width() <= 0 || area.height() <= 0) return false;  // reported
   const auto kind = find_mosaic(image.values, area, smallest_step(image));
   if (!kind) return false;
   reader.problems.add(where, name + ": pixels alternate in cells of 2 x 2: a " + *kind + " mosaic",
@@ -163,6 +215,7 @@ std::optional<LoadedImage> try_load(ConfigReader& reader, const MicrographSettin
   if (!settle_page(reader, file, page)) return std::nullopt;
   ImageRequest request{file, page.number, settings.channel, where};
   request.cells = !settings.mosaic.parts.empty();
+  if (reader.use != ConfigUse::render) request.region = read_for(settings);
   try {
     LoadedImage image = load_image(request);
     say(reader, request.path, image.notes);
@@ -187,19 +240,20 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
     if (!frame->name) continue;
     frame->image = try_load(reader, settings, reader.resolve(*frame->name), {}, frame->where);
     if (!frame->image) continue;
-    const Image &values = frame->image->values, &size = first ? first->image->values : values;
     if (!first) first = frame;
-    if (values.width() != size.width() || values.height() != size.height())
-      reader.problems.add(frame->where, *frame->name + " is " + std::to_string(values.width()) + " x " +
-                                            std::to_string(values.height()) + " pixels, " + *first->name + " is " +
-                                            std::to_string(size.width()) + " x " + std::to_string(size.height()));
+    const LoadedImage &image = *frame->image, &other = *first->image;
+    if (image.width != other.width || image.height != other.height)
+      reader.problems.add(frame->where, *frame->name + " is " + std::to_string(image.width) + " x " +
+                                            std::to_string(image.height) + " pixels, " + *first->name + " is " +
+                                            std::to_string(other.width) + " x " + std::to_string(other.height));
   }
   if (!first || reader.problems.all().size() > before) return std::nullopt;
   const Image& size = first->image->values;
-  if (!check_roi(reader, settings, size, *first->name)) return std::nullopt;
+  if (!check_roi(reader, settings, *first->image, *first->name)) return std::nullopt;
 
-  const PixelRect area = settings.roi.value_or(whole(size));
+  const PixelRect area = region_in(settings, *first->image);
   Calibration calibration;
+  calibration.width = first->image->width, calibration.height = first->image->height;
   calibration.name = *first->name, calibration.where = first->where;
   calibration.usable = Mask(size.width(), size.height(), 1);
   calibration.saturated = Mask(size.width(), size.height(), 0);
@@ -255,12 +309,14 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
   return calibration;
 }
 
-std::optional<Mask> load_user_mask(ConfigReader& reader, const MicrographSettings& settings) {
+std::optional<LoadedMask> load_user_mask(ConfigReader& reader, const MicrographSettings& settings) {
   if (!settings.mask) return std::nullopt;
   try {
-    LoadedMask mask = load_mask({reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where});
+    ImageRequest request{reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where};
+    request.region = read_for(settings);
+    LoadedMask mask = load_mask(request);
     say(reader, *settings.mask, mask.notes);
-    return std::move(mask.selected);
+    return mask;
   } catch (const UserError& error) {
     reader.problems.add(error);
     return std::nullopt;
@@ -284,7 +340,7 @@ void replace_ref(Picture& micrograph, ParameterRef from, ParameterRef to) {
 }
 
 std::vector<Picture> pictures_of(ConfigReader& reader, const MicrographSettings& settings,
-                                 const Calibration* calibration, const Mask* user_mask, LoadedImage image,
+                                 const Calibration* calibration, const LoadedMask* user_mask, LoadedImage image,
                                  const Where& where, const Picture& micrograph) {
   std::vector<Picture> pictures;
   if (settings.mosaic.parts.empty()) {

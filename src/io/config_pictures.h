@@ -6,13 +6,15 @@
 #include <vector>
 
 #include "io/config_micrograph.h"
+#include "io/images/mask.h"
 
 namespace birefit {
 
 /// The calibration frames as what a micrograph needs of them.
 struct Calibration {
-  Image dark;   ///< counts in linear light; empty: nothing is subtracted
-  Image light;  ///< the frame of light less dark; empty: nothing divides
+  int width = 0, height = 0;  ///< of the files; all else is of the region that was read
+  Image dark;                 ///< counts in linear light; empty: nothing is subtracted
+  Image light;                ///< the frame of light less dark; empty: nothing divides
   Mask usable;
   Mask saturated;
   double crossed_median = 0, crossed_sd = 0;
@@ -27,12 +29,12 @@ std::optional<LoadedImage> try_load(ConfigReader& reader, const MicrographSettin
 /// The frames that the settings name; none with a problem.
 std::optional<Calibration> load_calibration(ConfigReader& reader, const MicrographSettings& settings);
 /// The mask that the settings name; none without, and with a problem.
-std::optional<Mask> load_user_mask(ConfigReader& reader, const MicrographSettings& settings);
+std::optional<LoadedMask> load_user_mask(ConfigReader& reader, const MicrographSettings& settings);
 /// The reader's remarks on a file, to the warnings.
 void say(ConfigReader& reader, const std::filesystem::path& file, const std::vector<std::string>& notes);
 /// The picture with its pixels, or those that a mosaic holds; none when a problem left nothing to work with.
 std::vector<Picture> pictures_of(ConfigReader& reader, const MicrographSettings& settings,
-                                 const Calibration* calibration, const Mask* user_mask, LoadedImage image,
+                                 const Calibration* calibration, const LoadedMask* user_mask, LoadedImage image,
                                  const Where& where, const Picture& micrograph);
 /// Replaces a reference everywhere in a scene, or in a picture with its light.
 void replace_ref(Scene& scene, ParameterRef from, ParameterRef to);

@@ -49,6 +49,7 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
   }
   LoadedImage image;
   image.values = Image(rows, 1, 0);
+  image.width = rows, image.height = 1;
   image.bits = 32;
   const Plate& plate = std::get<Plate>(scene.sample);
   observable = {Quantity::ring_radius_cm, {}};

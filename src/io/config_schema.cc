@@ -131,6 +131,9 @@ Json micrograph_schema() {
   keys["mask"] = text("image of the same size; pixels of value 0 are left out");
   keys["mosaic"] = {{"description", "pixels that see different things in cells of 2 x 2"}};
   keys["bayer"] = one_of("first cell of a colour sensor's filters", {"rggb", "bggr", "grbg", "gbrg"});
+  keys["bin"] = {{"description", "so many pixels of the file along a side are one of the picture, their mean"},
+                 {"type", "integer"},
+                 {"minimum", 1}};
   keys["roi_px"] = {{"description", "[x0, y0, x1, y1], the ends exclusive"},
                     {"type", "array"},
                     {"items", {{"type", "integer"}}},

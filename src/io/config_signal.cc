@@ -230,9 +230,9 @@ std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
   // What belongs to images would be dropped without a word.
   if (const YamlNode* micrograph = root.find("micrograph"))
     for (const char* key :
-         {"image", "page", "channel", "transfer", "roi_px", "mask", "saturation_counts", "noise", "calibration"})
+         {"image", "page", "channel", "transfer", "roi_px", "bin", "mask", "saturation_counts", "noise", "calibration"})
       if (const YamlNode* found = micrograph->find(key);
-          found && !(images && std::string(key) != "image" && std::string(key) != "noise"))
+          found && !(images && std::string(key) != "image" && std::string(key) != "noise" && std::string(key) != "bin"))
         reader.problems.add(found->where, std::string("micrograph.") + key + " is of images, this config has signal",
                             std::string(key) == "noise" ? "signal has its own noise" : "leave it out");
   return items;

@@ -21,7 +21,7 @@ double mean_of(const Picture& picture) {
 
 /// The frame's picture; nothing, with a problem, where it cannot be used.
 std::optional<Picture> picture_of(ConfigReader& reader, const MicrographSettings& settings,
-                                  const Calibration* calibration, const Mask* mask, const SeriesFrame& frame) {
+                                  const Calibration* calibration, const LoadedMask* mask, const SeriesFrame& frame) {
   PageChoice page;
   page.number = frame.page;
   std::optional<LoadedImage> image = try_load(reader, settings, reader.resolve(frame.file), page, frame.where);
@@ -65,7 +65,7 @@ std::optional<TextTable> table_of_frames(ConfigReader& reader, const SignalItem&
   ImageSeries series;
   find_frames(reader, asked, series);
   const std::optional<Calibration> calibration = load_calibration(reader, region);
-  const std::optional<Mask> mask = load_user_mask(reader, region);
+  const std::optional<LoadedMask> mask = load_user_mask(reader, region);
   if (reader.problems.all().size() > before) return std::nullopt;
 
   TextTable table;

@@ -13,9 +13,12 @@ constexpr double kLeastDiscContrast = 3;
 /// Half-width of the bounds of an automatic centre, as a fraction of the image size.
 constexpr double kCenterBoundFraction = 0.15;
 
+/// What a scene has of a parameter.
+double in_scene(const ConfigReader& reader, ParameterRef ref) { return ref.times * reader.table[ref].value + ref.plus; }
+
 /// 0: not known.
 double pixel_um(const ConfigReader& reader, const View& view) {
-  return view.pixel_size_um ? reader.table[view.pixel_size_um].value : 0;
+  return view.pixel_size_um ? in_scene(reader, view.pixel_size_um) : 0;
 }
 
 /// The pixel size that a file states; one number for all files that state the same.
@@ -32,7 +35,9 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
                        const std::string& name) {
   View& view = scene.view;
   auto* droplet = std::get_if<Droplet>(&scene.sample);
-  const double middle_x = 0.5 * (view.width - 1), middle_y = 0.5 * (view.height - 1);
+  // A droplet is looked for in the region; what else has a centre has that of the whole image.
+  const double middle_x = droplet && reader.use != ConfigUse::render ? 0.5 * (view.width - 1) : view.middle_x(),
+               middle_y = droplet && reader.use != ConfigUse::render ? 0.5 * (view.height - 1) : view.middle_y();
   const auto open = [&](ParameterRef ref) {
     return ref && reader.table[ref].automatic && !std::isfinite(reader.table[ref].value);
   };
@@ -49,10 +54,11 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
   const auto center = [&](ParameterRef ref, double found, double middle, int size) {
     Parameter& parameter = reader.table[ref];
     const bool unset = !std::isfinite(parameter.value);
-    if (unset) parameter.value = parameter.automatic && reader.use != ConfigUse::render ? found : middle;
+    if (unset) parameter.value = ref.stated(parameter.automatic && reader.use != ConfigUse::render ? found : middle);
     if (parameter.automatic && !std::isfinite(parameter.lower)) {
-      parameter.lower = parameter.value - kCenterBoundFraction * size;
-      parameter.upper = parameter.value + kCenterBoundFraction * size;
+      const double reach = kCenterBoundFraction * size * view.file.bin;
+      parameter.lower = parameter.value - reach;
+      parameter.upper = parameter.value + reach;
     }
   };
   center(view.center_x_px, disc.center_x_px, middle_x, view.width);
@@ -91,6 +97,10 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
   if (!droplet || !droplet->diameter_um || !view.pixel_size_um || view.width <= 0) return;
   const Parameter& diameter = reader.table[droplet->diameter_um];
   const double pixel = pixel_um(reader, view), diameter_px = diameter.value / pixel;
+  // In words, pixels are the file's.
+  const int bin = view.file.bin;
+  const bool part = view.whole_width() >= view.width + 1 || view.whole_height() >= view.height + 1;
+  const std::string seen = (part ? "the region of " : "") + name;
   const double field_px = std::max(view.width, view.height);
   const std::string field = show(view.width * pixel) + " x " + show(view.height * pixel) + " um";
   const auto plausible = [&](double value_um) {
@@ -98,30 +108,31 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
     return pixels >= 3 && pixels <= 2 * field_px;
   };
   if (!(diameter_px >= 3)) {
-    std::string hint = "check pixel_size_um = " + show(pixel);
+    std::string hint = "check pixel_size_um = " + show(pixel / bin) + (bin > 1 ? " and bin" : "");
     for (double factor : {1e3, 1e6})
       if (plausible(diameter.value * factor))
         hint = "did you mean " + show(diameter.value * factor) + "? the key is in um";
     reader.problems.add(
         diameter.where,
-        "diameter_um = " + show(diameter.value) + " is only " + show(diameter_px) + " pixels in " + name, hint);
+        "diameter_um = " + show(diameter.value) + " is only " + show(diameter_px) + " pixels in " + seen, hint);
   } else if (diameter_px > 10 * field_px) {
     const double smaller = diameter.value / 1e3;
     reader.problems.add(diameter.where,
                         "diameter_um = " + show(diameter.value) + " is " + show(std::round(diameter_px / field_px)) +
-                            " times the field of view (" + field + ") of " + name,
+                            " times the field of view (" + field + ") of " + seen,
                         plausible(smaller) ? "did you mean " + show(smaller) + "? the key is in um"
-                                           : "check pixel_size_um = " + show(pixel));
+                                           : "check pixel_size_um = " + show(pixel / bin));
   } else {
     const Parameter& x = reader.table[view.center_x_px];
     const Parameter& y = reader.table[view.center_y_px];
-    const double dx = std::max({-0.5 - x.value, x.value - (view.width - 0.5), 0.0});
-    const double dy = std::max({-0.5 - y.value, y.value - (view.height - 0.5), 0.0});
+    const double column = in_scene(reader, view.center_x_px), row = in_scene(reader, view.center_y_px);
+    const double dx = std::max({-0.5 - column, column - (view.width - 0.5), 0.0});
+    const double dy = std::max({-0.5 - row, row - (view.height - 0.5), 0.0});
     if (std::hypot(dx, dy) >= 0.5 * diameter_px)
       reader.problems.add(x.where.line > 0 ? x.where : diameter.where,
                           "center_px = [" + show(x.value) + ", " + show(y.value) + "] puts the droplet outside " +
-                              name + ", which is " + std::to_string(view.width) + " x " + std::to_string(view.height) +
-                              " pixels");
+                              seen + ", which is " + std::to_string(bin * view.width) + " x " +
+                              std::to_string(bin * view.height) + " pixels");
   }
 }
 
@@ -138,6 +149,20 @@ void set_view(ConfigReader& reader, int width, int height, double file_pixel_um,
       reader.warnings.push_back(name + " states a pixel size of " + show(file_pixel_um) + " um; the config's " +
                                 show(stated) + " um is used.");
   }
+}
+
+void take_part(const MicrographSettings& settings, Scene& scene) {
+  View& view = scene.view;
+  const PixelRect roi = settings.roi.value_or(PixelRect{0, 0, view.width, view.height});
+  const int bin = settings.bin;
+  view.file = {roi.x0, roi.y0, bin, view.width, view.height};
+  view.width = roi.width() / bin, view.height = roi.height() / bin;
+  const auto place = [&](ParameterRef& ref, int first) { ref = ref.seen(1.0 / bin, -(first + 0.5 * (bin - 1)) / bin); };
+  place(view.center_x_px, roi.x0), place(view.center_y_px, roi.y0);
+  view.pixel_size_um = view.pixel_size_um.seen(bin, 0);
+  if (auto* crystal = std::get_if<Crystal>(&scene.sample))
+    for (ParameterRef* electrode : {&crystal->electrode_low_px, &crystal->electrode_high_px})
+      place(*electrode, crystal->field_along_y ? roi.y0 : roi.x0);
 }
 
 void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene) {

@@ -17,6 +17,8 @@ void add_branches(FitJob& job);
 void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& name);
 /// The view of a scene of this size (px); file_pixel_um: what the image states, 0 = nothing.
 void set_view(ConfigReader& reader, int width, int height, double file_pixel_um, const std::string& name, Scene& scene);
+/// What the settings take of the file's image, region and bins: the view is of that. Parameters stay those of the file.
+void take_part(const MicrographSettings& settings, Scene& scene);
 /// Electrodes that the config does not give are the region's edges.
 void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene);
 

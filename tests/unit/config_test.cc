@@ -391,9 +391,9 @@ TEST_F(Config, TurnsCountsIntoTransmission) {
     save(name, frame);
   const auto config = load(kCrystal + "calibration: {dark: d.tif, parallel: p.tif, crossed: c.tif}\n", ConfigUse::fit);
   const Picture& a = picture(config.job, 0);
-  EXPECT_DOUBLE_EQ(a.values(8, 8), 0.5);
-  EXPECT_DOUBLE_EQ(a.variance_scale(8, 8), 1e-6);
-  EXPECT_EQ(a.mask(10, 12), 0);
+  EXPECT_DOUBLE_EQ(a.values(9, 8), 0.5);
+  EXPECT_DOUBLE_EQ(a.variance_scale(9, 8), 1e-6);
+  EXPECT_EQ(a.mask(10 - 2, 12 - 4), 0);  // the picture is the region
   EXPECT_EQ(a.dead, 1);
   const Parameter& offset = config.job.parameters[a.offset];
   EXPECT_DOUBLE_EQ(offset.value, 0.02);
@@ -410,7 +410,7 @@ TEST_F(Config, ExcludesAndCountsNonFiniteAndIsolatedPixels) {
   const auto config = load(kCrystal, ConfigUse::fit);
   EXPECT_EQ(picture(config.job, 0).non_finite, 1);
   EXPECT_EQ(picture(config.job, 0).dead, 1);
-  EXPECT_EQ(picture(config.job, 0).mask(20, 20), 0);
+  EXPECT_EQ(picture(config.job, 0).mask(20 - 2, 20 - 4), 0);
   EXPECT_EQ(picture(config.job, 1).dead, 0);
 }
 

@@ -16,6 +16,7 @@ LoadedMask load_mask(const ImageRequest& request) {
   const bool white_is_zero = image.stored_zero != 0, stored_decides = white_is_zero && image.top_code != 1;
   LoadedMask mask;
   mask.notes = std::move(image.notes);
+  mask.width = image.width, mask.height = image.height;
   mask.selected = Mask(image.values.width(), image.values.height(), 0);
   long count = 0;
   for (std::size_t i = 0; i < mask.selected.size(); ++i) {
@@ -26,9 +27,10 @@ LoadedMask load_mask(const ImageRequest& request) {
   const char* which = stored_decides  ? "those not stored as 0 (white is zero in this file: they are shown dark)"
                       : white_is_zero ? "those shown white (white is zero in this file: they are stored as 0)"
                                       : "those that are not 0";
-  mask.notes.push_back(fmt::format("of the mask's {} pixels {} are taken as selected, {}", mask.selected.size(),
-                                   count == static_cast<long>(mask.selected.size()) ? "all" : fmt::format("{}", count),
-                                   which));
+  const bool whole = mask.selected.width() == mask.width && mask.selected.height() == mask.height;
+  mask.notes.push_back(fmt::format(
+      "of the mask's {} pixels {}{} are taken as selected, {}", mask.selected.size(), whole ? "" : "around the region ",
+      count == static_cast<long>(mask.selected.size()) ? "all" : fmt::format("{}", count), which));
   return mask;
 }
 

@@ -10,7 +10,8 @@
 namespace birefit {
 
 struct LoadedMask {
-  Mask selected;                   ///< 1 = use the pixel
+  Mask selected;                   ///< 1 = use the pixel; of the region asked for
+  int width = 0, height = 0;       ///< of the file's picture
   std::vector<std::string> notes;  ///< the reader's, and what was taken as selected
 };
 

@@ -152,14 +152,24 @@ std::vector<int> chosen_channels(const ImageRequest& request, const OIIO::ImageS
   return {rgb[choice == "r" ? 0 : choice == "g" ? 1 : 2]};
 }
 
+/// What was read at once: these pixels of the file, `channels` samples each.
+struct Block {
+  std::vector<unsigned char> bytes;
+  PixelRect at;
+  int channels = 1;
+};
+
+/// The pixels of a block that belong to the part of the file whose pixels `values` are.
 template <class T>
-void add_samples(const std::vector<unsigned char>& bytes, int channels, const std::vector<int>& offsets, int row,
-                 int rows, Image& values) {
+void add_samples(const Block& block, const std::vector<int>& offsets, const PixelRect& part, Image& values) {
   const double weight = 1.0 / static_cast<double>(offsets.size());
-  const unsigned char* pixel = bytes.data();
-  for (int y = row; y < row + rows; ++y) {
-    double* out = values.row(y);
-    for (int x = 0; x < values.width(); ++x, pixel += sizeof(T) * channels) {
+  const std::size_t pixel_bytes = sizeof(T) * block.channels;
+  for (int y = std::max(block.at.y0, part.y0); y < std::min(block.at.y1, part.y1); ++y) {
+    const unsigned char* pixel =
+        block.bytes.data() +
+        (static_cast<std::size_t>(y - block.at.y0) * block.at.width() + (part.x0 - block.at.x0)) * pixel_bytes;
+    double* out = values.row(y - part.y0);
+    for (int x = 0; x < values.width(); ++x, pixel += pixel_bytes) {
       double sum = 0;
       for (const int offset : offsets) {
         T sample;
@@ -171,8 +181,18 @@ void add_samples(const std::vector<unsigned char>& bytes, int channels, const st
   }
 }
 
+/// What is asked for of an image of this size.
+PixelRect wanted(const ImageRequest& request, int width, int height) {
+  PixelRect part{0, 0, width, height};
+  if (!request.region) return part;
+  const PixelRect& region = *request.region;
+  part = {std::max(region.x0, 0), std::max(region.y0, 0), std::min(region.x1, width), std::min(region.y1, height)};
+  return part.width() > 0 && part.height() > 0 ? part : PixelRect{};
+}
+
 Image read_samples(const ImageRequest& request, const Signature& signature, OIIO::ImageInput& input, int page,
-                   const OIIO::ImageSpec& spec, const std::vector<int>& channels) {
+                   const OIIO::ImageSpec& spec, const std::vector<int>& channels, const PixelRect& part) {
+  if (part.width() == 0) return {};
   const int first = *std::min_element(channels.begin(), channels.end());
   const int last = *std::max_element(channels.begin(), channels.end()) + 1;
   std::vector<int> offsets;
@@ -181,47 +201,55 @@ Image read_samples(const ImageRequest& request, const Signature& signature, OIIO
   const bool half = spec.format == TypeDesc::HALF || !spec.channelformats.empty();
   const TypeDesc type = half ? TypeDesc(TypeDesc::FLOAT) : spec.format;
 
-  const std::size_t row_bytes = std::size_t(spec.width) * (last - first) * type.size();
-  int band = static_cast<int>(std::clamp<std::size_t>(kBandBytes / row_bytes, 1, spec.height));
-  if (spec.tile_height > 0) band = std::max(band / spec.tile_height, 1) * spec.tile_height;
-  std::vector<unsigned char> bytes;
-  bytes.resize(row_bytes * std::min(band, spec.height));
+  // Whole tiles, or whole rows, that hold the part.
+  const bool tiled = spec.tile_width > 0;
+  const int tile_width = tiled ? spec.tile_width : spec.width, tile_height = tiled ? spec.tile_height : 1;
+  const auto up = [](int end, int step, int most) { return std::min((end + step - 1) / step * step, most); };
+  const PixelRect held{part.x0 / tile_width * tile_width, part.y0 / tile_height * tile_height,
+                       up(part.x1, tile_width, spec.width), up(part.y1, tile_height, spec.height)};
+  const std::size_t row_bytes = std::size_t(held.width()) * (last - first) * type.size();
+  const int band = up(static_cast<int>(std::clamp<std::size_t>(kBandBytes / row_bytes, 1, held.height())), tile_height,
+                      held.height());
+  Block block;
+  block.channels = last - first;
+  block.bytes.resize(row_bytes * band);
 
   Image values;
-  for (int row = 0; row < spec.height; row += band) {
-    const int rows = std::min(band, spec.height - row);
-    const int y = spec.y + row;
-    const bool read = spec.tile_width > 0
-                          ? input.read_tiles(page, 0, spec.x, spec.x + spec.width, y, y + rows, spec.z, spec.z + 1,
-                                             first, last, type, bytes.data())
-                          : input.read_scanlines(page, 0, y, y + rows, spec.z, first, last, type, bytes.data());
+  for (int row = held.y0; row < held.y1; row += band) {
+    block.at = {held.x0, row, held.x1, std::min(row + band, held.y1)};
+    const int x = spec.x, y = spec.y;
+    const bool read = tiled
+                          ? input.read_tiles(page, 0, x + block.at.x0, x + block.at.x1, y + block.at.y0,
+                                             y + block.at.y1, spec.z, spec.z + 1, first, last, type, block.bytes.data())
+                          : input.read_scanlines(page, 0, y + block.at.y0, y + block.at.y1, spec.z, first, last, type,
+                                                 block.bytes.data());
     // Some decoders (JPEG) fill what is missing with grey, report success and leave a message.
     if (!read || input.has_error()) refuse_damaged(request, signature, decoder_message(input));
-    if (values.empty()) values = Image(spec.width, spec.height);
+    if (values.empty()) values = Image(part.width(), part.height());
     switch (type.basetype) {
       case TypeDesc::UINT8:
-        add_samples<std::uint8_t>(bytes, last - first, offsets, row, rows, values);
+        add_samples<std::uint8_t>(block, offsets, part, values);
         break;
       case TypeDesc::INT8:
-        add_samples<std::int8_t>(bytes, last - first, offsets, row, rows, values);
+        add_samples<std::int8_t>(block, offsets, part, values);
         break;
       case TypeDesc::UINT16:
-        add_samples<std::uint16_t>(bytes, last - first, offsets, row, rows, values);
+        add_samples<std::uint16_t>(block, offsets, part, values);
         break;
       case TypeDesc::INT16:
-        add_samples<std::int16_t>(bytes, last - first, offsets, row, rows, values);
+        add_samples<std::int16_t>(block, offsets, part, values);
         break;
       case TypeDesc::UINT32:
-        add_samples<std::uint32_t>(bytes, last - first, offsets, row, rows, values);
+        add_samples<std::uint32_t>(block, offsets, part, values);
         break;
       case TypeDesc::INT32:
-        add_samples<std::int32_t>(bytes, last - first, offsets, row, rows, values);
+        add_samples<std::int32_t>(block, offsets, part, values);
         break;
       case TypeDesc::FLOAT:
-        add_samples<float>(bytes, last - first, offsets, row, rows, values);
+        add_samples<float>(block, offsets, part, values);
         break;
       case TypeDesc::DOUBLE:
-        add_samples<double>(bytes, last - first, offsets, row, rows, values);
+        add_samples<double>(block, offsets, part, values);
         break;
       default:
         refuse(request, fmt::format("has samples of type {}", type.c_str()),
@@ -348,7 +376,10 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   const std::string description = spec.get_string_attribute("ImageDescription", "");
   const std::vector<int> channels = chosen_channels(request, spec, palette, loaded.notes);
   loaded.colour = spec.nchannels >= 3;
-  loaded.values = read_samples(request, signature, *input, page, spec, channels);
+  const PixelRect part = wanted(request, spec.width, spec.height);
+  loaded.width = spec.width, loaded.height = spec.height;
+  loaded.x0 = part.x0, loaded.y0 = part.y0;
+  loaded.values = read_samples(request, signature, *input, page, spec, channels, part);
 
   const bool small_integer = spec.format == TypeDesc::UINT8 || spec.format == TypeDesc::UINT16;
   if (small_integer) {
@@ -412,7 +443,7 @@ LoadedImage load_raw(const ImageRequest& request, const TiffTags& tags) {
       LoadedImage loaded = load_checked(asked, {"tiff", "TIFF"}, beginning_with(request.path, tags, *picture));
       loaded.notes.insert(loaded.notes.begin(),
                           fmt::format("raw photograph: its picture of {} x {} pixels is read, not its thumbnail",
-                                      loaded.values.width(), loaded.values.height()));
+                                      loaded.width, loaded.height));
       return loaded;
     } catch (const UserError& error) {
       // What is wrong with the request is to be said as it is.
@@ -427,7 +458,10 @@ LoadedImage load_raw(const ImageRequest& request, const TiffTags& tags) {
                          raw->counts.height(), filters),
              "add `bayer: " + (raw->pattern.empty() ? "rggb" : raw->pattern) + "` and `channel: g` (or r, b)");
     LoadedImage loaded;
-    loaded.values = std::move(raw->counts);
+    loaded.width = raw->counts.width(), loaded.height = raw->counts.height();
+    const PixelRect part = wanted(request, loaded.width, loaded.height);
+    loaded.x0 = part.x0, loaded.y0 = part.y0;
+    loaded.values = cropped(raw->counts, part);
     loaded.bits = 16;
     loaded.top_code = 65535;
     loaded.filter_pattern = raw->pattern;
