@@ -31,6 +31,8 @@ struct UnevenLight {
   ParameterRef coefficient;
   Shape shape = Shape::x;
   bool of_intensity = false;  ///< added to the gain
+  /// From the middle to the edge of what is seen, where that is a part of a file's image.
+  bool over_region = false;
 };
 
 /// What lenses, cameras and resampling do to a picture beside gain and offset: `coefficient`, in units of the values

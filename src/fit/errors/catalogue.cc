@@ -57,7 +57,7 @@ FitJob with_catalogue(const Task& task, const Optimum& optimum) {
     const bool fitted = std::any_of(picture.uneven.begin(), picture.uneven.end(), [&](const UnevenLight& own) {
       return own.shape == one.shape && own.of_intensity == one.of_intensity;
     });
-    if (!fitted) picture.uneven.push_back({term(one.kind), one.shape, one.of_intensity});
+    if (!fitted) picture.uneven.push_back({term(one.kind), one.shape, one.of_intensity, true});
   }
   using Effect = PictureEffect::Kind;
   for (const auto& [kind, effect] : {std::pair(kBlur, Effect::blur),

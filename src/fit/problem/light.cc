@@ -11,8 +11,10 @@ double centre_in(const Theta& theta, ParameterRef ref) { return ref ? ref.in(the
 
 double LightTerm::shape_at(const View& view, int column, int row) const {
   if (!shape) return 1;
-  const double half = 0.5 * std::max(view.whole_width(), view.whole_height());
-  const double x = (column - view.middle_x()) / half, y = (view.middle_y() - row) / half;
+  const double width = over_region ? view.width : view.whole_width(),
+               height = over_region ? view.height : view.whole_height(), half = 0.5 * std::max(width, height);
+  const double x = (column - (over_region ? 0.5 * (width - 1) : view.middle_x())) / half,
+               y = ((over_region ? 0.5 * (height - 1) : view.middle_y()) - row) / half;
   switch (*shape) {
     case UnevenLight::Shape::x:
       return x;
@@ -25,11 +27,11 @@ double LightTerm::shape_at(const View& view, int column, int row) const {
 }
 
 std::vector<LightTerm> light_terms(const Picture& micrograph) {
-  std::vector<LightTerm> terms{{micrograph.gain, 1, true, {}, {}}, {micrograph.offset, 0, false, {}, {}}};
+  std::vector<LightTerm> terms{{micrograph.gain, 1, true, {}, false, {}}, {micrograph.offset, 0, false, {}, false, {}}};
   for (const UnevenLight& uneven : micrograph.uneven)
-    terms.push_back({uneven.coefficient, 0, uneven.of_intensity, uneven.shape, {}});
+    terms.push_back({uneven.coefficient, 0, uneven.of_intensity, uneven.shape, uneven.over_region, {}});
   for (const PictureEffect& effect : micrograph.effects)
-    terms.push_back({effect.coefficient, 0, false, {}, effect.kind});
+    terms.push_back({effect.coefficient, 0, false, {}, false, effect.kind});
   return terms;
 }
 

@@ -14,6 +14,7 @@ struct LightTerm {
   double absent = 0;  ///< the coefficient where the micrograph has none
   bool of_intensity = false;
   std::optional<UnevenLight::Shape> shape;  ///< nothing: 1 everywhere
+  bool over_region = false;                 ///< of UnevenLight
   /// Set: the coefficient stands before how the light changes by it, which follows the light.
   std::optional<PictureEffect::Kind> effect;
 

@@ -41,7 +41,8 @@ Eigen::VectorXd LeastSquares::misfit_along(const Eigen::MatrixXd& covariance) co
   for (std::size_t g = 0; g < frames_.size(); ++g) {
     const Frame& frame = frames_[g];
     const View& view = task_.picture(static_cast<int>(g)).scene.view;
-    const double center_x = view.center_x_px.in(theta_), center_y = view.center_y_px.in(theta_);
+    const double center_x = view.center_x_px ? view.center_x_px.in(theta_) : view.middle_x(),
+                 center_y = view.center_y_px ? view.center_y_px.in(theta_) : view.middle_y();
     int left = std::numeric_limits<int>::max(), right = -1, top = left, bottom = -1;
     double farthest = 0;
     for (const auto& [x, y] : frame.set.pixels) {
