@@ -38,7 +38,16 @@ constexpr Uneven kUneven[] = {{{"light_x", "", 0.02}, UnevenLight::Shape::x, tru
 }  // namespace
 
 bool asks_catalogue(const Task& task, const Optimum& optimum) {
-  return !optimum.stopped && task.picture(0).effects.empty() && leaves_discrepancy(task, optimum);
+  // What misses more of the contrast is not nearly the picture's model: other physics, another director.
+  constexpr double kNearly = 0.02;
+  if (optimum.stopped || task.frames() != 1 || !task.picture(0).effects.empty()) return false;
+  const LeastSquares& problem = *optimum.problem;
+  const Eigen::ArrayXd sigma = problem.pixels(0).sigma.array(),
+                       residual = problem.noise_whitened_residual(0).array() * sigma;
+  const auto [low, high] = problem.intensity_range(0);
+  const double contrast = std::abs(task.gain_of(0, optimum.theta)) * (high - low),
+               missed = std::sqrt(std::max(0.0, (residual.square() - sigma.square()).mean()));
+  return missed < kNearly * contrast && leaves_discrepancy(task, optimum);
 }
 
 FitJob with_catalogue(const Task& task, const Optimum& optimum) {

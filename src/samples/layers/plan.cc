@@ -482,7 +482,7 @@ std::vector<ParameterRef> heat_temperatures(const Scene& scene) {
   return {heat->cold_k, heat->hot_k, heat->initial_k ? heat->initial_k : heat->cold_k};
 }
 
-const SampleKind kLayers{.name = "layer",
+const SampleKind kLayers{.name = "layers",
                          .is = is_layers,
                          .plan = plan_planar,
                          .pilots = planar_pilots,

@@ -84,7 +84,7 @@ std::unique_ptr<SampleImage<S>> make_rings_image(const Scene& scene, const Rende
                                                                const BeamMaker&);
 BIREFIT_FOR_EACH_SCALAR(BIREFIT_INSTANTIATE)
 
-const SampleKind kRings{.name = "ring table",
+const SampleKind kRings{.name = "rings",
                         .is = is_rings,
                         .plan = plan_rings,
                         .phases_rad = ring_phases,
