@@ -1,0 +1,161 @@
+// What load_config makes of tables of signals, and where it says they are wrong.
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "config_fixture.h"
+#include "pictures.h"
+
+namespace birefit {
+namespace {
+
+using Config = testing::ConfigFolder;
+class ConfigSignal : public Config {};
+
+const std::string kSignal = R"(signal:
+  - {file: a.csv, value: out, columns: {sample.cell.director.freedericksz.voltage_v: volts}, set:
+       {microscope.light.wavelength_nm: 500}}
+  - {file: b.csv, value: out, columns: {sample.cell.director.freedericksz.voltage_v: volts}, set:
+       {microscope.light.wavelength_nm: 600, micrograph.gain: {fit: auto}}, noise: 0.5, every: 2}
+sample:
+  cell:
+    thickness_um: {value: 5, fit: [4, 6]}
+    director: {freedericksz: {threshold_v: 1, k33_over_k11: 1.5, eps_ratio: 3, azimuth_deg: 45}}
+  material: {ordinary: 1.52, birefringence: 0.2}
+microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}
+)";
+
+TEST_F(ConfigSignal, GivesEveryRowOfASignalASceneOfItsOwn) {
+  write("a.csv", ",volts,out\n0,0.5,1\n1,1,2\n2,2,4\n3,3,8\n");
+  write("b.csv", "out,volts\n1,0.5\n2,1\n3,1.5\n4,2\n5,2.5\n");
+  const auto config = load(kSignal, ConfigUse::fit);
+  ASSERT_EQ(config.job.measurements.size(), 2u);
+  const Readings &a = readings(config.job, 0), &b = readings(config.job, 1);
+  ASSERT_EQ(a.rows.size(), 4u);
+  ASSERT_EQ(b.rows.size(), 3u);
+  ASSERT_EQ(config.signals.size(), 2u);
+  EXPECT_EQ(config.signals[1].first, 4u);
+  EXPECT_EQ(config.signals[1].x, (std::vector<double>{0.5, 1.5, 2.5}));
+  const Theta theta = config.job.parameters.values();
+  const auto voltage = [&](const Scene& row) {
+    return theta[std::get<FreederickszDirector>(std::get<Cell>(row.sample).director).voltage_v.index];
+  };
+  EXPECT_EQ(a.values[3], 8);
+  EXPECT_EQ(voltage(a.rows[3]), 3);
+  EXPECT_EQ(voltage(b.rows[1]), 1.5);
+  EXPECT_EQ(theta[a.rows[2].microscope.wavelength_nm.index], 500);
+  EXPECT_EQ(theta[b.rows[0].microscope.wavelength_nm.index], 600);
+  EXPECT_EQ(b.noise->read_counts, 0.5);
+  EXPECT_GT(a.noise->read_counts, 0);
+  // The first table has the shared gain, the second its own.
+  EXPECT_NE(a.gain.index, b.gain.index);
+  for (const Readings* table : {&a, &b}) EXPECT_EQ(config.job.parameters[table->gain].lower, 0);
+  // Without images: the scene of the first row.
+  EXPECT_EQ(load(kSignal).scene.view.width, 1);
+}
+
+TEST_F(ConfigSignal, SaysWhereASignalIsWrong) {
+  write("a.csv", "volts,out\n0.5,1\n-1,2\n2,4\n");
+  write("b.csv", "volts,aut\n0.5,1\n1,2\n1.5,3\n");
+  EXPECT_EQ(mistakes(kSignal, ConfigUse::fit),
+            "config.yaml:4:12: b.csv has no column out; did you mean aut?\n"
+            "a.csv:3:1: volts = -1 is outside [0, 100000], the range of sample.cell.director.freedericksz.voltage_v");
+  EXPECT_NE(mistakes(replaced(kSignal, "voltage_v: volts", "voltage: volts"), ConfigUse::fit).find("did you mean"),
+            std::string::npos);
+  EXPECT_NE(mistakes("micrograph: {roi_px: [0, 0, 3, 3]}\n" + kSignal, ConfigUse::fit)
+                .find("1:22: micrograph.roi_px is of images"),
+            std::string::npos);
+  EXPECT_NE(mistakes("image_size_px: [3, 3]\n" + kSignal, ConfigUse::fit).find("image_size_px is given beside signal"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kSignal, "columns: {sample.cell.director.freedericksz.voltage_v: volts}, set", "set"),
+                     ConfigUse::fit)
+                .find("columns"),
+            std::string::npos);
+}
+
+const std::string kBirefringence = R"(signal:
+  file: a.csv
+  value: dn
+  quantity: birefringence
+  columns: {sample.material.temperature_k: {column: celsius, scale: 1, plus: 273.15}}
+  where: {kind: nematic, celsius: [0, 50]}
+sample:
+  cell: {thickness_um: 10, director: {uniform: {azimuth_deg: 0}}}
+  material:
+    {ordinary: 1.5, birefringence: {value: 0.1, fit: [0, 0.3]}, temperature_k: 300,
+     haller: {reference_k: 298, clearing_k: 330, exponent: 0.2}}
+microscope: {light: {wavelength_nm: 550}}
+)";
+
+// The radii of a table's rings are one measurement, which tells what is expected of a fit as a picture does.
+TEST(RingTable, IsReadingsOfOneSceneWithAnOutlook) {
+  const birefit::Config config = load_config(BIREFIT_SOURCE_DIR "/fit_configs/linbo3_rings.yaml", ConfigUse::plan);
+  ASSERT_EQ(config.job.measurements.size(), 1u);
+  const Readings& rings = readings(config.job, 0);
+  EXPECT_EQ(rings.observable.quantity, Quantity::ring_radius_cm);
+  EXPECT_EQ(rings.rows.size(), 1u);
+  ASSERT_EQ(static_cast<std::size_t>(rings.values.size()), rings.observable.ring_numbers.size());
+  // rings grow outwards
+  for (Eigen::Index i = 1; i < rings.values.size(); ++i) EXPECT_GT(rings.values[i], rings.values[i - 1]);
+  for (const ParameterEstimate& expected : outlook(config.job).parameters) {
+    EXPECT_TRUE(std::isfinite(expected.stderr_)) << expected.name;
+    EXPECT_GT(expected.stderr_, 0) << expected.name;
+  }
+  EXPECT_THROW(next_shots(config.job, "birefringence"), UserError);
+}
+
+// No polarizer, no gain: the table has the birefringence itself. Rows of other kinds, texts and all, are left alone.
+TEST_F(ConfigSignal, TakesTheRowsAndUnitsThatASignalAsksFor) {
+  write("a.csv",
+        "kind,celsius,dn,remark\nnematic,20,0.1,ok\nisotropic,58,0,clear\nnematic,30,0.09,\nnematic,40.5,0.08,"
+        "\nnematic,52,0.01,late\nother,none,x,\n");
+  const auto config = load(kBirefringence, ConfigUse::fit);
+  ASSERT_EQ(config.job.measurements.size(), 1u);
+  EXPECT_EQ(config.signals[0].line, (std::vector<int>{2, 4, 5}));
+  const Theta theta = config.job.parameters.values();
+  const Readings& table = readings(config.job, 0);
+  ASSERT_EQ(table.rows.size(), 3u);
+  const Scene& last = table.rows[2];
+  EXPECT_EQ(theta[static_cast<std::size_t>(std::get<LawIndices>(last.material).temperature_k.index)], 313.65);
+  EXPECT_EQ(table.observable.quantity, Quantity::birefringence);
+  EXPECT_FALSE(config.job.parameters[table.gain].free);
+  EXPECT_EQ(config.job.parameters[table.gain].value, 1);
+  EXPECT_EQ(config.job.parameters[table.offset].value, 0);
+
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "sort: nematic"), ConfigUse::fit)
+                .find("a.csv has no column sort"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "kind: nematic", "kind: smectic"), ConfigUse::fit)
+                .find("fewer than three rows that `where` lets through"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "[0, 50]", "[50, 0]"), ConfigUse::fit).find("range [low, high]"),
+            std::string::npos);
+  // Without `kind`: the last row has no temperature, which `where` asks for.
+  const auto all = load(replaced(kBirefringence, "kind: nematic, ", ""), ConfigUse::fit);
+  EXPECT_EQ(all.signals[0].line, (std::vector<int>{2, 4, 5}));
+  EXPECT_NE(all.job.warnings[0].find("a.csv: 1 row without a number left out (line 7)"), std::string::npos);
+  write("a.csv", "kind,celsius,dn\nnematic,20,0.1\nnematic,30,1.2.3\nnematic,40,0.08\nnematic,45,0.07\n");
+  EXPECT_NE(mistakes(kBirefringence, ConfigUse::fit).find("a.csv:3:12: dn = 1.2.3 is not a finite number"),
+            std::string::npos);
+  write("a.csv", "kind;celsius;dn\n;K;\nnematic;20,5;0,1\nnematic;30;0,09\nnematic;40;0,08\n");
+  EXPECT_EQ(load(kBirefringence, ConfigUse::fit).signals[0].line, (std::vector<int>{3, 4, 5}));
+  write("a.csv", "kind;celsius;dn\n;C;\nnematic;20,5;0,1\nnematic;30;0,09\nnematic;40;0,08\n");
+  EXPECT_NE(mistakes(replaced(kBirefringence, ", scale: 1, plus: 273.15", ""), ConfigUse::fit)
+                .find("celsius is in C by the table's line of units, sample.material.temperature_k in K"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "quantity: birefringence", "quantity: retardance"), ConfigUse::fit)
+                .find("retardance_um"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "uniform: {azimuth_deg: 0}",
+                              "twisted: {twist_deg: 90, azimuth_deg: 0, pretilt_deg: 0}"),
+                     ConfigUse::fit)
+                .find("turns about the light"),
+            std::string::npos);
+  EXPECT_NE(mistakes(replaced(kBirefringence, "  quantity: birefringence\n", ""), ConfigUse::fit).find("polarizer_deg"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace birefit
