@@ -142,12 +142,16 @@ struct StatedNumber {
   /// Standard deviations by which pictures want it elsewhere.
   double away() const { return fitted && known_to > 0 ? (value - stated) / known_to : 0; }
 };
-/// A departure of the picture from the model that was fitted since something was left over: blur, a camera that is not
-/// linear, uneven light. In units of the gain.
+/// A departure of the picture from the model that was fitted since something was left over (docs/methods.md, "Nearly
+/// the model"). Light and background: shares of the gain at the picture's edge; blur: variance (px^2), < 0: sharpened;
+/// gamma: light to the power of 1 + gamma; curve: light times 1 + curve (light / brightest - 1); stretch: share by
+/// which the picture is wider, and as much lower (or longer along the diagonal from its upper left, as much narrower
+/// across).
 struct Departure {
   std::string name, unit;
+  std::string words;  ///< how a picture looks that has it: "light that grows to the right by"
   double value = 0, stderr_ = 0;
-  double expected = 0;  ///< standard deviation among pictures that are nearly the model
+  double usual = 0;  ///< standard deviation among pictures that are nearly the model
 };
 /// Beyond so many standard deviations pictures contradict what was stated.
 inline constexpr double kContradicted = 3;

@@ -43,7 +43,7 @@ struct PictureEffect {
     gamma,             ///< light to the power of 1 + gamma, of the brightest
     curve,             ///< light times 1 + curve (light / brightest - 1)
     stretch_x,         ///< about the centre, wider by it and as much lower
-    stretch_diagonal,  ///< the same along the diagonals
+    stretch_diagonal,  ///< the same, longer along the diagonal from the upper left
     growth,            ///< about the centre, wider and higher by it
   };
   ParameterRef coefficient;

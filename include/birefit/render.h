@@ -76,7 +76,7 @@ std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Th
 double ripple_period(const Scene& scene, const Demand& demand, const Theta& theta, int index);
 
 /// Largest change of retardance phase (rad) anywhere in the image per unit of theta[index]; 0 when the parameter forms
-/// no fringes. The coarse scan steps by less than a radian of it.
+/// no fringes. The coarse scan steps by less than a radian of it. Of `demand` only the memo is used.
 double fringe_phase_per_unit(const Scene& scene, const Demand& demand, const Theta& theta, int index);
 
 }  // namespace birefit

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "birefit/io.h"
+#include "birefit/memo.h"
 #include "core/printable.h"
 #include "io/config_disc.h"
 #include "io/config_fit.h"
@@ -431,6 +432,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     }
   }
   config.job.demand = reader.demand;
+  config.job.demand.memo = std::make_shared<Memo>();
   config.job.parameters = std::move(reader.table);
   config.job.warnings = std::move(reader.warnings);
   config.job.misfit = std::move(reader.misfit);

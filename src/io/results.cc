@@ -65,7 +65,7 @@ Json departures_json(const FitResult& result) {
                     {"unit", d.unit},
                     {"value", number(d.value)},
                     {"stderr", number(d.stderr_)},
-                    {"usual", number(d.expected)}});
+                    {"usual", number(d.usual)}});
   return list;
 }
 

@@ -12,42 +12,55 @@ namespace {
 
 const std::string kPrefix = "departure.";
 
-/// Beside a picture's gain: what it is called, the unit, and the standard deviation that it has among pictures.
+/// Beside a picture's gain: what it is called, the unit, the standard deviation that it has among pictures, and how a
+/// picture looks that has so much of it.
 struct Kind {
   const char* name;
   const char* unit;
   double sd;
+  const char* words;
 };
-constexpr Kind kBlur{"blur", "px^2", 0.15};
-constexpr Kind kGamma{"gamma", "", 0.03};
-constexpr Kind kCurve{"curve", "", 0.03};
-constexpr Kind kStretchX{"stretch_x", "", 0.003};
-constexpr Kind kStretchDiagonal{"stretch_diagonal", "", 0.003};
 struct Uneven {
   Kind kind;
   UnevenLight::Shape shape;
   bool of_intensity;
 };
-constexpr Uneven kUneven[] = {{{"light_x", "", 0.02}, UnevenLight::Shape::x, true},
-                              {{"light_y", "", 0.02}, UnevenLight::Shape::y, true},
-                              {{"light_square", "", 0.02}, UnevenLight::Shape::square, true},
-                              {{"background_x", "", 0.01}, UnevenLight::Shape::x, false},
-                              {{"background_y", "", 0.01}, UnevenLight::Shape::y, false},
-                              {{"background_square", "", 0.01}, UnevenLight::Shape::square, false}};
+constexpr Uneven kUneven[] = {
+    {{"light_x", "", 0.02, "light that grows to the right by"}, UnevenLight::Shape::x, true},
+    {{"light_y", "", 0.02, "light that grows upwards by"}, UnevenLight::Shape::y, true},
+    {{"light_square", "", 0.02, "light that grows outwards by"}, UnevenLight::Shape::square, true},
+    {{"background_x", "", 0.01, "a background that grows to the right by"}, UnevenLight::Shape::x, false},
+    {{"background_y", "", 0.01, "a background that grows upwards by"}, UnevenLight::Shape::y, false},
+    {{"background_square", "", 0.01, "a background that grows outwards by"}, UnevenLight::Shape::square, false}};
+struct Effect {
+  Kind kind;
+  PictureEffect::Kind effect;
+};
+constexpr Effect kEffects[] = {
+    {{"blur", "px^2", 0.15, "a blur whose variance is"}, PictureEffect::Kind::blur},
+    {{"gamma", "", 0.03, "a camera's gamma off by"}, PictureEffect::Kind::gamma},
+    {{"curve", "", 0.03, "a camera's curve bent by"}, PictureEffect::Kind::curve},
+    {{"stretch_x", "", 0.003, "all of it wider, and as much lower, by"}, PictureEffect::Kind::stretch_x},
+    {{"stretch_diagonal", "", 0.003, "all of it stretched along its falling diagonal by"},
+     PictureEffect::Kind::stretch_diagonal}};
+
+const char* words_of(const std::string& name) {
+  for (const Uneven& one : kUneven)
+    if (name == one.kind.name) return one.kind.words;
+  for (const Effect& one : kEffects)
+    if (name == one.kind.name) return one.kind.words;
+  return "";
+}
 
 }  // namespace
 
-bool asks_catalogue(const Task& task, const Optimum& optimum) {
+bool asks_catalogue(const Task& task, Optimum& optimum) {
   // What misses more of the contrast is not nearly the picture's model: other physics, another director.
   constexpr double kNearly = 0.02;
   if (optimum.stopped || task.frames() != 1 || !task.picture(0).effects.empty()) return false;
-  const LeastSquares& problem = *optimum.problem;
-  const Eigen::ArrayXd sigma = problem.pixels(0).sigma.array(),
-                       residual = problem.noise_whitened_residual(0).array() * sigma;
-  const auto [low, high] = problem.intensity_range(0);
-  const double contrast = std::abs(task.gain_of(0, optimum.theta)) * (high - low),
-               missed = std::sqrt(std::max(0.0, (residual.square() - sigma.square()).mean()));
-  return missed < kNearly * contrast && leaves_discrepancy(task, optimum);
+  if (!(missed_of_contrast(task, optimum) < kNearly)) return false;
+  optimum.explained = !leaves_discrepancy(task, optimum);
+  return !optimum.explained;
 }
 
 FitJob with_catalogue(const Task& task, const Optimum& optimum) {
@@ -68,13 +81,7 @@ FitJob with_catalogue(const Task& task, const Optimum& optimum) {
     });
     if (!fitted) picture.uneven.push_back({term(one.kind), one.shape, one.of_intensity, true});
   }
-  using Effect = PictureEffect::Kind;
-  for (const auto& [kind, effect] : {std::pair(kBlur, Effect::blur),
-                                     {kGamma, Effect::gamma},
-                                     {kCurve, Effect::curve},
-                                     {kStretchX, Effect::stretch_x},
-                                     {kStretchDiagonal, Effect::stretch_diagonal}})
-    picture.effects.push_back({term(kind), effect});
+  for (const Effect& one : kEffects) picture.effects.push_back({term(one.kind), one.effect});
   return wider;
 }
 
@@ -87,12 +94,8 @@ Eigen::VectorXd shift_by_aspect(const Task& task, const Optimum& optimum, const 
       stretch = std::hypot(stretch, optimum.theta[static_cast<std::size_t>(effect.coefficient.index)] / gain);
   if (!(gain > 0) || !(stretch > 0)) return {};
   const PixelSet& set = optimum.problem->pixels(0);
-  const View& view = picture.scene.view;
-  KnownLight known(view.width, view.height);
-  known.center_x = view.center_x_px.in(optimum.theta), known.center_y = view.center_y_px.in(optimum.theta);
   const Eigen::VectorXd& light = optimum.problem->intensity();
-  for (std::size_t i = 0; i < set.pixels.size(); ++i)
-    known.set(set.pixels[i][0], set.pixels[i][1], light[static_cast<Eigen::Index>(i)]);
+  const KnownLight known(picture.scene.view, optimum.theta, set.pixels, light);
   Eigen::VectorXd change(light.size());
   for (std::size_t i = 0; i < set.pixels.size(); ++i)
     change[static_cast<Eigen::Index>(i)] =
@@ -104,9 +107,11 @@ std::vector<Departure> departures_of(const Task& task, const FitResult& result) 
   std::vector<Departure> departures;
   const double gain = std::abs(task.gain_of(0, result.theta));
   for (const ParameterEstimate& estimate : result.parameters)
-    if (estimate.name.starts_with(kPrefix) && estimate.prior_sd && gain > 0)
-      departures.push_back({estimate.name.substr(kPrefix.size()), estimate.unit, estimate.value / gain,
-                            estimate.stderr_ / gain, *estimate.prior_sd / gain});
+    if (estimate.name.starts_with(kPrefix) && estimate.prior_sd && gain > 0) {
+      const std::string name = estimate.name.substr(kPrefix.size());
+      departures.push_back({name, estimate.unit, words_of(name), estimate.value / gain, estimate.stderr_ / gain,
+                            *estimate.prior_sd / gain});
+    }
   return departures;
 }
 

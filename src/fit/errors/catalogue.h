@@ -6,8 +6,10 @@
 
 namespace birefit::estimation {
 
-/// Whether noise does not explain what a fit of one picture of a sphere leaves over, so that the catalogue is asked.
-bool asks_catalogue(const Task& task, const Optimum& optimum);
+/// Whether noise does not explain what a fit of one picture of a sphere leaves over, while the model misses less than a
+/// fiftieth of its contrast: then the catalogue is asked. Where noise does explain it, the optimum says so from then
+/// on.
+bool asks_catalogue(const Task& task, Optimum& optimum);
 
 /// The job with a nuisance for each: light and background that are uneven, the blur of lenses and resampling, a camera
 /// that is not linear, pixels out of square, each with a prior of the size that such departures have (docs/methods.md,

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "fit/errors/discrepancy.h"
 #include "fit/errors/report.h"
 #include "fit/errors/verdict.h"
 #include "fit/problem/constant.h"
@@ -25,18 +26,13 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
 
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {
   constexpr double kMostOfContrast = 0.03, kMostOfValue = 0.1, kMostOfBounds = 0.25;
-  const LeastSquares& problem = *optimum.problem;
-  const PixelSet& set = problem.pixels(0);
-  const Eigen::ArrayXd sigma = set.sigma.array(), residual = problem.noise_whitened_residual(0).array() * sigma;
-  const auto [low, high] = problem.intensity_range(0);
-  const double contrast = std::abs(task.gain_of(0, optimum.theta)) * (high - low),
-               missed = std::sqrt(std::max(0.0, (residual.square() - sigma.square()).mean()));
-  if (missed > kMostOfContrast * contrast) {
+  const double missed = missed_of_contrast(task, optimum);
+  if (missed > kMostOfContrast) {
     result.described = false;
     return fmt::format(
         "Not described: the model misses {:.2g} % of the image's contrast, where 3 % is the most that its "
         "values could be trusted with.",
-        100 * missed / contrast);
+        100 * missed);
   }
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
     if (task.job.parameters[task.unknowns.table_index(static_cast<int>(j))].nuisance) continue;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fit/errors/statistics.h"
+#include "fit/problem/effects.h"
 #include "samples/kind.h"
 #include "scene/values.h"
 
@@ -38,10 +39,9 @@ class Patterns {
   int count() const { return static_cast<int>(group_.size()); }
   int groups() const { return groups_; }
   int group(int pattern) const { return group_[static_cast<std::size_t>(pattern)]; }
-  /// `light`: the model's, from 0 to 1 over the picture; how it changes where the picture is stretched by 1 along x and
-  /// along the diagonal, as much shrunk across, and where it grows; its Laplacian.
+  /// `light`: the model's, from 0 to 1 over the picture, and how it changes by these effects.
   struct Light {
-    double value, stretched_along_x, stretched_along_diagonal, grown, laplacian;
+    double value, stretched_along_x, stretched_along_diagonal, grown, blurred;
   };
   void of(const Place& at, const Light& light, Eigen::Ref<Eigen::VectorXd> out) const {
     int k = 0;
@@ -66,7 +66,7 @@ class Patterns {
     for (int order = 0; order < 6; ++order) ring(order, c2), ring(order, 2 * s2 * c2), ring(order, c2 * s2 * s2);
     // Out of round, or pixels out of square: then its size is uncertain by as much, which itself leaves no trace.
     out[k++] = light.stretched_along_x, out[k++] = light.stretched_along_diagonal, out[k++] = light.grown;
-    out[k++] = light.laplacian;  // blurred or sharpened
+    out[k++] = light.blurred;  // blurred or sharpened
   }
 
  private:
@@ -86,37 +86,17 @@ struct Sums {
   std::vector<Part> sectors, rings;
 };
 
-/// The model's light over the picture, from 0 to 1, and its differences; 0 where a neighbour is not used.
-class ModelLight {
- public:
-  ModelLight(const LeastSquares& problem, const View& view, double center_x, double center_y)
-      : light_(view.width, view.height), used_(view.width, view.height), center_x_(center_x), center_y_(center_y) {
-    const std::array<double, 2> range = problem.intensity_range(0);
-    const double contrast = std::max(range[1] - range[0], 1e-300);
-    const PixelSet& set = problem.pixels(0);
-    for (std::size_t i = 0; i < set.pixels.size(); ++i) {
-      const auto [x, y] = set.pixels[i];
-      light_(x, y) = (problem.intensity()[static_cast<Eigen::Index>(i)] - range[0]) / contrast;
-      used_(x, y) = 1;
-    }
-  }
-  Patterns::Light at(int x, int y) const {
-    Patterns::Light light{light_(x, y), 0, 0, 0, 0};
-    if (x < 1 || y < 1 || x + 1 >= light_.width() || y + 1 >= light_.height()) return light;
-    if (!used_(x - 1, y) || !used_(x + 1, y) || !used_(x, y - 1) || !used_(x, y + 1)) return light;
-    const double by_x = 0.5 * (light_(x + 1, y) - light_(x - 1, y)), by_y = 0.5 * (light_(x, y + 1) - light_(x, y - 1)),
-                 dx = x - center_x_, dy = y - center_y_;
-    light.stretched_along_x = dx * by_x - dy * by_y, light.stretched_along_diagonal = dx * by_y + dy * by_x;
-    light.grown = dx * by_x + dy * by_y;
-    light.laplacian = light_(x + 1, y) + light_(x - 1, y) + light_(x, y + 1) + light_(x, y - 1) - 4 * light_(x, y);
-    return light;
-  }
-
- private:
-  Image light_;
-  Mask used_;
-  double center_x_, center_y_;
-};
+/// The model's light over the picture, from 0 to 1.
+KnownLight light_of(const LeastSquares& problem, const View& view, const Theta& theta) {
+  const std::array<double, 2> range = problem.intensity_range(0);
+  const double contrast = std::max(range[1] - range[0], 1e-300);
+  return {view, theta, problem.pixels(0).pixels, (problem.intensity().array() - range[0]).matrix() / contrast};
+}
+Patterns::Light patterns_light(const KnownLight& light, int x, int y) {
+  using Kind = PictureEffect::Kind;
+  return {light.light(x, y), effect_at(Kind::stretch_x, light, x, y), effect_at(Kind::stretch_diagonal, light, x, y),
+          effect_at(Kind::growth, light, x, y), effect_at(Kind::blur, light, x, y)};
+}
 
 /// Over every stride-th pixel.
 Sums sums_of(const Task& task, const Optimum& optimum, const Patterns& patterns, Eigen::Index stride) {
@@ -128,7 +108,7 @@ Sums sums_of(const Task& task, const Optimum& optimum, const Patterns& patterns,
                radius_px = 0.5 * value(traits_of(scene).sphere_diameter_um) / value(scene.view.pixel_size_um),
                from = value.radians(scene.microscope.polarizer_deg),
                half_side = 0.5 * std::max(scene.view.width, scene.view.height);
-  const ModelLight light(problem, scene.view, center_x, center_y);
+  const KnownLight light = light_of(problem, scene.view, optimum.theta);
   const Eigen::Index n = task.unknowns.size(), m = patterns.count();
   const Sums::Part none{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
   Sums sums{Eigen::MatrixXd::Zero(n, n),
@@ -156,7 +136,7 @@ Sums sums_of(const Task& task, const Optimum& optimum, const Patterns& patterns,
       const double dx = x - center_x, dy = center_y - y;
       const Place place{(x + 0.5) / half_side - 1, (y + 0.5) / half_side - 1, std::hypot(dx, dy) / radius_px,
                         std::atan2(dy, dx) - from};
-      patterns.of(place, light.at(x, y), pattern);
+      patterns.of(place, patterns_light(light, x, y), pattern);
       columns.row(i) = pattern.transpose() / set.sigma[pixel];
       const double turn = place.azimuth / (2 * kPi);
       // Eleven rings to just beyond the rim, and all that is outside.
@@ -272,12 +252,21 @@ std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
   Inverse inverse = invert_normal_equations(Eigen::MatrixXd(information.llt().matrixU()));
   if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return std::nullopt;
   Discrepancy found = by_patterns(patterns, sums, inverse.covariance);
-  constexpr double kEvidence = 15;  // clean pictures stay below it (NoDiscrepancyIsSeenInCleanPictures)
+  constexpr double kEvidence = 15;  // clean pictures stay below it (NoDepartureIsAskedForInCleanPictures)
   if (!(chi_square / pixels > 1 + 3 * std::sqrt(2 / pixels)) && !(found.evidence > kEvidence)) return std::nullopt;
   return LeftOver{std::move(sums), std::move(information), std::move(inverse), std::move(found), pixels};
 }
 
 }  // namespace
+
+double missed_of_contrast(const Task& task, const Optimum& optimum) {
+  const LeastSquares& problem = *optimum.problem;
+  const Eigen::ArrayXd sigma = problem.pixels(0).sigma.array(),
+                       residual = problem.noise_whitened_residual(0).array() * sigma;
+  const auto [low, high] = problem.intensity_range(0);
+  const double missed = std::sqrt(std::max(0.0, (residual.square() - sigma.square()).mean()));
+  return missed / std::max(std::abs(task.gain_of(0, optimum.theta)) * (high - low), 1e-300);
+}
 
 bool leaves_discrepancy(const Task& task, const Optimum& optimum) { return left_over(task, optimum).has_value(); }
 

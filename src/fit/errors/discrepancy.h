@@ -20,4 +20,7 @@ Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum);
 /// Whether it is not empty.
 bool leaves_discrepancy(const Task& task, const Optimum& optimum);
 
+/// What the model of the first picture misses beyond its noise, as RMS over the range of the model's light.
+double missed_of_contrast(const Task& task, const Optimum& optimum);
+
 }  // namespace birefit::estimation

@@ -144,23 +144,23 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
 }
 
 void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances) {
-  if (optimum.came_from) {
-    // What the fit without the catalogue would have answered: no explanation is sure enough to make it impossible.
-    Eigen::VectorXd step = Eigen::VectorXd::Zero(task.unknowns.size());
-    for (int j = 0; j < task.unknowns.size(); ++j)
-      if (const auto index = static_cast<std::size_t>(task.unknowns.table_index(j));
-          index < optimum.came_from->size() && !task.job.parameters[task.unknowns.table_index(j)].nuisance)
-        step[j] = optimum.theta[index] - (*optimum.came_from)[index];
-    covariances.with_misfit.covariance += step * step.transpose();
-    const Eigen::VectorXd aspect = shift_by_aspect(task, optimum, covariances.of_noise.covariance);
-    if (aspect.size() > 0) covariances.with_misfit.covariance += aspect * aspect.transpose();
-  }
-  const Eigen::VectorXd sd = sd_of_discrepancy(task, optimum);
-  if (sd.size() == 0) return;
-  covariances.by_discrepancy = sd;
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
-  const Eigen::VectorXd wider = sd.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMax(1);
-  covariance = wider.asDiagonal() * covariance * wider.asDiagonal();
+  if (!optimum.explained) covariances.by_discrepancy = sd_of_discrepancy(task, optimum);
+  if (covariances.discrepancy()) {
+    const Eigen::VectorXd wider =
+        covariances.by_discrepancy.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMax(1);
+    covariance = wider.asDiagonal() * covariance * wider.asDiagonal();
+  }
+  if (!optimum.came_from) return;
+  // What the fit without the catalogue would have answered: no explanation is sure enough to make it impossible.
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(task.unknowns.size());
+  for (int j = 0; j < task.unknowns.size(); ++j)
+    if (const auto index = static_cast<std::size_t>(task.unknowns.table_index(j));
+        index < optimum.came_from->size() && !task.job.parameters[task.unknowns.table_index(j)].nuisance)
+      step[j] = optimum.theta[index] - (*optimum.came_from)[index];
+  covariance += step * step.transpose();
+  const Eigen::VectorXd aspect = shift_by_aspect(task, optimum, covariances.of_noise.covariance);
+  if (aspect.size() > 0) covariance += aspect * aspect.transpose();
 }
 
 void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covariances) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include <fmt/format.h>
 
@@ -20,23 +19,6 @@ void add_effect(const Parameter& of, double value, double known_to, const Eigen:
   const Eigen::VectorXd shift = effect.step * shift_per_unit;
   effect.shift.assign(shift.begin(), shift.end());
   if (effect.step > 0) result.inputs.push_back(std::move(effect));
-}
-
-std::string departure_words(const std::string& name) {
-  static const std::map<std::string, std::string> words{
-      {"blur", "a blur (variance) of"},
-      {"gamma", "a camera's gamma off by"},
-      {"curve", "a camera's curve bent by"},
-      {"stretch_x", "pixels wider than high by"},
-      {"stretch_diagonal", "a picture stretched along its diagonal by"},
-      {"light_x", "light that grows to the right by"},
-      {"light_y", "light that grows upwards by"},
-      {"light_square", "light that grows outwards by"},
-      {"background_x", "a background that grows to the right by"},
-      {"background_y", "a background that grows upwards by"},
-      {"background_square", "a background that grows outwards by"}};
-  const auto found = words.find(name);
-  return found == words.end() ? name : found->second;
 }
 
 /// The estimate of an unknown once nuisances have left; null of those.
@@ -164,10 +146,10 @@ void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& c
           number.name, with_error(number.value, number.stderr_), number.unit.empty() ? "" : " " + number.unit,
           std::abs(number.away()), number.stated));
   for (const Departure& d : result.departures)
-    if (std::abs(d.value) > kContradicted * d.expected && std::abs(d.value) > kContradicted * d.stderr_)
+    if (std::abs(d.value) > kContradicted * d.usual && std::abs(d.value) > kContradicted * d.stderr_)
       result.misfit.push_back(fmt::format("the picture looks like one with {} {:.2g}{}, {:.2g} times what is usual",
-                                          departure_words(d.name), d.value, d.unit.empty() ? "" : " " + d.unit,
-                                          std::abs(d.value) / d.expected));
+                                          d.words, d.value, d.unit.empty() ? "" : " " + d.unit,
+                                          std::abs(d.value) / d.usual));
   // A noise that is estimated a tenth too small is no misfit of the model, nor is a discrepancy that errors hardly
   // feel.
   constexpr double kOfNote = 1.2, kOfVariance = 0.2;

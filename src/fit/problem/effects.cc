@@ -12,6 +12,14 @@ bool has_neighbours(const KnownLight& p, int x, int y) {
 
 }  // namespace
 
+KnownLight::KnownLight(const View& view, const Theta& theta, const std::vector<std::array<int, 2>>& pixels,
+                       const Eigen::Ref<const Eigen::VectorXd>& values)
+    : KnownLight(view.width, view.height) {
+  center_x = view.center_x_px ? view.center_x_px.in(theta) : view.middle_x();
+  center_y = view.center_y_px ? view.center_y_px.in(theta) : view.middle_y();
+  for (std::size_t i = 0; i < pixels.size(); ++i) set(pixels[i][0], pixels[i][1], values[static_cast<Eigen::Index>(i)]);
+}
+
 double effect_at(PictureEffect::Kind kind, const KnownLight& p, int x, int y) {
   const double here = p.light(x, y);
   switch (kind) {

@@ -237,13 +237,7 @@ void LeastSquares::set_effects(Frame& frame, const Eigen::Ref<const Eigen::Vecto
   if (std::none_of(frame.terms.begin(), frame.terms.end(), [](const Term& term) { return term.effect.has_value(); }))
     return;
   const View& view = task_.picture(static_cast<int>(&frame - frames_.data())).scene.view;
-  KnownLight known(view.width, view.height);
-  for (Eigen::Index i = 0; i < frame.count; ++i) {
-    const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(i)];
-    known.set(x, y, intensity[i]);
-  }
-  if (view.center_x_px) known.center_x = view.center_x_px.in(theta_);
-  if (view.center_y_px) known.center_y = view.center_y_px.in(theta_);
+  const KnownLight known(view, theta_, frame.set.pixels, intensity);
   for (Term& term : frame.terms) {
     if (!term.effect) continue;
     term.at_pixels.resize(frame.count);

@@ -1,13 +1,12 @@
 #include "fit/problem/light.h"
 
+#include <array>
+#include <optional>
+#include <vector>
+
 #include "fit/problem/effects.h"
 
 namespace birefit::estimation {
-namespace {
-
-double centre_in(const Theta& theta, ParameterRef ref) { return ref ? ref.in(theta) : 0; }
-
-}  // namespace
 
 double LightTerm::shape_at(const View& view, int column, int row) const {
   if (!shape) return 1;
@@ -38,12 +37,11 @@ std::vector<LightTerm> light_terms(const Picture& micrograph) {
 Image lit(const Picture& micrograph, const Theta& theta, Image intensity) {
   const std::vector<LightTerm> terms = light_terms(micrograph);
   const View& view = micrograph.scene.view;
-  KnownLight known(micrograph.effects.empty() ? 0 : intensity.width(),
-                   micrograph.effects.empty() ? 0 : intensity.height());
+  std::optional<KnownLight> known;
   if (!micrograph.effects.empty()) {
-    known.center_x = centre_in(theta, view.center_x_px), known.center_y = centre_in(theta, view.center_y_px);
+    known.emplace(view, theta, std::vector<std::array<int, 2>>{}, Eigen::VectorXd{});
     for (int y = 0; y < intensity.height(); ++y)
-      for (int x = 0; x < intensity.width(); ++x) known.set(x, y, intensity(x, y));
+      for (int x = 0; x < intensity.width(); ++x) known->set(x, y, intensity(x, y));
   }
   for (int y = 0; y < intensity.height(); ++y)
     for (int x = 0; x < intensity.width(); ++x) {
@@ -51,7 +49,7 @@ Image lit(const Picture& micrograph, const Theta& theta, Image intensity) {
       for (const LightTerm& term : terms)
         (term.of_intensity ? gain : offset) +=
             term.coefficient_in(theta) *
-            (term.effect ? effect_at(*term.effect, known, x, y) : term.shape_at(view, x, y));
+            (term.effect ? effect_at(*term.effect, *known, x, y) : term.shape_at(view, x, y));
       intensity(x, y) = gain * intensity(x, y) + offset;
     }
   return intensity;

@@ -43,6 +43,7 @@ void solve_again(const Task& task, Optimum& optimum, const std::string& label) {
   optimum.converged = summary.converged && !optimum.stopped;
   optimum.solver_report = summary.report;
   optimum.theta = optimum.problem->theta();
+  optimum.explained = false;
 }
 
 void rebuild(const Task& task, Optimum& optimum) {

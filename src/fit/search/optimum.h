@@ -29,6 +29,7 @@ struct Optimum {
   std::optional<Eigen::VectorXd> better;  ///< a lower place that was met after all
   std::vector<Outliers> left_out;         ///< of each micrograph
   MisfitFound misfit;
+  bool explained = false;          ///< looked at, and noise explains all that is left over here
   std::optional<Theta> came_from;  ///< the optimum without the catalogue of departures, where that was asked
 
   double per_pixel = 1;  ///< objective of the last solution over its pixels

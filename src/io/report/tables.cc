@@ -198,7 +198,7 @@ std::string departures_table(const FitResult& result) {
   for (const Departure& d : result.departures)
     rows += fmt::format("<tr><td class=\"name\">{}</td><td>{} \u00b1 {} {}</td><td>{}</td></tr>\n", escape_html(d.name),
                         html_number(fmt::format("{:.2g}", d.value)), html_number(fmt::format("{:.2g}", d.stderr_)),
-                        escape_html(d.unit), html_number(fmt::format("{:.2g}", d.expected)));
+                        escape_html(d.unit), html_number(fmt::format("{:.2g}", d.usual)));
   if (rows.empty()) return {};
   return "<h2>How the picture departs from the model</h2>\n<p>Noise did not explain what the model left over: what "
          "pictures usually depart by was fitted along, all at once, in units of the gain. None of it is proven; the "
