@@ -143,6 +143,37 @@ TEST(Equilibrium, TwistedNematicProfilesAgree) {
   }
 }
 
+// Between faces alike half of a cell is solved for; where they differ by next to nothing all of it.
+TEST(Equilibrium, HalfOfACellTellsTheWhole) {
+  for (const bool twisted : {false, true})
+    for (const double v : {0.9, 1.3, 4.0}) {
+      const CellForces<double> same = twisted ? twisted_e7(v) : e7(v, 2);
+      CellForces<double> nearly = same;
+      nearly.tilt_exit += 1e-15;
+      const DirectorSolution half = solve_director(same), whole = solve_director(nearly);
+      ASSERT_EQ(half.tilt.size(), whole.tilt.size());
+      ASSERT_EQ(half.azimuth.size(), whole.azimuth.size());
+      const auto tangents_of = [](const CellForces<double>& p, const DirectorSolution& s) {
+        CellForces<Dual<double, 1>> d{p.k33,        p.k22,       p.gamma, p.drive,  p.chirality,
+                                      p.tilt_entry, p.tilt_exit, p.twist, p.twisted};
+        d.drive.d[0] = 1, d.tilt_entry.d[0] = d.tilt_exit.d[0] = 0.3, d.twist.d[0] = 0.2;
+        std::pair<std::vector<std::array<double, 1>>, std::vector<std::array<double, 1>>> slopes;
+        director_tangents<1>(d, cell_mesh(), s, slopes.first, slopes.second);
+        return slopes;
+      };
+      const auto of_half = tangents_of(same, half), of_whole = tangents_of(nearly, whole);
+      // Steps end at 1e-11, and slopes are theirs over the weakest restoring force, a few per cent.
+      for (std::size_t i = 0; i < half.tilt.size(); ++i) {
+        EXPECT_NEAR(half.tilt[i], whole.tilt[i], 1e-10) << v;
+        EXPECT_NEAR(of_half.first[i][0], of_whole.first[i][0], 1e-8) << v;
+      }
+      for (std::size_t i = 0; i < half.azimuth.size(); ++i) {
+        EXPECT_NEAR(half.azimuth[i], whole.azimuth[i], 1e-9) << v;
+        EXPECT_NEAR(of_half.second[i][0], of_whole.second[i][0], 1e-7) << v;
+      }
+    }
+}
+
 TEST(Equilibrium, HybridCellsAgree) {
   const ReferenceTable table(data_path("physics/han.csv"));
   for (std::size_t row = 0; row < table.size(); ++row) {

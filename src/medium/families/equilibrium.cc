@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-
-#include <Eigen/Dense>
+#include <optional>
+#include <utility>
 
 #include "birefit/error.h"
 #include "birefit/memo.h"
@@ -169,6 +169,12 @@ class SymmetricBand {
       for (int j = std::max(0, i - width_); j < i; ++j) b[static_cast<std::size_t>(j)] -= (*this)(i, j) * x;
     }
   }
+  /// Takes an unknown out: a row and column of the identity.
+  void fix(int i) {
+    for (int j = std::max(0, i - width_); j < i; ++j) (*this)(i, j) = 0;
+    for (int j = i + 1; j < std::min(size_, i + width_ + 1); ++j) (*this)(j, i) = 0;
+    (*this)(i, i) = 1;
+  }
   void add_to_diagonal(double x) {
     for (int i = 0; i < size_; ++i) (*this)(i, i) += x;
   }
@@ -184,21 +190,21 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-/// Energy, gradient by the inner nodes' unknowns (tilt, or tilt and azimuth in turn) and pull = dQ/d(unknowns).
+/// Energy, gradient by the free nodes' unknowns (tilt, or tilt and azimuth in turn) and pull = dQ/d(unknowns).
 template <class R>
 struct Slopes {
   R energy = R(0.0), q = R(0.0);
   std::vector<R> gradient, pull;
 };
 
-/// The part of one element in the Hessian by the inner nodes' unknowns.
+/// The part of one element in the Hessian by the free nodes' unknowns.
 template <bool kTwisted>
 void add_element(const DirectorMesh& mesh, int e, const Density<double>* points, double electric,
                  SymmetricBand& hessian) {
   constexpr int kMost = 21, kEach = kTwisted ? 2 : 1;  // nodes of an element
   // By (t'_i, t'_j), (f'_i, f'_j), (t_k, t'_j), (t_k, f'_j).
   std::array<double, kMost * kMost> tptp{}, fpfp{}, ttp, tfp;
-  const int n = mesh.degree() + 1, inner = mesh.nodes() - 2, base = e * mesh.degree() - 1;
+  const int n = mesh.degree() + 1, inner = mesh.free_nodes(), base = e * mesh.degree() - 1;
   const double scale = 2 / mesh.width(e);
   const auto at = [](int i, int j) { return static_cast<std::size_t>(i * kMost + j); };
   for (int k = 0; k < n; ++k) {
@@ -236,7 +242,7 @@ template <bool kTwisted, class R>
 Slopes<R> slopes(const CellForces<R>& p, const DirectorMesh& mesh, const std::vector<R>& t, const std::vector<R>& f,
                  SymmetricBand* hessian) {
   constexpr int kEach = kTwisted ? 2 : 1;
-  const int n = mesh.degree() + 1, inner = mesh.nodes() - 2;
+  const int n = mesh.degree() + 1, inner = mesh.free_nodes();
   Slopes<R> r;
   r.gradient.assign(static_cast<std::size_t>(inner * kEach), R(0.0));
   r.pull.assign(r.gradient.size(), R(0.0));
@@ -287,6 +293,11 @@ Slopes<R> slopes(const CellForces<R>& p, const DirectorMesh& mesh, const std::ve
     if constexpr (std::is_same_v<R, double>)
       if (hessian) add_element<kTwisted>(mesh, e, &points[static_cast<std::size_t>(e * n)], electric, *hessian);
   }
+  // In the middle of a mirrored profile the tilt is free, the azimuth half of the twist.
+  if (kTwisted && mesh.is_half()) {
+    r.gradient.back() = R(0.0);
+    if (hessian) hessian->fix(inner * kEach - 1);
+  }
   return r;
 }
 
@@ -323,18 +334,18 @@ DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, st
                        std::vector<double> f) {
   constexpr int kEach = kTwisted ? 2 : 1;
   constexpr int kMostIterations = 200;
-  const int unknowns = (mesh.nodes() - 2) * kEach;
+  const int unknowns = mesh.free_nodes() * kEach;
   DirectorSolution result;
-  double before = 1;
+  double before = 0;
   const auto moved = [&](const std::vector<double>& from, const std::vector<double>& step, double share, int offset) {
     std::vector<double> to = from;
-    for (int i = 0; i < mesh.nodes() - 2; ++i)
+    for (int i = 0; i < mesh.free_nodes(); ++i)
       to[static_cast<std::size_t>(i + 1)] += share * step[static_cast<std::size_t>(i * kEach + offset)];
     return to;
   };
+  SymmetricBand band(unknowns, band_width(mesh, kTwisted));
+  Slopes<double> here = slopes<kTwisted, double>(p, mesh, t, f, &band);
   for (int iteration = 1; iteration <= kMostIterations; ++iteration) {
-    SymmetricBand band(unknowns, band_width(mesh, kTwisted));
-    const Slopes<double> here = slopes<kTwisted, double>(p, mesh, t, f, &band);
     Newton newton(band, here.pull, curvature_by_q(p, here.q));
     // away from the minimum: steepest descent, the more the worse
     for (double shift = 1e-3; !newton.band.factor(); shift *= 10) {
@@ -352,52 +363,82 @@ DirectorSolution solve(const CellForces<double>& p, const DirectorMesh& mesh, st
     // No step turns the director by more than a radian.
     double share = std::min(1.0, 1 / largest);
     result.iterations = iteration;
-    // The last steps are below the rounding of the energy, which can judge them no more.
-    const bool last = largest < 1e-5;
+    result.energy = here.energy;
+    // The last steps are below the rounding of the energy, which can judge them no more. Each is some number times the
+    // one before squared: done where the next one would not show. Near the normal the azimuth is known to rounding over
+    // cos^2 of the tilt: steps that no longer shrink are its last digits.
+    const bool last = largest < 1e-5, first = iteration == 1;
+    const double next = first ? largest : largest * std::min(1.0, std::pow(largest / before, 2));
+    const bool done = last && (largest < 1e-11 || next < 1e-12 || (!first && largest > 0.25 * before));
+    before = largest;
     std::vector<double> next_t = moved(t, step, share, 0), next_f = kTwisted ? moved(f, step, share, 1) : f;
-    for (int halvings = 0; !last && halvings < 60; ++halvings) {
-      if (slopes<kTwisted, double>(p, mesh, next_t, next_f, nullptr).energy <=
-          here.energy + 1e-4 * share * descent + 1e-13 * std::abs(here.energy))
-        break;
+    if (done) {
+      result.tilt = std::move(next_t);
+      result.azimuth = std::move(next_f);
+      return result;
+    }
+    const double energy = here.energy;
+    // Most steps are taken whole: what the next one needs is worked out with the energy that judges this one.
+    band = SymmetricBand(unknowns, band_width(mesh, kTwisted));
+    here = slopes<kTwisted, double>(p, mesh, next_t, next_f, &band);
+    bool halved = false;
+    for (int halvings = 0; !last && halvings < 60; ++halvings, halved = true) {
+      if (here.energy <= energy + 1e-4 * share * descent + 1e-13 * std::abs(energy)) break;
       share *= 0.5;
       next_t = moved(t, step, share, 0);
       if (kTwisted) next_f = moved(f, step, share, 1);
+      here = slopes<kTwisted, double>(p, mesh, next_t, next_f, nullptr);
     }
     t = std::move(next_t);
     f = std::move(next_f);
-    result.energy = here.energy;
-    // Near the normal the azimuth is known to rounding over cos^2 of the tilt: steps that no longer shrink are its last
-    // digits.
-    const bool done = largest < 1e-11 || (last && largest > 0.25 * before);
-    before = largest;
-    if (done) {
-      result.tilt = std::move(t);
-      result.azimuth = std::move(f);
-      return result;
+    if (halved) {
+      band = SymmetricBand(unknowns, band_width(mesh, kTwisted));
+      here = slopes<kTwisted, double>(p, mesh, t, f, &band);
     }
   }
   throw UserError(Where{}, "the director of this cell has no equilibrium that could be found",
                   "check the voltage, the elastic constants and the twist of sample.cell.director.freedericksz");
 }
 
+/// Between faces alike a cell is its own mirror image: the tilt the same, the azimuth as far before the exit as after
+/// the entry. Half of it tells the whole.
+template <class S>
+bool is_mirrored(const CellForces<S>& p) {
+  return p.tilt_entry == p.tilt_exit;
+}
+template <class S, int N>
+bool is_mirrored(const CellForces<Dual<S, N>>& p) {
+  return p.tilt_entry.value == p.tilt_exit.value && p.tilt_entry.d == p.tilt_exit.d;
+}
+std::vector<double> first_half(const std::vector<double>& whole) {
+  return {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>((whole.size() + 1) / 2)};
+}
+/// `mirror` of what stands as far from the middle on the other side.
+template <class T, class Mirror>
+void complete(std::vector<T>& half, const Mirror& mirror) {
+  for (std::size_t i = half.size(); i-- > 1;) half.push_back(mirror(half[i - 1]));
+}
+
 template <bool kTwisted, int N>
-void tangents(const CellForces<Dual<double, N>>& p, const DirectorMesh& mesh, const DirectorSolution& solution,
-              std::vector<std::array<double, N>>& tilt, std::vector<std::array<double, N>>& azimuth) {
+void tangents(const CellForces<Dual<double, N>>& p, const DirectorMesh& mesh, const std::vector<double>& tilts,
+              const std::vector<double>& azimuths, std::vector<std::array<double, N>>& tilt,
+              std::vector<std::array<double, N>>& azimuth) {
   constexpr int kEach = kTwisted ? 2 : 1;
   using D = Dual<double, N>;
   CellForces<double> plain_forces{p.k33.value,       p.k22.value,       p.gamma.value,
                                   p.drive.value,     p.chirality.value, p.tilt_entry.value,
                                   p.tilt_exit.value, p.twist.value,     p.twisted};
-  const int unknowns = (mesh.nodes() - 2) * kEach;
+  const int unknowns = mesh.free_nodes() * kEach;
   SymmetricBand band(unknowns, band_width(mesh, kTwisted));
-  const Slopes<double> here = slopes<kTwisted, double>(plain_forces, mesh, solution.tilt, solution.azimuth, &band);
+  const Slopes<double> here = slopes<kTwisted, double>(plain_forces, mesh, tilts, azimuths, &band);
   Newton newton(std::move(band), here.pull, curvature_by_q(plain_forces, here.q));
   const bool stable = newton.band.factor();
   if (stable) newton.prepare();
-  std::vector<D> t(solution.tilt.begin(), solution.tilt.end()), f(solution.azimuth.begin(), solution.azimuth.end());
+  std::vector<D> t(tilts.begin(), tilts.end()), f(azimuths.begin(), azimuths.end());
   t.front() = p.tilt_entry;
-  t.back() = p.tilt_exit;
-  if (kTwisted) f.back() = p.twist;
+  if (!mesh.is_half()) t.back() = p.tilt_exit;
+  const D azimuth_exit = mesh.is_half() ? 0.5 * p.twist : p.twist;
+  if (kTwisted) f.back() = azimuth_exit;
   const Slopes<D> moved = slopes<kTwisted, D>(p, mesh, t, f, nullptr);
   tilt.assign(t.size(), {});
   azimuth.assign(kTwisted ? t.size() : 0, {});
@@ -408,77 +449,17 @@ void tangents(const CellForces<Dual<double, N>>& p, const DirectorMesh& mesh, co
       newton.solve(change);
     else
       std::fill(change.begin(), change.end(), 0.0);  // at the very threshold of a cell without pretilt no slope exists
-    for (std::size_t i = 0; i + 2 < t.size(); ++i) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(mesh.free_nodes()); ++i) {
       tilt[i + 1][d] = change[i * kEach];
       if constexpr (kTwisted) azimuth[i + 1][d] = change[i * kEach + 1];
     }
     tilt.front()[d] = p.tilt_entry.d[d];
-    tilt.back()[d] = p.tilt_exit.d[d];
-    if constexpr (kTwisted) azimuth.back()[d] = p.twist.d[d];
+    if (!mesh.is_half()) tilt.back()[d] = p.tilt_exit.d[d];
+    if constexpr (kTwisted) azimuth.back()[d] = azimuth_exit.d[d];
   }
 }
 
 }  // namespace
-
-DirectorMesh::DirectorMesh(int elements, int degree) : degree_(degree) {
-  const int n = degree + 1;
-  for (int i = 0; i <= elements; ++i) edges_.push_back(0.5 * (1 - std::cos(kPi * i / elements)));
-  edges_.front() = 0;
-  edges_.back() = 1;
-  // Gauss-Lobatto points: ends and zeros of P'_degree, by Newton from the Chebyshev points.
-  for (int i = 0; i < n; ++i) {
-    double x = -std::cos(kPi * i / degree), p = 0;
-    for (int pass = 0; pass < 100; ++pass) {
-      double before = 1;
-      p = x;
-      for (int k = 2; k <= degree; ++k) {
-        const double next = ((2 * k - 1) * x * p - (k - 1) * before) / k;
-        before = p;
-        p = next;
-      }
-      const double step = (x * p - before) / (n * p);
-      x -= step;
-      if (std::abs(step) < 1e-16) break;
-    }
-    if (i == 0) x = -1;
-    if (i == degree) x = 1;
-    point_.push_back(x);
-    weight_.push_back(2 / (degree * n * p * p));
-  }
-  std::vector<double> legendre(static_cast<std::size_t>(n));  // P_degree at the points
-  for (int i = 0; i < n; ++i)
-    legendre[static_cast<std::size_t>(i)] =
-        std::sqrt(2 / (degree * n * weight_[static_cast<std::size_t>(i)])) * ((degree - i) % 2 ? -1 : 1);
-  slope_.assign(static_cast<std::size_t>(n * n), 0.0);
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j) {
-      double& d = slope_[static_cast<std::size_t>(k * n + j)];
-      if (k != j)
-        d = legendre[static_cast<std::size_t>(k)] / legendre[static_cast<std::size_t>(j)] /
-            (point_[static_cast<std::size_t>(k)] - point_[static_cast<std::size_t>(j)]);
-      else if (k == 0)
-        d = -0.25 * degree * n;
-      else if (k == degree)
-        d = 0.25 * degree * n;
-    }
-  Eigen::MatrixXd powers(n, n);
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j) powers(k, j) = std::pow(point_[static_cast<std::size_t>(k)], j);
-  const Eigen::MatrixXd inverse_powers = powers.inverse();
-  monomial_.resize(static_cast<std::size_t>(n * n));
-  for (int power = 0; power < n; ++power)
-    for (int j = 0; j < n; ++j) monomial_[static_cast<std::size_t>(power * n + j)] = inverse_powers(power, j);
-}
-
-double DirectorMesh::place(int node) const {
-  const int e = std::min(node / degree_, elements() - 1);
-  return middle(e) + 0.5 * width(e) * point_[static_cast<std::size_t>(node - e * degree_)];
-}
-
-int DirectorMesh::element_at(double u) const {
-  const auto it = std::upper_bound(edges_.begin() + 1, edges_.end() - 1, u);
-  return static_cast<int>(it - edges_.begin()) - 1;
-}
 
 const DirectorMesh& cell_mesh() {
   static const DirectorMesh mesh(16, 10);
@@ -507,7 +488,7 @@ DirectorSolution solve_from_start(const CellForces<double>& p, const DirectorMes
     t.push_back(even ? swung + linear - mean : linear);
   }
   t.front() = entry;
-  t.back() = exit;
+  if (!mesh.is_half()) t.back() = exit;
   if (!p.twisted) return solve<false>(p, mesh, std::move(t), {});
   // The azimuth that this tilt would have: (flux) / stiffness against twist, the chiral part included.
   f.assign(t.size(), 0.0);
@@ -523,9 +504,10 @@ DirectorSolution solve_from_start(const CellForces<double>& p, const DirectorMes
     yielding[i] = yielding[i - 1] + 0.5 * h * (a + c);
     driven[i] = driven[i - 1] + 0.5 * h * (b + d);
   }
-  const double flux = (p.twist - driven.back()) / yielding.back();
+  const double azimuth_exit = (mesh.is_half() ? 0.5 : 1) * p.twist;
+  const double flux = (azimuth_exit - driven.back()) / yielding.back();
   for (std::size_t i = 1; i < t.size(); ++i) f[i] = driven[i] + flux * yielding[i];
-  f.back() = p.twist;
+  f.back() = azimuth_exit;
   return solve<true>(p, mesh, std::move(t), std::move(f));
 }
 
@@ -538,24 +520,41 @@ struct KnownDirectors : Recent<std::array<double, 9>, DirectorSolution> {
 }  // namespace
 
 DirectorSolution solve_director(const CellForces<double>& forces, const DirectorMesh& mesh) {
-  return solve_from_start(forces, mesh);
+  const std::optional<DirectorMesh> half = is_mirrored(forces) ? mesh.half() : std::nullopt;
+  if (!half) return solve_from_start(forces, mesh);
+  DirectorSolution solution = solve_from_start(forces, *half);
+  complete(solution.tilt, [](double tilt) { return tilt; });
+  complete(solution.azimuth, [&](double azimuth) { return forces.twist - azimuth; });
+  return solution;
 }
 
 std::shared_ptr<const DirectorSolution> known_director(const CellForces<double>& p, Memo* memo) {
   const std::array<double, 9> key{
       p.k33, p.k22, p.gamma, p.drive, p.chirality, p.tilt_entry, p.tilt_exit, p.twist, p.twisted ? 1.0 : 0.0};
-  return remembered<KnownDirectors>(
-      memo, key, [&] { return std::make_shared<DirectorSolution>(solve_from_start(p, cell_mesh())); });
+  return remembered<KnownDirectors>(memo, key,
+                                    [&] { return std::make_shared<DirectorSolution>(solve_director(p, cell_mesh())); });
 }
 
 template <int N>
 void director_tangents(const CellForces<Dual<double, N>>& forces, const DirectorMesh& mesh,
                        const DirectorSolution& solution, std::vector<std::array<double, N>>& tilt,
                        std::vector<std::array<double, N>>& azimuth) {
+  const std::optional<DirectorMesh> half = is_mirrored(forces) ? mesh.half() : std::nullopt;
+  const DirectorMesh& of = half ? *half : mesh;
+  const std::vector<double> tilts = half ? first_half(solution.tilt) : solution.tilt,
+                            azimuths = half ? first_half(solution.azimuth) : solution.azimuth;
   if (forces.twisted)
-    tangents<true, N>(forces, mesh, solution, tilt, azimuth);
+    tangents<true, N>(forces, of, tilts, azimuths, tilt, azimuth);
   else
-    tangents<false, N>(forces, mesh, solution, tilt, azimuth);
+    tangents<false, N>(forces, of, tilts, azimuths, tilt, azimuth);
+  if (!half) return;
+  using Slope = std::array<double, static_cast<std::size_t>(N)>;
+  complete(tilt, [](const Slope& slope) { return slope; });
+  complete(azimuth, [&](const Slope& slope) {
+    Slope mirrored;
+    for (std::size_t i = 0; i < slope.size(); ++i) mirrored[i] = forces.twist.d[i] - slope[i];
+    return mirrored;
+  });
 }
 template void director_tangents<1>(const CellForces<Dual<double, 1>>&, const DirectorMesh&, const DirectorSolution&,
                                    std::vector<std::array<double, 1>>&, std::vector<std::array<double, 1>>&);

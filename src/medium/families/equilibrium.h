@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/scalar.h"
+#include "medium/families/director_mesh.h"
 
 namespace birefit {
 
@@ -32,34 +33,6 @@ struct CellForces {
   bool twisted = false;  ///< azimuth and chirality take part; else f = 0 everywhere
 };
 
-/// Piecewise polynomials in depth: tilt and azimuth (from the entry's) at any u in [0, 1].
-/// Elements crowd towards the faces, where a strong field leaves a layer of thickness d / (pi V/V_threshold).
-class DirectorMesh {
- public:
-  /// elements >= 1 of polynomials of this degree, 2 to 20.
-  DirectorMesh(int elements, int degree);
-  int elements() const { return static_cast<int>(edges_.size()) - 1; }
-  int degree() const { return degree_; }
-  int nodes() const { return elements() * degree_ + 1; }
-  double place(int node) const;  ///< of a node, in [0, 1]
-  double width(int element) const {
-    return edges_[static_cast<std::size_t>(element) + 1] - edges_[static_cast<std::size_t>(element)];
-  }
-  /// Gauss-Lobatto, sum 2
-  double weight(int k) const { return weight_[static_cast<std::size_t>(k)]; }
-  /// at point k of cardinal polynomial j
-  double slope(int k, int j) const { return slope_[static_cast<std::size_t>(k * (degree_ + 1) + j)]; }
-  /// of cardinal polynomial j
-  double monomial(int power, int j) const { return monomial_[static_cast<std::size_t>(power * (degree_ + 1) + j)]; }
-  int element_at(double u) const;
-  double middle(int element) const {
-    return 0.5 * (edges_[static_cast<std::size_t>(element)] + edges_[static_cast<std::size_t>(element) + 1]);
-  }
-
- private:
-  int degree_;
-  std::vector<double> edges_, point_, weight_, slope_, monomial_;
-};
 /// The mesh of all cells: 16 elements of degree 10. The profile is then good to 1e-9 rad up to ten times the threshold
 /// voltage, 1e-6 up to fifty times (tests/laws/equilibrium_test.cc).
 const DirectorMesh& cell_mesh();
