@@ -10,6 +10,9 @@
 
 #include <gtest/gtest.h>
 
+#include "independent_disc.h"
+#include "independent_droplet.h"  // camera()
+
 namespace birefit::estimation {
 namespace {
 
@@ -287,6 +290,55 @@ TEST(NoiseEstimate, IsThatOfTheOthersWhereHalfOfThePixelsAreCutOff) {
       // The fringes of 10 pixels' period at the edge add to the median: 10 % of noise, 5 % of fringes.
       EXPECT_NEAR(std::sqrt(variance_at(noise, s)), 20, 0.15 * 20) << background << ' ' << s;
   }
+}
+
+// A disc of 64 pixels under a load: fringes finer than a few pixels look like noise where it is bright. A line through
+// them and the dark must not fall below what the dark pixels around the disc show themselves.
+TEST(NoiseEstimate, OfTheDarkIsNotExtrapolatedFromFringes) {
+  testing::IndependentDisc disc;
+  disc.center_x_px = 32.3, disc.center_y_px = 30.6, disc.um_per_px = 200, disc.load_n = 150;
+  std::vector<double> mean;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) mean.push_back(50 + 1000 * disc.pixel(x, y, 8));
+  for (unsigned long seed = 1; seed <= 20; ++seed) {
+    Picture micrograph;
+    micrograph.values = Image(64, 64);
+    micrograph.mask = Mask(64, 64, 1);
+    micrograph.values.values() = testing::camera(mean, 1, 3, seed, false);
+    // 59 there, by photons and the camera: half of it, and a tenth for what 900 pixels leave open.
+    EXPECT_GT(variance_at(estimate_noise(micrograph), 50), 0.4 * 59) << seed;
+  }
+}
+
+// What rounding does to all of an even picture: twenty of them, whose light falls anywhere between codes 17 apart.
+TEST(NoiseEstimate, RoundingIsSharedByPixelsOfEvenLight) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> light(100, 900);
+  for (const double noise : {0.05, 0.3, 1.5}) {  // of a code
+    std::vector<Picture> pictures(20);
+    std::vector<const Picture*> all;
+    double squares = 0;  // of what their means are off by
+    for (Picture& picture : pictures) {
+      picture.values = Image(20, 20);
+      picture.mask = Mask(20, 20, 1);
+      const double mean = light(random);
+      double sum = 0;
+      for (double& v : picture.values.values()) v = 17 * std::round(mean / 17 + noise * normal(random)), sum += v / 400;
+      squares += (sum - mean) * (sum - mean) / static_cast<double>(pictures.size());
+      all.push_back(&picture);
+    }
+    const CoarseCodes codes = coarse_codes(all);
+    EXPECT_EQ(codes.step, 17);
+    // Twenty pictures tell a standard deviation to a sixth: three of that, beside the pixels' own noise.
+    EXPECT_NEAR(codes.shared_sd, std::sqrt(squares), 0.5 * std::sqrt(squares) + 17 * noise / 20);
+    EXPECT_NEAR(codes.pixel_sd, 17 * std::sqrt(noise * noise + 1 / 12.0), 0.2 * codes.pixel_sd);
+  }
+  Picture smooth;
+  smooth.values = Image(20, 20);
+  smooth.mask = Mask(20, 20, 1);
+  for (double& value : smooth.values.values()) value = normal(random);
+  EXPECT_EQ(coarse_codes({&smooth}).step, 0);
 }
 
 }  // namespace

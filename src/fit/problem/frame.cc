@@ -7,6 +7,7 @@
 
 #include "fit/problem/light.h"
 #include "fit/weights/noise.h"
+#include "samples/kind.h"
 
 namespace birefit::estimation {
 namespace {
@@ -20,6 +21,50 @@ Theta start_of(const FitJob& job) {
       theta[static_cast<std::size_t>(ref.index)] = std::clamp(job.prior->mean[static_cast<Eigen::Index>(i)],
                                                               job.parameters[ref].lower, job.parameters[ref].upper);
   return theta;
+}
+
+/// A frame of one value tells no noise: it has that of the noisiest one.
+void borrow_noise(const Task& task, Frames& frames) {
+  constexpr double kNone = 1e-4;
+  const auto sd = [&](int g) {
+    const Image& sigma = frames[static_cast<std::size_t>(g)].sigma;
+    return *std::max_element(sigma.values().begin(), sigma.values().end());
+  };
+  int noisiest = 0;
+  for (int g = 1; g < task.frames(); ++g)
+    if (sd(g) > sd(noisiest)) noisiest = g;
+  for (int g = 0; g < task.frames(); ++g) {
+    Frame& frame = frames[static_cast<std::size_t>(g)];
+    if (!frame.noise.estimated || !(sd(g) < kNone * sd(noisiest))) continue;
+    frame.noise = frames[static_cast<std::size_t>(noisiest)].noise;
+    frame.noise.estimated = false;  // the residual tells no more of it
+    frame.sigma = standard_deviation(task.picture(g), frame.noise, smoothed(task.picture(g)));
+    frame.pixels = usable_pixels(task.picture(g), frame.sigma);
+  }
+}
+
+/// Of a pixel's noise: where all pixels share less, each frame's own estimate tells its noise better.
+constexpr double kCoarse = 0.1;
+
+/// Where the light is even, every pixel is rounded the same way, and no mean makes that smaller. By all such frames
+/// together: in one of them the noise is all of it or none, as its light falls between codes or on one.
+void note_rounding(const Task& task, Frames& frames) {
+  std::vector<const Picture*> even;
+  for (int g = 0; g < task.frames(); ++g)
+    if (const Picture& picture = task.picture(g);
+        traits_of(picture.scene).even && frames[static_cast<std::size_t>(g)].pixels.size() > 1)
+      even.push_back(&picture);
+  const CoarseCodes codes = coarse_codes(even);
+  if (!(codes.shared_sd > 0)) return;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Picture& picture = task.picture(g);
+    if (std::find(even.begin(), even.end(), &picture) == even.end()) continue;
+    Frame& frame = frames[static_cast<std::size_t>(g)];
+    frame.rounding_sd = codes.shared_sd;
+    if (!frame.noise.estimated || codes.shared_sd < kCoarse * codes.pixel_sd) continue;
+    frame.noise = {codes.pixel_sd, 0, false};
+    frame.sigma = standard_deviation(picture, frame.noise, smoothed(picture));
+  }
 }
 
 }  // namespace
@@ -45,6 +90,8 @@ Start prepare(const Task& task) {
     used += frame.pixels.size();
     start.frames.push_back(std::move(frame));
   }
+  borrow_noise(task, start.frames);
+  note_rounding(task, start.frames);
   if (used <= static_cast<std::size_t>(task.unknowns.size()))
     throw UserError(Where{}, fmt::format("{} usable pixels cannot determine {} parameters", used, task.unknowns.size()),
                     "check mask and roi_px");
@@ -92,6 +139,7 @@ std::unique_ptr<LeastSquares> problem_of(const Task& task, const Frames& frames,
   for (int g = 0; g < task.frames(); ++g) {
     const Frame& frame = frames[static_cast<std::size_t>(g)];
     sets.push_back(pixel_set(task.picture(g), frame.sigma, frame.pixels));
+    sets.back().shared_sd = frame.rounding_sd;
     plans.push_back(frame.plan);
   }
   auto problem = std::make_unique<LeastSquares>(task, std::move(plans), std::move(sets));

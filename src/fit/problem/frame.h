@@ -12,8 +12,9 @@ namespace birefit::estimation {
 struct Frame {
   RenderPlan plan;
   NoiseModel noise;
-  Image sigma;    ///< standard deviation of every pixel's value, in its units
-  Pixels pixels;  ///< that take part
+  Image sigma;             ///< standard deviation of every pixel's value, in its units
+  double rounding_sd = 0;  ///< of what rounding does to all pixels alike: those of even light, less noisy than a code
+  Pixels pixels;           ///< that take part
 };
 using Frames = std::vector<Frame>;
 

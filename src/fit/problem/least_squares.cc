@@ -55,6 +55,7 @@ LeastSquares::LeastSquares(const Task& task, std::vector<RenderPlan> plans, std:
     frame.count = frame.set.value.size();
     frame.inverse_sigma = frame.set.sigma.cwiseInverse();
     frame.inverse_sigma_norm = frame.inverse_sigma.norm();
+    frame.shared = frame.set.shared_sd * frame.inverse_sigma_norm;
     for (const LightTerm& light : light_terms(picture)) {
       Term term{light, light.coefficient ? position(unknowns_.linear, light.coefficient.index) : -1, {}, {}};
       if (term.shape) {
@@ -87,7 +88,10 @@ void LeastSquares::set_misfit(const std::vector<Misfit>& misfit) {
     Frame& frame = frames_[g];
     frame.shape_factor = 1 / std::sqrt(misfit_[g].shape_variance);
     const double ratio = misfit_[g].mean_sd * frame.inverse_sigma_norm;  // of the mean's misfit to its noise
-    frame.mean_factor = misfit_[g].mean_follows_shape ? frame.shape_factor : 1 / std::sqrt(1 + ratio * ratio);
+    const double beyond = misfit_[g].mean_follows_shape ? misfit_[g].shape_variance : 1 + ratio * ratio;
+    frame.mean_factor = frame.shared > 0 || !misfit_[g].mean_follows_shape
+                            ? 1 / std::sqrt(beyond + frame.shared * frame.shared)
+                            : frame.shape_factor;
     auto value = whitened_value_.segment(frame.begin, frame.count);
     value = frame.set.value;
     const int threads = thread_count(job_.options.threads);
@@ -511,10 +515,24 @@ void LeastSquares::for_noise_whitened_rows(
     int micrograph,
     const std::function<void(Eigen::Index, const Eigen::MatrixXd&, const Eigen::VectorXd&)>& what) const {
   const Frame& frame = frames_[micrograph];
+  const auto along = [&](const Tile& tile) {
+    return frame.inverse_sigma.segment(tile.begin, tile.count) / frame.inverse_sigma_norm;
+  };
+  const auto residual = [&](const Tile& tile) { return residual_.segment(frame.begin + tile.begin, tile.count); };
+  // The part along the mean, which has a factor of its own.
+  const double beyond = 1 / frame.mean_factor - 1 / frame.shape_factor;
+  Eigen::VectorXd mean_rows = Eigen::VectorXd::Zero(unknowns_.size());
+  double mean_residual = 0;
+  if (beyond != 0)
+    for (const Tile& tile : tiles_)
+      if (tile.micrograph == micrograph) {
+        mean_rows += full_rows(tile).transpose() * along(tile);
+        mean_residual += along(tile).dot(residual(tile));
+      }
   for (const Tile& tile : tiles_)
     if (tile.micrograph == micrograph)
-      what(tile.begin, full_rows(tile) / frame.shape_factor,
-           residual_.segment(frame.begin + tile.begin, tile.count) / frame.shape_factor);
+      what(tile.begin, full_rows(tile) / frame.shape_factor + beyond * along(tile) * mean_rows.transpose(),
+           residual(tile) / frame.shape_factor + beyond * mean_residual * along(tile));
 }
 
 Eigen::MatrixXd LeastSquares::factor(bool with_priors) const {
@@ -539,20 +557,23 @@ LeastSquares::FrameMisfit LeastSquares::frame_misfit(int micrograph) const {
   const Eigen::VectorXd along = frame.inverse_sigma / frame.inverse_sigma_norm;
   FrameMisfit misfit;
   misfit.chi_square = noise.squaredNorm();
-  misfit.mean_whitened = along.dot(noise);
-  misfit.mean_noise_sd = 1 / frame.inverse_sigma_norm;
+  // The noise of a mean is that of its pixels and what they share.
+  const double of_mean = std::hypot(1, frame.shared);
+  misfit.mean_noise_sd = of_mean / frame.inverse_sigma_norm;
+  misfit.mean_whitened = along.dot(noise) / of_mean;
+  misfit.mean_chi_square = std::pow(along.dot(noise), 2);
   misfit.mean_residual = misfit.mean_whitened * misfit.mean_noise_sd;
   const Eigen::ArrayXd bright =
       light(frame, true, 0, frame.count).array() * intensity_.segment(frame.begin, frame.count).array();
-  misfit.mean_light = along.dot((bright * frame.inverse_sigma.array()).matrix()) * misfit.mean_noise_sd;
+  misfit.mean_light = along.dot((bright * frame.inverse_sigma.array()).matrix()) / frame.inverse_sigma_norm;
   const Eigen::Index p = searched_size();
   misfit.mean_jacobian_whitened = Eigen::VectorXd::Zero(unknowns_.size());
   if (has_derivatives_)
     misfit.mean_jacobian_whitened.head(p) =
-        searched_columns_.middleRows(frame.begin, frame.count).transpose() * along / frame.mean_factor;
+        searched_columns_.middleRows(frame.begin, frame.count).transpose() * along / (frame.mean_factor * of_mean);
   for (const Term& term : frame.terms)
     if (term.unknown >= 0)
-      misfit.mean_jacobian_whitened[p + term.unknown] += term.whitened.dot(along) / frame.mean_factor;
+      misfit.mean_jacobian_whitened[p + term.unknown] += term.whitened.dot(along) / (frame.mean_factor * of_mean);
   return misfit;
 }
 

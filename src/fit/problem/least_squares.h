@@ -67,6 +67,7 @@ class LeastSquares {
   /// Noise-whitened residual sums of one micrograph, its misfit weights not applied.
   struct FrameMisfit {
     double chi_square = 0;                   ///< sum of (residual / noise sd)^2
+    double mean_chi_square = 0;              ///< its part along the generalised mean
     double mean_whitened = 0;                ///< generalised mean residual over its noise standard deviation
     double mean_noise_sd = 0;                ///< that standard deviation, units of the values
     double mean_residual = 0;                ///< units of the values
@@ -78,8 +79,7 @@ class LeastSquares {
   /// Whitened residual of one micrograph without its misfit weights, in the pixels' order.
   Eigen::VectorXd noise_whitened_residual(int micrograph) const;
   /// what(first, rows, residual) for some thousand pixels of one micrograph at a time, from its pixel `first` on: the
-  /// whitened rows [d/d searched, d/d linear] and the whitened residual, both without its misfit weights. Only where
-  /// its mean has the weight of all else (Misfit::mean_follows_shape).
+  /// whitened rows [d/d searched, d/d linear] and the whitened residual, both without its misfit weights.
   void for_noise_whitened_rows(
       int micrograph,
       const std::function<void(Eigen::Index, const Eigen::MatrixXd&, const Eigen::VectorXd&)>& what) const;
@@ -129,6 +129,7 @@ class LeastSquares {
     PixelSet set;
     Eigen::VectorXd inverse_sigma;
     double inverse_sigma_norm = 0;
+    double shared = 0;  ///< PixelSet::shared_sd over the noise of the mean
     Eigen::Index begin = 0, count = 0;
     std::vector<int> read;  ///< searched unknowns that its scene reads
     std::vector<Term> terms;

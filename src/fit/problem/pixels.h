@@ -16,6 +16,7 @@ using Pixels = std::vector<std::array<int, 2>>;
 struct PixelSet {
   Pixels pixels;
   Eigen::VectorXd value, sigma;
+  double shared_sd = 0;  ///< of an error that is the same in all of them, units of the values
 };
 
 /// Pixels the mask leaves and whose value and weight are numbers.

@@ -68,7 +68,7 @@ void weigh_shapes(const Task& task, const Optimum& optimum, const FrameSums& fra
     Misfit& own = misfit[static_cast<std::size_t>(g)];
     const double n = frame.mean_noise_sd > 0 ? static_cast<double>(optimum.problem->pixels(g).value.size()) : 0;
     const bool mean_known = own_scatter || !own.mean_follows_shape;
-    const double mean_part = mean_known ? frame.mean_whitened * frame.mean_whitened : 0;
+    const double mean_part = mean_known ? frame.mean_chi_square : 0;
     const double reduced = (frame.chi_square - mean_part) / std::max(1.0, n * (1 - task.unknowns.size() / pixels));
     // White noise stays below this in all but 1 of 3 million images: exact errors stay exact.
     const double sampling = std::sqrt(2 / n);
@@ -258,9 +258,9 @@ double deviance(const Task& task, const Frames& setup, const LeastSquares& probl
   double shapes = 0, squares = 0;
   for (int g = 0; g < task.frames(); ++g) {
     frames.push_back(problem.frame_misfit(g));
-    const double mean = frames.back().mean_whitened * frames.back().mean_whitened;
-    shapes += (frames.back().chi_square - mean) / problem.misfit()[static_cast<std::size_t>(g)].shape_variance;
-    squares += mean;
+    shapes += (frames.back().chi_square - frames.back().mean_chi_square) /
+              problem.misfit()[static_cast<std::size_t>(g)].shape_variance;
+    squares += frames.back().mean_whitened * frames.back().mean_whitened;
   }
   const double of_means = std::min(deviance_by_lamp(frames, lamp_over_noise(task, setup, frames)),
                                    deviance_by_scatter(task, problem.theta(), frames));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -298,6 +299,35 @@ VarianceLine variance_line(const std::vector<Bin>& bins, double floor, std::opti
 
 }  // namespace
 
+CoarseCodes coarse_codes(const std::vector<const Picture*>& pictures) {
+  CoarseCodes codes;
+  std::vector<double> values;
+  double squares = 0, freedom = 0;  // about each picture's own mean
+  for (const Picture* picture : pictures) {
+    if (!picture->variance_scale.empty()) return {};
+    const std::size_t from = values.size();
+    for (std::size_t i = 0; i < picture->values.size(); ++i)
+      if (picture->mask.values()[i]) values.push_back(picture->values.values()[i]);
+    const double count = static_cast<double>(values.size() - from);
+    if (count < 2) continue;
+    const double mean = std::accumulate(values.begin() + static_cast<std::ptrdiff_t>(from), values.end(), 0.0) / count;
+    for (std::size_t i = from; i < values.size(); ++i) squares += (values[i] - mean) * (values[i] - mean);
+    freedom += count - 1;
+  }
+  const double pixels = static_cast<double>(values.size());
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  constexpr double kMet = 12;  // times that a code is met; values that are no codes repeat less
+  if (values.size() < 2 || kMet * static_cast<double>(values.size()) > pixels) return {};
+  std::vector<double> apart;
+  for (std::size_t i = 1; i < values.size(); ++i) apart.push_back(values[i] - values[i - 1]);
+  codes.step = *std::min_element(apart.begin(), apart.end());
+  const double seen = squares / freedom / (codes.step * codes.step), hidden = hidden_rounding(seen, 1);
+  codes.shared_sd = codes.step * std::sqrt(hidden);
+  codes.pixel_sd = codes.step * std::sqrt(seen + hidden);
+  return codes;
+}
+
 NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
   if (const SubGrid grid = sub_grid(micrograph.mask); grid.spacing > 1) {
     Picture part;
@@ -331,11 +361,13 @@ NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
   if (!micrograph.variance_scale.empty()) black = 0;
   const VarianceLine line = variance_line(bins, codes.floor(), black);
   noise.counts_per_photon = line.slope;
-  // A model may come to be darker than anything seen: there the variance is not extrapolated below half of what was.
+  // A model may come to be darker than anything seen: there the variance is not extrapolated below half of what was, by
+  // the line or by the darkest pixels themselves, which a line through fringes finer than pixels may pass far below.
   const double seen = line.at_dark + line.slope * (bins.front().darkest - line.dark);
+  const double least = 0.5 * std::max(seen, bins.front().variance);
   const double without_light = line.at_dark - line.slope * line.dark;
-  const bool from_zero = line.slope == 0 || without_light >= 0.5 * seen;
-  if (!from_zero) noise.black_counts = bins.front().darkest - 0.5 * seen / line.slope;
+  const bool from_zero = line.slope == 0 || (without_light >= 0.5 * seen && seen >= least);
+  if (!from_zero) noise.black_counts = line.dark + (least - line.at_dark) / line.slope;
   noise.read_counts = std::sqrt(without_light + line.slope * noise.black_counts);
   return noise;
 }

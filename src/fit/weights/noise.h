@@ -1,6 +1,8 @@
 #pragma once
 // How much one pixel's value scatters: from the user's noise model, or from the image itself.
 
+#include <vector>
+
 #include "birefit/fit.h"
 
 namespace birefit::estimation {
@@ -11,6 +13,14 @@ namespace birefit::estimation {
 NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted = nullptr);
 /// Mean variance of the usable pixels' values under a model.
 double mean_variance(const Picture& micrograph, const NoiseModel& noise, const Image& signal);
+
+/// What rounding does to pictures of even light that were taken by one camera (units of the values).
+struct CoarseCodes {
+  double step = 0;       ///< of neighbouring codes, all pictures together; 0: values are not rounded, or calibrated
+  double shared_sd = 0;  ///< of an error that all pixels of a picture share: less, the more of a code noise is
+  double pixel_sd = 0;   ///< of a pixel's value about its light: noise and rounding
+};
+CoarseCodes coarse_codes(const std::vector<const Picture*>& pictures);
 
 /// Mean of the usable pixels of each 3 x 3 neighbourhood: a first guess of the signal.
 Image smoothed(const Picture& micrograph);
