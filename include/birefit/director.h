@@ -25,7 +25,7 @@ struct UniformDirector {
   static void describe(Self& self, Visit&& visit) {
     visit.vector("axis", self.axis, numbers::within(-1e6, 1e6).left_out(),
                  "the direction [x, y, z], of any length; instead of angles");
-    visit.number("azimuth_deg", self.azimuth_deg, numbers::angle().or_else(0),
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::dial().or_else(0),
                  "from +x, counter-clockwise in the image");
     visit.number("tilt_deg", self.tilt_deg, numbers::angle().or_else(0), "from the layer plane towards +z");
   }
@@ -40,7 +40,7 @@ struct TwistedDirector {
   static void describe(Self& self, Visit&& visit) {
     visit.number("twist_deg", self.twist_deg, numbers::angle(),
                  "over the whole cell; > 0 is right-handed (x towards y as z grows)");
-    visit.number("azimuth_deg", self.azimuth_deg, numbers::angle().or_else(0), "at the entry face");
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::dial().or_else(0), "at the entry face");
     visit.number("pretilt_deg", self.pretilt_deg, numbers::angle(-90, 90).or_else(0),
                  "of the axis out of the layer plane");
   }
@@ -84,7 +84,7 @@ struct FreederickszDirector {
                  "permittivity across the axis");
     visit.number("pretilt_deg", self.pretilt_deg, numbers::angle(0, 45).physical().or_else(1),
                  "at both faces; of hybrid cells 0 where it is not given");
-    visit.number("azimuth_deg", self.azimuth_deg, numbers::angle().or_else(0), "at the entry face");
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::dial().or_else(0), "at the entry face");
     visit.number("twist_deg", self.twist_deg, numbers::angle(-1440, 1440).left_out(),
                  "between the faces, > 0 right-handed; not given: none");
     visit.number("pitch_um", self.pitch_um, numbers::within(-100000, 100000, "um").left_out(),
@@ -103,7 +103,7 @@ struct HelixDirector {
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
     visit.number("pitch_um", self.pitch_um, numbers::within(-100000, 100000, "um"), "without field; > 0 right-handed");
-    visit.number("azimuth_deg", self.azimuth_deg, numbers::angle().or_else(0), "at the entry face");
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::dial().or_else(0), "at the entry face");
     visit.number("modulus", self.modulus, numbers::within(0, 1 - 1e-6).physical().left_out(),
                  "k of a helix that a field unwinds; not given: no field");
   }
@@ -145,7 +145,7 @@ struct AxialDirector {
                  "field in the droplet over applied field");
     visit.number("ring_radius", self.ring_radius, numbers::within(0.2, 0.995).left_out(),
                  "of an equatorial disclination ring over the radius; not given: hedgehog");
-    visit.number("field_azimuth_deg", self.field_azimuth_deg, numbers::angle().left_out(),
+    visit.number("field_azimuth_deg", self.field_azimuth_deg, numbers::dial().left_out(),
                  "field in the image plane, from +x; not given: along the view");
   }
 };
@@ -158,7 +158,7 @@ struct BipolarDirector {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("azimuth_deg", self.azimuth_deg, numbers::angle().or_else(0), "of the poles' axis, from +x");
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::dial().or_else(0), "of the poles' axis, from +x");
     visit.number("tilt_deg", self.tilt_deg, numbers::angle(-90, 90).or_else(0),
                  "of that axis out of the image plane, towards +z");
     visit.number("pole_distance", self.pole_distance, numbers::within(1, 1000).or_else(1),

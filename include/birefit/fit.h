@@ -28,6 +28,8 @@ struct FitOptions {
   /// Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
   bool choose_waves = false;
   double max_seconds = 60;
+  /// Nobody will read the errors: what is stated and what pictures depart by is taken as exact.
+  bool values_only = false;
   bool choose_rays = false;  ///< straight or curved rays (Scene::rays) by what curved ones would change
   std::function<void(const std::string&)> progress;  ///< called with one line now and then; may be empty
   const std::atomic<bool>* interrupted = nullptr;    ///< set by Ctrl-C: end with the best state so far

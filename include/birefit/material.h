@@ -35,7 +35,7 @@ struct E44Steinberg2020 {
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
-    visit.number("temperature_k", self.temperature_k, numbers::within(250, 373, "K"),
+    visit.number("temperature_k", self.temperature_k, numbers::within(250, 373, "K").known_within(0.2),
                  "of the preset; a sample with a temperature profile has its own");
   }
 };
@@ -135,7 +135,7 @@ struct LawIndices {
   static void describe(Self& self, Visit&& visit) {
     visit.inside("indices", self.indices);
     visit.inside("haller", self.haller);
-    visit.number("temperature_k", self.temperature_k, numbers::within(100, 2000, "K").left_out(),
+    visit.number("temperature_k", self.temperature_k, numbers::within(100, 2000, "K").known_within(0.2).left_out(),
                  "where a law of temperature needs it");
     visit.number("birefringence_factor", self.birefringence_factor, numbers::within(0, 10).left_out(),
                  "n_e - n_o times this");

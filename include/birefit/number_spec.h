@@ -89,7 +89,7 @@ inline NumberSpec length_um(double upper) { return positive(upper, "um").physica
 inline NumberSpec angle() { return within(-36000, 36000, "deg"); }
 inline NumberSpec angle(double lower, double upper) { return within(lower, upper, "deg"); }
 inline NumberSpec index() { return within(1, 4); }
-/// Read off a polarizer's mount, whose zero is as good.
+/// Read off a mount, or off how the sample lies in it: its zero is as good.
 inline NumberSpec dial() { return angle().known_within(1); }
 /// Of a table, for about this temperature and wavelength.
 inline NumberSpec tabulated_index() { return index().known_within(0.01); }

@@ -164,7 +164,7 @@ struct StressedDisc {
     visit.number("load_n", self.load_n, numbers::within(0, 1e7, "N").physical(), "pressing it together");
     visit.number("stress_optic_brewster", self.stress_optic_brewster, numbers::within(-1e5, 1e5, "brewster"),
                  "1e-12/Pa");
-    visit.number("load_azimuth_deg", self.load_azimuth_deg, numbers::angle().or_else(90),
+    visit.number("load_azimuth_deg", self.load_azimuth_deg, numbers::dial().or_else(90),
                  "of the line of the two forces");
     visit.list("residual.normal_mpa", self.residual_normal_mpa, numbers::within(-1e6, 1e6, "MPa").left_out(),
                "of sxx - syy");

@@ -8,6 +8,7 @@
 #include "birefit/fit.h"
 #include "core/threads.h"
 #include "fit/errors/statistics.h"
+#include "fit/problem/shared_zeros.h"
 #include "fit/weights/noise.h"
 
 namespace birefit {
@@ -107,11 +108,12 @@ void redraw_priors(FitJob& job, const Theta& truth, std::mt19937_64& random) {
 Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws) {
   Coverage coverage;
   coverage.of_residuals = std::any_of(result.micrographs.begin(), result.micrographs.end(), misfits);
+  const FitJob whole = with_shared_zeros(job);  // a draw has another zero, and not another angle for every frame
   std::vector<std::optional<FitResult>> fits(static_cast<std::size_t>(std::max(0, draws)));
   const auto one = [&](int draw, int threads) {
     if (job.options.interrupted && job.options.interrupted->load()) return;
     std::mt19937_64 random(0x9e3779b97f4a7c15u * static_cast<std::uint64_t>(draw + 1));
-    FitJob again = job;
+    FitJob again = whole;
     again.options.progress = nullptr;
     again.options.threads = threads;
     std::size_t sight = 0;

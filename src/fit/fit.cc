@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "fit/errors/catalogue.h"
+#include "fit/errors/discrepancy.h"
 #include "fit/errors/left_out.h"
 #include "fit/errors/report.h"
 #include "fit/errors/stated.h"
@@ -86,7 +87,8 @@ Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimu
   const Task wider(job);
   Theta before = optimum.theta;
   Optimum with_all = settle(wider, best_with_nuisances(wider, task, optimum, minima));
-  if (with_all.stopped) return concluded(task, minima, std::move(optimum), beaten);
+  if (with_all.stopped || !believes_catalogue(missed_of_contrast(task, optimum), missed_of_contrast(wider, with_all)))
+    return concluded(task, minima, std::move(optimum), beaten);
   with_all.came_from = std::move(before);
   return concluded(wider, minima, std::move(with_all), beaten);
 }
@@ -96,6 +98,7 @@ Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   if (minima.hopeless && !beaten)
     if (std::optional<Outcome> outcome = given_up(task, minima)) return std::move(*outcome);
   Optimum optimum = settle(task, best_minimum(task, minima, beaten));
+  if (task.job.options.values_only) return concluded(task, minima, std::move(optimum), beaten);
   const WorthFitting told = worth_fitting(task, optimum);
   if (told.numbers.empty()) return with_what_is_left(task, minima, std::move(optimum), beaten);
   task.say("what is stated and not known exactly is fitted as well");
@@ -121,7 +124,7 @@ std::vector<Outcome> fit_side_by_side(std::span<const FitJob> jobs) {
   std::vector<double> seconds;
   for (const FitJob& job : jobs) {
     const Clock::time_point begin = Clock::now();
-    tasks.emplace_back(has_unstated_focus(job) ? completed.emplace_back(with_unstated_focus(job)) : job);
+    tasks.emplace_back(has_more_stated(job) ? completed.emplace_back(with_all_stated(job)) : job);
     minima.push_back(search(tasks.back(), prepare(tasks.back()), kBeaten * best));
     best = std::min(best, minima.back().lowest_per_pixel());
     seconds.push_back(seconds_since(begin));

@@ -164,7 +164,7 @@ void turn_polarizer(Microscope& microscope, ParameterRef to) {
 }  // namespace
 
 Outlook outlook(const FitJob& job) {
-  const Planned p = planned(has_unstated_focus(job) ? with_unstated_focus(job) : job);
+  const Planned p = planned(has_more_stated(job) ? with_all_stated(job) : job);
   const Information known = information(p);
   FitResult result;
   result.interval_degrees_of_freedom = std::numeric_limits<double>::infinity();

@@ -96,25 +96,31 @@ FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(c
     constexpr long kEnoughLeft = 4;
     if (kEnoughLeft * count(possible) >= count(mask)) mask = std::move(possible);
   }
+  now.options.values_only = depends;  // until it has settled
   FitResult result = fit(now);
   constexpr int kRounds = 6;
   constexpr double kSettled = 1e-3;  // of the pixels: a zone's edge may pass to and fro over some
   double changed = 1;
   int evaluations = 0;
   double seconds = 0;
-  for (int round = 0; depends && round < kRounds && changed > kSettled && !result.interrupted; ++round) {
+  for (int round = 0; depends && round < kRounds && !result.interrupted; ++round) {
     double pixels = 0;
     changed = 0;
     for (std::size_t d = 0; d < zoned.size(); ++d) {
       Picture& picture = *zoned[d].picture;
-      const Mask before = std::exchange(picture.mask, given[d]);
+      Mask before = std::exchange(picture.mask, given[d]);
       picture.mask = fitted_pixels(picture, result.theta);
-      if (count(picture.mask) == 0) return result;  // the sample has left the picture
+      if (count(picture.mask) == 0) {  // the sample has left the picture
+        picture.mask = std::move(before);
+        now.options.values_only = false;
+        return fit(now);
+      }
       for (std::size_t i = 0; i < before.size(); ++i)
         changed += picture.mask.values()[i] != before.values()[i], pixels += picture.mask.values()[i] != 0;
     }
     changed /= pixels;
-    if (changed == 0) break;
+    if (changed <= kSettled && !now.options.values_only) break;
+    now.options.values_only = now.options.values_only && changed > kSettled && round + 1 < kRounds;
     for (int i = 0; i < now.parameters.size(); ++i) {
       Parameter& p = now.parameters[i];
       // The value of a parameter with a prior is the prior's mean.

@@ -358,7 +358,9 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
                                 ", the range of " + item.columns[c].path);
       const std::string name =
           "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;
-      replace(scene, columns[c].shared, reader.table.add_constant(name, value, columns[c].spec->unit));
+      const ParameterRef own = reader.table.add_constant(name, value, columns[c].spec->unit);
+      reader.table[own].known_to.sd = columns[c].spec->known_to.sd;  // the zero of a dial or thermometer
+      replace(scene, columns[c].shared, own);
     }
     table.x.push_back(row.set[0]);
     table.line.push_back(line);

@@ -2,6 +2,8 @@
 // Every kind of sample by what it can do. A new one is a folder here, its struct in birefit/sample.h and a line in
 // kinds.def.
 
+#include <optional>
+
 #include "samples/jones_table.h"
 #include "samples/pilots.h"
 #include "samples/planning.h"
@@ -15,6 +17,12 @@ struct SampleWaves;  // samples/waves/object.h
 struct Traits {
   /// Of a sphere, which is seen as a disc about the view's centre; empty: it is none.
   ParameterRef sphere_diameter_um = {};
+  /// Of what is seen as a disc about the view's centre, spheres among it: its diameter, and from where its patterns
+  /// count azimuths; not given: 90.
+  struct Round {
+    ParameterRef diameter_um, from_deg;
+  };
+  std::optional<Round> round = {};
   bool even = false;   ///< the picture is one number wherever the light is even
   bool quick = false;  ///< and costs microseconds: no field has to be found for it
   /// Parts of it next to each other tell the same, rows or columns of the picture.

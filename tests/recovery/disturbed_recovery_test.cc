@@ -13,6 +13,7 @@
 #include <set>
 
 #include "birefit/fit.h"
+#include "departures.h"
 #include "scene_builder.h"
 
 namespace birefit {
@@ -328,21 +329,6 @@ TEST(DisturbedRecovery, SaturatedAndCutOff) {
   EXPECT_EQ(half.wrong, 0);
 }
 
-/// The mean counts where a camera saw `from(x, y)` of them, by the straight line between four pixels.
-template <class From>
-void resample(Image& counts, const From& from) {
-  const Image seen = counts;
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
-      const auto [u, v] = from(x, y);
-      const double cu = std::clamp(u, 0.0, kSize - 1.001), cv = std::clamp(v, 0.0, kSize - 1.001);
-      const int i = static_cast<int>(cu), j = static_cast<int>(cv);
-      const double a = cu - i, b = cv - j;
-      counts(x, y) = (1 - b) * ((1 - a) * seen(i, j) + a * seen(i + 1, j)) +
-                     b * ((1 - a) * seen(i, j + 1) + a * seen(i + 1, j + 1));
-    }
-}
-
 // Pictures that are nearly the model's, in ways that no parameter of the fit stands for: what is left over tells how
 // large a discrepancy is, and the interval holds what one of that size could have done, or there is no answer. Errors
 // by the noise, scaled or not, do not: what lies along a parameter's own pattern leaves nothing over.
@@ -357,34 +343,14 @@ TEST(DisturbedRecovery, NearlyTheModelIsPaidForOrRefused) {
     };
     return d;
   };
-  const auto aspect = [](double by) {
+  const auto by = [](Disturb change) {
     Disturbance d;
-    d.light = [by](Image& counts, Random&) {
-      resample(counts, [by](int x, int y) { return std::pair(47.7 + (x - 47.7) * (1 + by), static_cast<double>(y)); });
-    };
+    d.light = [change](Image& counts, Random&) { change(counts); };
     return d;
   };
-  const auto blur = [](double pixels) {
-    Disturbance d;
-    d.light = [pixels](Image& counts, Random&) {
-      Image sum(kSize, kSize);
-      for (const double dx : {-pixels, 0.0, pixels})
-        for (const double dy : {-pixels, 0.0, pixels}) {
-          Image moved = counts;
-          resample(moved, [&](int x, int y) { return std::pair(x + dx, y + dy); });
-          for (std::size_t i = 0; i < sum.size(); ++i) sum.values()[i] += moved.values()[i] / 9;
-        }
-      counts = sum;
-    };
-    return d;
-  };
-  const auto gamma = [](double power) {
-    Disturbance d;
-    d.light = [power](Image& counts, Random&) {
-      for (double& v : counts.values()) v = 1100 * std::pow(v / 1100, power);
-    };
-    return d;
-  };
+  const auto aspect = [&](double share) { return by(narrowed(47.7, share)); };
+  const auto blur = [&](double pixels) { return by(blurred(pixels)); };
+  const auto gamma = [&](double power) { return by(bent(1100, power)); };
   const auto black_cut = [](double share) {
     Disturbance d;
     d.camera = [share](Image& counts, Random&) {
@@ -443,34 +409,14 @@ TEST(DisturbedRecovery, NearlyTheModelIsPaidForOrRefused) {
 // What pictures depart by is fitted where something is left over, and what it came out as is what it was: every
 // departure of the catalogue, made of the counts and not by its first order.
 TEST(DisturbedRecovery, DeparturesAreFoundAsTheyAre) {
-  using Change = std::function<void(Image&)>;
-  const auto u = [](int pixel) { return (pixel - 47.5) / 48; };
-  /// Mean counts at (x, y in -1 .. 1 from the middle, y upwards) from those that there are.
-  const auto over = [&](const std::function<double(double, double, double)>& f) -> Change {
-    return [=](Image& counts) {
-      for (int y = 0; y < kSize; ++y)
-        for (int x = 0; x < kSize; ++x) counts(x, y) = f(counts(x, y), u(x), -u(y));
-    };
-  };
-  const auto times = [&](const std::function<double(double, double)>& f) {
+  const auto times = [](const std::function<double(double, double)>& f) {
     return over([=](double v, double x, double y) { return kOffset + (v - kOffset) * (1 + f(x, y)); });
   };
-  const auto plus = [&](const std::function<double(double, double)>& f) {
+  const auto plus = [](const std::function<double(double, double)>& f) {
     return over([=](double v, double x, double y) { return v + kGain * f(x, y); });
   };
-  // The mean over three by three points a pixel apart.
-  const Change blur = [](Image& counts) {
-    const Image seen = counts;
-    for (int y = 1; y + 1 < kSize; ++y)
-      for (int x = 1; x + 1 < kSize; ++x) {
-        double sum = 0;
-        for (int j = -1; j <= 1; ++j)
-          for (int i = -1; i <= 1; ++i) sum += seen(x + i, y + j);
-        counts(x, y) = sum / 9;
-      }
-  };
   // Wider by a share along axes turned by `turned` from x towards the lower right, as much narrower across.
-  const auto stretched = [](double share, double turned) -> Change {
+  const auto stretched = [](double share, double turned) -> Disturb {
     return [=](Image& counts) {
       const double c = std::cos(turned), s = std::sin(turned);
       resample(counts, [=](int x, int y) {
@@ -483,7 +429,7 @@ TEST(DisturbedRecovery, DeparturesAreFoundAsTheyAre) {
   struct Case {
     const char* name;
     double truth;
-    Change change;
+    Disturb change;
   };
   const std::vector<Case> cases{
       {"light_x", 0.04, times([](double x, double) { return 0.04 * x; })},
@@ -492,7 +438,7 @@ TEST(DisturbedRecovery, DeparturesAreFoundAsTheyAre) {
       {"background_x", 0.02, plus([](double x, double) { return 0.02 * x; })},
       {"background_y", 0.02, plus([](double, double y) { return 0.02 * y; })},
       {"background_square", 0.02, plus([](double x, double y) { return 0.02 * (x * x + y * y); })},
-      {"blur", 2.0 / 3, blur},
+      {"blur", 2.0 / 3, blurred(1)},
       {"stretch_x", 0.005, stretched(0.005, 0)},
       {"stretch_diagonal", -0.005, stretched(-0.005, M_PI / 4)}};
   std::set<std::string> known, tested{"gamma", "curve"};

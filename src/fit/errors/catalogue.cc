@@ -6,6 +6,7 @@
 
 #include "fit/errors/discrepancy.h"
 #include "fit/problem/effects.h"
+#include "samples/kind.h"
 
 namespace birefit::estimation {
 namespace {
@@ -55,12 +56,17 @@ const char* words_of(const std::string& name) {
 }  // namespace
 
 bool asks_catalogue(const Task& task, Optimum& optimum) {
-  // What misses more of the contrast is not nearly the picture's model: other physics, another director.
-  constexpr double kNearly = 0.02;
+  constexpr double kHopeless = 0.1;
   if (optimum.stopped || task.frames() != 1 || !task.picture(0).effects.empty()) return false;
-  if (!(missed_of_contrast(task, optimum) < kNearly)) return false;
+  if (!traits_of(task.picture(0).scene).round) return false;
+  if (!(missed_of_contrast(task, optimum) < kHopeless)) return false;
   optimum.explained = !leaves_discrepancy(task, optimum);
   return !optimum.explained;
+}
+
+bool believes_catalogue(double missed_before, double missed_after) {
+  constexpr double kNearly = 0.02, kAll = 0.1;
+  return missed_before < kNearly || missed_after < kAll * missed_before;
 }
 
 FitJob with_catalogue(const Task& task, const Optimum& optimum) {

@@ -6,10 +6,14 @@
 
 namespace birefit::estimation {
 
-/// Whether noise does not explain what a fit of one picture of a sphere leaves over, while the model misses less than a
-/// fiftieth of its contrast: then the catalogue is asked. Where noise does explain it, the optimum says so from then
-/// on.
+/// Whether noise does not explain what a fit of one picture of a sphere or disc leaves over, while the model misses
+/// less than a tenth of its contrast: then the catalogue is asked. Where noise does explain it, the optimum says so
+/// from then on.
 bool asks_catalogue(const Task& task, Optimum& optimum);
+/// By what is missed of the contrast (missed_of_contrast) without and with the catalogue: what missed more than a
+/// fiftieth is not nearly the picture's model, but other physics or another director, unless nearly all of it is
+/// explained.
+bool believes_catalogue(double missed_before, double missed_after);
 
 /// The job with a nuisance for each: light and background that are uneven, the blur of lenses and resampling, a camera
 /// that is not linear, pixels out of square, each with a prior of the size that such departures have (docs/methods.md,

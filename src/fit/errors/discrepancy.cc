@@ -3,114 +3,67 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "fit/errors/patterns.h"
 #include "fit/errors/statistics.h"
-#include "fit/problem/effects.h"
 #include "samples/kind.h"
-#include "scene/values.h"
 
 namespace birefit::estimation {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr int kParts = 12;  ///< sectors, and rings
-
-/// Where a pixel lies: from -1 to 1 along the picture's longer side, and about the sphere.
-struct Place {
-  double x, y, radius, azimuth;  ///< of the picture; in sphere's radii, and from the polarizer on
-};
-
-/// What discrepancies look like, in groups of patterns that are as likely as one another.
-class Patterns {
- public:
-  Patterns() {
-    const auto add_group = [this](int patterns) {
-      group_.insert(group_.end(), static_cast<std::size_t>(patterns), groups_++);
-    };
-    // By the order in which of() lists them.
-    add_group(5), add_group(22), add_group(9), add_group(2);
-    add_group(6), add_group(8), add_group(10), add_group(18);
-    add_group(3), add_group(1);
-  }
-  int count() const { return static_cast<int>(group_.size()); }
-  int groups() const { return groups_; }
-  int group(int pattern) const { return group_[static_cast<std::size_t>(pattern)]; }
-  /// `light`: the model's, from 0 to 1 over the picture, and how it changes by these effects.
-  struct Light {
-    double value, stretched_along_x, stretched_along_diagonal, grown, blurred;
-  };
-  void of(const Place& at, const Light& light, Eigen::Ref<Eigen::VectorXd> out) const {
-    int k = 0;
-    const auto wave = [&](int i, int j) {
-      return std::cos(kPi * i * 0.5 * (at.x + 1)) * std::cos(kPi * j * 0.5 * (at.y + 1));
-    };
-    const auto waves = [&](int from, int to, double factor) {
-      for (int order = from; order <= to; ++order)
-        for (int i = 0; i <= order; ++i) out[k++] = factor * wave(i, order - i);
-    };
-    waves(1, 2, 1), waves(3, 6, 1);  // light that is added, slow and faster
-    waves(1, 3, light.value);        // that light is multiplied by
-    // A camera that is not linear.
-    out[k++] = light.value * light.value, out[k++] = light.value * light.value * light.value;
-    // Rings: of a cross between polarizers, of all azimuths, of others.
-    constexpr double kReach = 1.3;
-    const bool inside = at.radius < kReach;
-    const double t = kPi * at.radius / kReach, c2 = std::cos(2 * at.azimuth), s2 = std::sin(2 * at.azimuth);
-    const auto ring = [&](int order, double by) { out[k++] = inside ? std::cos(order * t) * by : 0; };
-    for (int order = 0; order < 14; ++order) ring(order, s2 * s2);
-    for (int order = 0; order < 10; ++order) ring(order, 1);
-    for (int order = 0; order < 6; ++order) ring(order, c2), ring(order, 2 * s2 * c2), ring(order, c2 * s2 * s2);
-    // Out of round, or pixels out of square: then its size is uncertain by as much, which itself leaves no trace.
-    out[k++] = light.stretched_along_x, out[k++] = light.stretched_along_diagonal, out[k++] = light.grown;
-    out[k++] = light.blurred;  // blurred or sharpened
-  }
-
- private:
-  std::vector<int> group_;
-  int groups_ = 0;
-};
-
-/// Sums over the pixels, in units of the noise: J the unknowns' columns, B the patterns', r the residual.
+/// Sums over the pixels of one picture, in units of the noise: J the unknowns' columns, B the patterns', r the
+/// residual.
 struct Sums {
   Eigen::MatrixXd jj, jb, bb;
   Eigen::VectorXd jr, br;
   double rr = 0, pixels = 0;
-  struct Part {
-    Eigen::MatrixXd jj;
-    Eigen::VectorXd jr;
-  };
-  std::vector<Part> sectors, rings;
+  std::vector<int> group;  ///< of every pattern
+};
+/// What a part of all pictures adds to those.
+struct Part {
+  Eigen::MatrixXd jj;
+  Eigen::VectorXd jr;
+};
+/// Ways to part the pictures: into sectors and rings, or columns and rows; and one from another.
+using Partition = std::vector<Part>;
+
+struct Parted {
+  std::vector<Sums> pictures;
+  std::array<Partition, 2> within;
+
+  /// As they are where the noise has this variance, in units of what it had.
+  void measure_by(double variance) {
+    for (Sums& s : pictures) {
+      s.jj /= variance, s.jb /= variance, s.bb /= variance;
+      s.jr /= variance, s.br /= variance, s.rr /= variance;
+    }
+    for (Partition& partition : within)
+      for (Part& part : partition) part.jj /= variance, part.jr /= variance;
+  }
 };
 
-/// The model's light over the picture, from 0 to 1.
-KnownLight light_of(const LeastSquares& problem, const View& view, const Theta& theta) {
-  const std::array<double, 2> range = problem.intensity_range(0);
-  const double contrast = std::max(range[1] - range[0], 1e-300);
-  return {view, theta, problem.pixels(0).pixels, (problem.intensity().array() - range[0]).matrix() / contrast};
+Part no_part(const Task& task) {
+  const Eigen::Index n = task.unknowns.size();
+  return {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
 }
-Patterns::Light patterns_light(const KnownLight& light, int x, int y) {
-  using Kind = PictureEffect::Kind;
-  return {light.light(x, y), effect_at(Kind::stretch_x, light, x, y), effect_at(Kind::stretch_diagonal, light, x, y),
-          effect_at(Kind::growth, light, x, y), effect_at(Kind::blur, light, x, y)};
+
+/// Patterns of rms 1, whatever they came with.
+void scale_patterns(Sums& sums) {
+  Eigen::VectorXd scale = (sums.bb.diagonal() / std::max(1.0, sums.pixels)).cwiseSqrt();
+  scale = scale.unaryExpr([](double v) { return v > 0 ? 1 / v : 0.0; });
+  sums.bb = scale.asDiagonal() * sums.bb * scale.asDiagonal();
+  sums.jb = sums.jb * scale.asDiagonal();
+  sums.br = scale.cwiseProduct(sums.br);
 }
 
 /// Over every stride-th pixel.
-Sums sums_of(const Task& task, const Optimum& optimum, const Patterns& patterns, Eigen::Index stride) {
-  const LeastSquares& problem = *optimum.problem;
-  const PixelSet& set = problem.pixels(0);
-  const Scene& scene = task.picture(0).scene;
-  const Values<double> value(optimum.theta, {});
-  const double center_x = value(scene.view.center_x_px), center_y = value(scene.view.center_y_px),
-               radius_px = 0.5 * value(traits_of(scene).sphere_diameter_um) / value(scene.view.pixel_size_um),
-               from = value.radians(scene.microscope.polarizer_deg),
-               half_side = 0.5 * std::max(scene.view.width, scene.view.height);
-  const KnownLight light = light_of(problem, scene.view, optimum.theta);
-  const Eigen::Index n = task.unknowns.size(), m = patterns.count();
-  const Sums::Part none{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
+Sums sums_of(const LeastSquares& problem, const Patterns& patterns, int picture, Eigen::Index stride,
+             std::array<Partition, 2>& parts) {
+  const PixelSet& set = problem.pixels(picture);
+  const Eigen::Index n = parts[0].front().jr.size(), m = patterns.count();
   Sums sums{Eigen::MatrixXd::Zero(n, n),
             Eigen::MatrixXd::Zero(n, m),
             Eigen::MatrixXd::Zero(m, m),
@@ -118,10 +71,10 @@ Sums sums_of(const Task& task, const Optimum& optimum, const Patterns& patterns,
             Eigen::VectorXd::Zero(m),
             0,
             0,
-            std::vector<Sums::Part>(kParts, none),
-            std::vector<Sums::Part>(kParts, none)};
-  problem.for_noise_whitened_rows(0, [&](Eigen::Index begin, const Eigen::MatrixXd& all_rows,
-                                         const Eigen::VectorXd& all_residuals) {
+            {}};
+  for (int k = 0; k < patterns.count(); ++k) sums.group.push_back(patterns.group(k));
+  problem.for_noise_whitened_rows(picture, [&](Eigen::Index begin, const Eigen::MatrixXd& all_rows,
+                                               const Eigen::VectorXd& all_residuals) {
     const Eigen::Index first = (stride - begin % stride) % stride,
                        used = (all_rows.rows() - first + stride - 1) / stride;
     if (used <= 0) return;
@@ -132,95 +85,193 @@ Sums sums_of(const Task& task, const Optimum& optimum, const Patterns& patterns,
     Eigen::VectorXd pattern(m);
     for (Eigen::Index i = 0; i < rows.rows(); ++i) {
       const Eigen::Index pixel = begin + first + i * stride;
-      const auto [x, y] = set.pixels[static_cast<std::size_t>(pixel)];
-      const double dx = x - center_x, dy = center_y - y;
-      const Place place{(x + 0.5) / half_side - 1, (y + 0.5) / half_side - 1, std::hypot(dx, dy) / radius_px,
-                        std::atan2(dy, dx) - from};
-      patterns.of(place, patterns_light(light, x, y), pattern);
+      patterns.at(pixel, pattern);
       columns.row(i) = pattern.transpose() / set.sigma[pixel];
-      const double turn = place.azimuth / (2 * kPi);
-      // Eleven rings to just beyond the rim, and all that is outside.
-      const auto sector = static_cast<std::size_t>(kParts * (turn - std::floor(turn))) % kParts;
-      const auto ring = static_cast<std::size_t>(std::min(kParts - 1.0, place.radius / 1.05 * (kParts - 1)));
-      for (Sums::Part* part : {&sums.sectors[sector], &sums.rings[ring]}) {
-        part->jj.selfadjointView<Eigen::Lower>().rankUpdate(rows.row(i).transpose());
-        part->jr += rows.row(i).transpose() * residual[i];
+      const std::array<std::size_t, 2> at = patterns.parts_at(pixel);
+      for (std::size_t way = 0; way < parts.size(); ++way) {
+        Part& part = parts[way][at[way]];
+        part.jj.selfadjointView<Eigen::Lower>().rankUpdate(rows.row(i).transpose());
+        part.jr += rows.row(i).transpose() * residual[i];
       }
     }
     sums.jj += rows.transpose() * rows, sums.jb += rows.transpose() * columns, sums.bb += columns.transpose() * columns;
     sums.jr += rows.transpose() * residual, sums.br += columns.transpose() * residual;
     sums.rr += residual.squaredNorm(), sums.pixels += static_cast<double>(rows.rows());
   });
-  for (std::vector<Sums::Part>* parts : {&sums.sectors, &sums.rings})
-    for (Sums::Part& part : *parts) part.jj = Eigen::MatrixXd(part.jj.selfadjointView<Eigen::Lower>());
-  // Patterns of rms 1.
-  Eigen::VectorXd scale = (sums.bb.diagonal() / sums.pixels).cwiseSqrt();
-  scale = scale.unaryExpr([](double v) { return v > 0 ? 1 / v : 0.0; });
-  sums.bb = scale.asDiagonal() * sums.bb * scale.asDiagonal();
-  sums.jb = sums.jb * scale.asDiagonal();
-  sums.br = scale.cwiseProduct(sums.br);
+  scale_patterns(sums);
   return sums;
 }
 
-struct Discrepancy {
-  double evidence;             ///< twice the log of the likelihood ratio against noise alone
-  double white;                ///< variance of what no pattern explains, over the noise's
-  Eigen::MatrixXd covariance;  ///< of the unknowns, by a discrepancy of the size that the residual shows
-};
-/// `c`: the unknowns' covariance by noise alone.
-Discrepancy by_patterns(const Patterns& patterns, const Sums& s, const Eigen::MatrixXd& c) {
-  const Eigen::Index m = patterns.count(), p = c.rows();
-  const Eigen::MatrixXd g = s.bb - s.jb.transpose() * c * s.jb;
-  const Eigen::VectorXd h = s.br - s.jb.transpose() * (c * s.jr);
-  const double excess = std::max(s.rr / s.pixels - 1, 3 * std::sqrt(2 / s.pixels));
-  Eigen::VectorXd v = Eigen::VectorXd::Constant(patterns.groups(), excess / static_cast<double>(m));
-  Eigen::VectorXd of_pattern(m), found = Eigen::VectorXd::Zero(m);
-  double free = 0, evidence = 0;
-  const auto spread = [&] {
-    for (Eigen::Index k = 0; k < m; ++k) of_pattern[k] = v[patterns.group(static_cast<int>(k))];
-  };
-  constexpr int kTimes = 60;
-  for (int time = 0; time < kTimes; ++time) {
-    spread();
-    // (G + V^-1)^-1 = V^1/2 (1 + V^1/2 G V^1/2)^-1 V^1/2, which a vanishing variance leaves sound.
-    const Eigen::VectorXd root = of_pattern.cwiseSqrt();
-    Eigen::MatrixXd inner = root.asDiagonal() * g * root.asDiagonal();
-    inner.diagonal().array() += 1;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(inner);
-    const Eigen::MatrixXd sigma = root.asDiagonal() * solver.solve(Eigen::MatrixXd::Identity(m, m)) * root.asDiagonal();
-    found = sigma * h;
-    evidence = h.dot(found) - solver.vectorD().array().abs().log().sum();
-    Eigen::VectorXd squares = Eigen::VectorXd::Zero(v.size()), known = squares;
-    free = 0;
-    for (Eigen::Index k = 0; k < m; ++k) {
-      const int group = patterns.group(static_cast<int>(k));
-      const double share = of_pattern[k] > 0 ? 1 - sigma(k, k) / of_pattern[k] : 0;
-      squares[group] += found[k] * found[k], known[group] += share, free += share;
-    }
-    const Eigen::VectorXd before = v;
-    for (Eigen::Index group = 0; group < v.size(); ++group)
-      v[group] = known[group] > 1e-9 ? squares[group] / known[group] : 0;
-    if ((v - before).cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
-  }
-  spread();
-  // What no pattern explains is white, and scales what noise does.
-  const Eigen::VectorXd pull = s.jr - s.jb * found, moved = c * pull;
-  const double rest =
-      s.rr - 2 * found.dot(s.br) + found.dot(s.bb * found) - 2 * pull.dot(moved) + moved.dot(s.jj * moved);
-  const double white = std::max(1.0, rest / std::max(1.0, s.pixels - static_cast<double>(p) - free));
-  const Eigen::MatrixXd influence = c * s.jb;
-  return {evidence, white, influence * of_pattern.asDiagonal() * influence.transpose()};
+Parted parted(const Task& task, const LeastSquares& problem, Eigen::Index stride) {
+  Parted all;
+  all.within.fill(Partition(Patterns::kParts, no_part(task)));
+  for (int g = 0; g < task.frames(); ++g)
+    all.pictures.push_back(sums_of(problem, Patterns(task, g, problem), g, stride, all.within));
+  for (Partition& partition : all.within)
+    for (Part& part : partition) part.jj = Eigen::MatrixXd(part.jj.selfadjointView<Eigen::Lower>());
+  return all;
 }
 
+/// Frames that are one number each, rows of a table or even pictures, by the weights of their fit: the scatter that
+/// they show is in those, what they have in common with their neighbours is not.
+Parted parted_rows(const Task& task, const LeastSquares& problem) {
+  const RowPatterns patterns(task, problem);
+  const auto rows = static_cast<Eigen::Index>(task.frames());
+  Eigen::MatrixXd jacobian(rows, task.unknowns.size()), columns(rows, patterns.count());
+  Eigen::VectorXd residual(rows);
+  Parted all;
+  all.within.fill(Partition(Patterns::kParts, no_part(task)));
+  for (Eigen::Index g = 0; g < rows; ++g) {
+    const LeastSquares::FrameMisfit frame = problem.frame_misfit(static_cast<int>(g));
+    const Misfit& misfit = problem.misfit()[static_cast<std::size_t>(g)];
+    const double weight = misfit.mean_follows_shape ? 1 / std::sqrt(misfit.shape_variance)
+                                                    : 1 / std::hypot(1, misfit.mean_sd / frame.mean_noise_sd);
+    jacobian.row(g) = weight * frame.mean_jacobian_whitened.transpose();
+    residual[g] = weight * frame.mean_whitened;
+    columns.row(g) = weight / frame.mean_noise_sd * patterns.of(static_cast<int>(g)).transpose();
+    for (Partition& partition : all.within) {
+      Part& part = partition[static_cast<std::size_t>(g * Patterns::kParts / rows)];
+      part.jj += jacobian.row(g).transpose() * jacobian.row(g), part.jr += jacobian.row(g).transpose() * residual[g];
+    }
+  }
+  Sums sums{jacobian.transpose() * jacobian, jacobian.transpose() * columns,
+            columns.transpose() * columns,   jacobian.transpose() * residual,
+            columns.transpose() * residual,  residual.squaredNorm(),
+            static_cast<double>(rows),       {}};
+  for (int k = 0; k < patterns.count(); ++k) sums.group.push_back(patterns.group(k));
+  scale_patterns(sums);
+  all.pictures.push_back(std::move(sums));
+  return all;
+}
+
+struct Discrepancy {
+  double evidence = 0;         ///< twice the log of the likelihood ratio against noise alone
+  double white = 1;            ///< variance of what no pattern explains, over the noise's
+  Eigen::MatrixXd covariance;  ///< of the unknowns, by a discrepancy of the size that the residual shows
+};
+/// Of the patterns' coefficients in one picture, given the variances of all.
+struct Found {
+  Eigen::VectorXd root;      ///< standard deviations before
+  Eigen::MatrixXd alone;     ///< (1 + V^1/2 B'B V^1/2)^-1
+  Eigen::MatrixXd shared;    ///< V^1/2 B'J
+  Eigen::VectorXd mean;      ///< after
+  Eigen::VectorXd variance;  ///< after
+};
+/// `information`, `c`: of the unknowns by noise alone, and its inverse.
+class ByPatterns {
+ public:
+  ByPatterns(const std::vector<Sums>& pictures, const Eigen::MatrixXd& information, const Eigen::MatrixXd& c)
+      : pictures_(pictures), information_(information), c_(c), found_(pictures.size()) {
+    pull_ = Eigen::VectorXd::Zero(c.rows());
+    for (const Sums& s : pictures) pull_ += s.jr;
+  }
+  Discrepancy operator()() {
+    double rr = 0, pixels = 0, patterns = 0;
+    for (const Sums& s : pictures_)
+      rr += s.rr, pixels += s.pixels, patterns += static_cast<double>(s.group.size()) / pictures_.size();
+    const double excess = std::max(rr / pixels - 1, 3 * std::sqrt(2 / pixels));
+    Eigen::VectorXd v = Eigen::VectorXd::Constant(Patterns::kGroups, excess / patterns);
+    constexpr int kTimes = 60;
+    for (int time = 0; time < kTimes; ++time) {
+      settle(v);
+      const Eigen::VectorXd before = std::exchange(v, variances(v));
+      if ((v - before).cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
+    }
+    // What no pattern explains is white, and scales what noise does.
+    Eigen::VectorXd pull = pull_;
+    double rest = rr;
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(c_.rows(), c_.rows());
+    for (std::size_t g = 0; g < pictures_.size(); ++g) {
+      const Sums& s = pictures_[g];
+      const Eigen::VectorXd& mean = found_[g].mean;
+      pull -= s.jb * mean, rest += mean.dot(s.bb * mean) - 2 * mean.dot(s.br);
+      const Eigen::MatrixXd influence = c_ * s.jb;
+      for (Eigen::Index k = 0; k < mean.size(); ++k)
+        covariance += v[s.group[static_cast<std::size_t>(k)]] * influence.col(k) * influence.col(k).transpose();
+    }
+    const Eigen::VectorXd moved = c_ * pull;
+    Eigen::MatrixXd jj = Eigen::MatrixXd::Zero(c_.rows(), c_.rows());
+    for (const Sums& s : pictures_) jj += s.jj;
+    rest += moved.dot(jj * moved) - 2 * pull.dot(moved);
+    const double left = pixels - static_cast<double>(c_.rows()) - free_;
+    return {evidence_, std::max(1.0, rest / std::max(1.0, left)), covariance};
+  }
+
+ private:
+  /// The coefficients after, by the inverse of (G + V^-1) = V^-1/2 (A - U C U') V^-1/2, where A = 1 + V^1/2 B'B V^1/2
+  /// is a block a picture and U = V^1/2 B'J has a column an unknown (Woodbury's identity).
+  void settle(const Eigen::VectorXd& v) {
+    Eigen::MatrixXd among = information_;
+    evidence_ = 0;
+    for (std::size_t g = 0; g < pictures_.size(); ++g) {
+      const Sums& s = pictures_[g];
+      Found& found = found_[g];
+      const auto m = static_cast<Eigen::Index>(s.group.size());
+      found.root.resize(m);
+      for (Eigen::Index k = 0; k < m; ++k) found.root[k] = std::sqrt(v[s.group[static_cast<std::size_t>(k)]]);
+      Eigen::MatrixXd inner = found.root.asDiagonal() * s.bb * found.root.asDiagonal();
+      inner.diagonal().array() += 1;
+      const Eigen::LDLT<Eigen::MatrixXd> solver(inner);
+      found.alone = solver.solve(Eigen::MatrixXd::Identity(m, m));
+      found.shared = found.root.asDiagonal() * s.jb.transpose();
+      among -= found.shared.transpose() * found.alone * found.shared;
+      evidence_ -= solver.vectorD().array().abs().log().sum();
+    }
+    const Eigen::LDLT<Eigen::MatrixXd> solver(among);
+    evidence_ -= solver.vectorD().array().abs().log().sum() - information_.ldlt().vectorD().array().abs().log().sum();
+    // h of a picture is V^1/2 (B'r - B'J C J'r), and J'r is of all pictures.
+    std::vector<Eigen::VectorXd> h;
+    Eigen::VectorXd along = Eigen::VectorXd::Zero(c_.rows());
+    const Eigen::VectorXd taken = c_ * pull_;
+    for (std::size_t g = 0; g < pictures_.size(); ++g) {
+      Found& found = found_[g];
+      h.push_back(found.root.cwiseProduct(pictures_[g].br) - found.shared * taken);
+      along += found.shared.transpose() * (found.alone * h.back());
+    }
+    const Eigen::VectorXd answer = solver.solve(along);
+    for (std::size_t g = 0; g < pictures_.size(); ++g) {
+      Found& found = found_[g];
+      const Eigen::MatrixXd seen = found.alone * found.shared;
+      const Eigen::VectorXd mean = found.alone * h[g] + seen * answer;
+      evidence_ += h[g].dot(mean);
+      found.mean = found.root.cwiseProduct(mean);
+      const Eigen::MatrixXd solved = solver.solve(seen.transpose());
+      found.variance = found.root.cwiseAbs2().cwiseProduct(found.alone.diagonal() +
+                                                           seen.cwiseProduct(solved.transpose()).rowwise().sum());
+    }
+  }
+  /// Of the groups, the next ones.
+  Eigen::VectorXd variances(const Eigen::VectorXd& v) {
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(v.size()), known = squares;
+    free_ = 0;
+    for (std::size_t g = 0; g < pictures_.size(); ++g)
+      for (std::size_t k = 0; k < pictures_[g].group.size(); ++k) {
+        const int group = pictures_[g].group[k];
+        const auto i = static_cast<Eigen::Index>(k);
+        const double share = v[group] > 0 ? 1 - found_[g].variance[i] / v[group] : 0;
+        squares[group] += found_[g].mean[i] * found_[g].mean[i], known[group] += share, free_ += share;
+      }
+    for (Eigen::Index group = 0; group < v.size(); ++group)
+      squares[group] = known[group] > 1e-9 ? squares[group] / known[group] : 0;
+    return squares;
+  }
+
+  const std::vector<Sums>& pictures_;
+  const Eigen::MatrixXd &information_, &c_;
+  Eigen::VectorXd pull_;
+  std::vector<Found> found_;
+  double evidence_ = 0, free_ = 0;
+};
+
 /// The variances of the unknowns by fits without a part at a time, nearly all of it.
-Eigen::VectorXd by_parts(const std::vector<Sums::Part>& parts, const Eigen::MatrixXd& information) {
+Eigen::VectorXd by_parts(const Partition& parts, const Eigen::MatrixXd& information) {
   constexpr double kLeftOut = 0.98;
   const double m = static_cast<double>(parts.size());
   Eigen::VectorXd mean_pull = Eigen::VectorXd::Zero(information.rows());
-  for (const Sums::Part& part : parts) mean_pull += part.jr / m;
+  for (const Part& part : parts) mean_pull += part.jr / m;
   std::vector<Eigen::VectorXd> steps;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(information.rows()), variance = mean;
-  for (const Sums::Part& part : parts) {
+  for (const Part& part : parts) {
     steps.push_back(-(information - kLeftOut * part.jj).ldlt().solve(part.jr - mean_pull));
     mean += steps.back() / m;
   }
@@ -228,33 +279,76 @@ Eigen::VectorXd by_parts(const std::vector<Sums::Part>& parts, const Eigen::Matr
   return variance;
 }
 
-/// What there is to say of a fit's residual; nothing where it is not one picture of a sphere, or where noise explains
-/// it.
+/// Pictures whose model changes from place to place, each with enough of it to tell patterns apart.
+bool tells_patterns(const Task& task, const LeastSquares& problem) {
+  constexpr std::size_t kFewestPixels = 400;
+  constexpr double kContrast = 0.05;  // else it is one number
+  for (int g = 0; g < task.frames(); ++g) {
+    const auto [low, high] = problem.intensity_range(g);
+    if (task.observable(g).quantity != Quantity::intensity || traits_of(task.picture(g).scene).even ||
+        problem.pixels(g).pixels.size() < kFewestPixels ||
+        !(high - low > kContrast * std::max(std::abs(high), std::abs(low))))
+      return false;
+  }
+  return task.frames() > 0 && task.unknowns.size() > 0;
+}
+
+/// Frames of one number each, enough of them to tell a pattern from what is fitted.
+bool tells_row_patterns(const Task& task, const LeastSquares& problem) {
+  constexpr int kFreedom = 8;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Picture& picture = task.picture(g);
+    const bool even = traits_of(picture.scene).even && picture.uneven.empty() && picture.effects.empty();
+    if (task.observable(g).quantity != Quantity::intensity || (!even && problem.pixels(g).pixels.size() != 1))
+      return false;
+  }
+  return task.unknowns.size() > 0 && task.frames() >= task.unknowns.size() + kFreedom;
+}
+
+/// What there is to say of a fit's residual; nothing where noise explains it.
 struct LeftOver {
-  Sums sums;
+  Parted parted;
   Eigen::MatrixXd information;
   Inverse inverse;
   Discrepancy found;
-  double pixels = 0;
+  double sampled = 1;  ///< share of the pixels
 };
 std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
-  const bool spheres = task.frames() == 1 && task.observable(0).quantity == Quantity::intensity &&
-                       traits_of(task.picture(0).scene).sphere_diameter_um;
-  if (!spheres || task.unknowns.size() == 0 || optimum.stopped) return std::nullopt;
   const LeastSquares& problem = *optimum.problem;
-  const double pixels = static_cast<double>(problem.pixel_rows()), chi_square = problem.frame_misfit(0).chi_square;
-  const Patterns patterns;
+  if (optimum.stopped) return std::nullopt;
+  const bool rows = tells_row_patterns(task, problem);
+  if (!rows && !tells_patterns(task, problem)) return std::nullopt;
   constexpr double kPixels = 40000;  // they tell a discrepancy as well as all of them
-  const Eigen::Index stride = static_cast<Eigen::Index>(std::ceil(pixels / kPixels));
-  Sums sums = sums_of(task, optimum, patterns, stride);
-  const Eigen::MatrixXd all = problem.factor(true), data = problem.factor(false);
-  Eigen::MatrixXd information = sums.jj + (all.transpose() * all - data.transpose() * data);
-  Inverse inverse = invert_normal_equations(Eigen::MatrixXd(information.llt().matrixU()));
-  if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return std::nullopt;
-  Discrepancy found = by_patterns(patterns, sums, inverse.covariance);
+  double pixels = rows ? task.frames() : static_cast<double>(problem.pixel_rows());
+  Parted sums =
+      rows ? parted_rows(task, problem) : parted(task, problem, static_cast<Eigen::Index>(std::ceil(pixels / kPixels)));
+  const Eigen::MatrixXd all = problem.factor(true), data = problem.factor(false),
+                        prior = all.transpose() * all - data.transpose() * data;
+  double chi_square = 0, used = 0;
+  for (int g = 0; g < task.frames(); ++g) chi_square += problem.frame_misfit(g).chi_square;
+  for (const Sums& s : sums.pictures) used += s.pixels;
+  Eigen::MatrixXd information;
+  Inverse inverse;
+  Discrepancy found;
+  // A noise that is larger than it was thought to be is no pattern: in its units they are sought again.
+  constexpr int kTimes = 3;
+  constexpr double kAsThought = 1.1;
+  for (int time = 0; time < kTimes; ++time) {
+    if (time > 0) sums.measure_by(found.white);
+    information = prior;
+    for (const Sums& s : sums.pictures) information += s.jj;
+    inverse = invert_normal_equations(Eigen::MatrixXd(information.llt().matrixU()));
+    if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return std::nullopt;
+    found = ByPatterns(sums.pictures, information, inverse.covariance)();
+    if (found.white < kAsThought) break;
+  }
   constexpr double kEvidence = 15;  // clean pictures stay below it (NoDepartureIsAskedForInCleanPictures)
-  if (!(chi_square / pixels > 1 + 3 * std::sqrt(2 / pixels)) && !(found.evidence > kEvidence)) return std::nullopt;
-  return LeftOver{std::move(sums), std::move(information), std::move(inverse), std::move(found), pixels};
+  // What noise does not explain is charged by its own size, too: what has no size of its own needs a pattern to be
+  // seen.
+  const bool round = !rows && traits_of(task.picture(0).scene).round;
+  const bool beyond_noise = round && chi_square / pixels > 1 + 3 * std::sqrt(2 / pixels);
+  if (!beyond_noise && !(found.evidence > kEvidence)) return std::nullopt;
+  return LeftOver{std::move(sums), std::move(information), std::move(inverse), std::move(found), used / pixels};
 }
 
 }  // namespace
@@ -275,10 +369,15 @@ Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum) {
   const std::optional<LeftOver> left = left_over(task, optimum);
   if (!left) return {};
   Eigen::VectorXd variance =
-      (left->found.white * left->sums.pixels / left->pixels * left->inverse.covariance + left->found.covariance)
-          .diagonal();
-  for (const auto* parts : {&left->sums.sectors, &left->sums.rings})
-    variance = variance.cwiseMax(by_parts(*parts, left->information));
+      (left->found.white * left->sampled * left->inverse.covariance + left->found.covariance).diagonal();
+  for (const Partition& partition : left->parted.within)
+    variance = variance.cwiseMax(by_parts(partition, left->information));
+  constexpr std::size_t kFewestPictures = 3;
+  if (left->parted.pictures.size() >= kFewestPictures) {
+    Partition pictures;
+    for (const Sums& s : left->parted.pictures) pictures.push_back({s.jj, s.jr});
+    variance = variance.cwiseMax(by_parts(pictures, left->information));
+  }
   return variance.allFinite() ? Eigen::VectorXd(kFactor * variance.cwiseMax(0).cwiseSqrt()) : Eigen::VectorXd();
 }
 

@@ -11,11 +11,12 @@ namespace birefit::estimation {
 /// pattern shows in no residual. Its size is read off the residual beside, in groups of patterns of like kind, each
 /// with a variance of its own by the highest likelihood (empirical Bayes; D. J. C. MacKay, Neural Comput. 4, 415
 /// (1992)); what a discrepancy of that size does to the parameters is their covariance. A second opinion: the picture
-/// without one of its sectors or rings at a time (M. H. Quenouille, Biometrika 43, 353 (1956)). The larger of the two
-/// counts, times 1.5, which is measured, not derived (docs/methods.md, "Nearly the model").
+/// without one of its sectors or rings at a time, or columns and rows, or one of several pictures (M. H. Quenouille,
+/// Biometrika 43, 353 (1956)). The larger of the two counts, times 1.5, which is measured, not derived
+/// (docs/methods.md, "Nearly the model").
 ///
-/// Standard deviations of all unknowns, searched first; empty where nothing is left over, or where the job is not one
-/// picture of a droplet or shell.
+/// Standard deviations of all unknowns, searched first; empty where nothing is left over, or where pictures do not
+/// change from place to place (tables, even cells).
 Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum);
 /// Whether it is not empty.
 bool leaves_discrepancy(const Task& task, const Optimum& optimum);

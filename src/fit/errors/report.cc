@@ -8,6 +8,7 @@
 #include "fit/errors/catalogue.h"
 #include "fit/errors/discrepancy.h"
 #include "fit/errors/verdict.h"
+#include "samples/kind.h"
 
 namespace birefit::estimation {
 namespace {
@@ -214,7 +215,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
   if (!signal) result.identifiable = false;
   std::string misfit;
-  if (covariances.discrepancy() && result.described)
+  if (covariances.discrepancy() && result.described && task.frames() == 1 && traits_of(task.picture(0).scene).round)
     misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
   report_stated(task, optimum, covariances, result);
   keep_inputs_of_note(task, result);

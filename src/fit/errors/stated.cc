@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <set>
 
 #include "fit/errors/changed_input.h"
 #include "fit/errors/statistics.h"
+#include "fit/problem/shared_zeros.h"
 
 namespace birefit::estimation {
 namespace {
@@ -63,6 +65,19 @@ Eigen::VectorXd widened(const Task& wider, const Task& narrow, const Theta& thet
   return place;
 }
 
+/// Where frames scatter their weights hold all that stated numbers could explain: the problem as it is before they have
+/// shown a scatter, solved from the optimum.
+std::unique_ptr<LeastSquares> before_scatter(const Task& task, const Optimum& optimum) {
+  auto problem = problem_of(task, optimum.frames, misfit_expected(task, optimum.frames, optimum.theta));
+  Eigen::VectorXd searched = optimum.searched;
+  SolveOptions few;
+  few.max_iterations = 15;
+  few.function_tolerance = 1e-6;
+  few.interrupted = task.job.options.interrupted;
+  problem->solve(searched, few);
+  return problem;
+}
+
 }  // namespace
 
 Stated linear_stated_numbers(const Task& task, LeastSquares& problem, const Theta& theta,
@@ -113,16 +128,16 @@ std::vector<int> told_numbers(const Task& task, const Optimum& optimum) {
 
 WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   if (optimum.stopped || task.unknowns.searched.empty()) return {};
-  // Where the scatter of a few frames is what is known of a misfit, more unknowns would leave it no degrees of freedom:
-  // by derivatives then.
-  if (task.frames() > 1 && (optimum.misfit.frames_scatter || optimum.misfit.beyond_noise)) return {};
-  const Inverse inverse = invert_normal_equations(optimum.problem->factor());
+  const bool scatter = task.frames() > 1 && optimum.misfit.frames_scatter;
+  const std::unique_ptr<LeastSquares> own = scatter ? before_scatter(task, optimum) : nullptr;
+  LeastSquares& problem = own ? *own : *optimum.problem;
+  const Inverse inverse = invert_normal_equations(problem.factor());
   if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return {};
-  const Stated stated = linear_stated_numbers(task, *optimum.problem, optimum.theta, inverse.covariance);
+  const Stated stated = linear_stated_numbers(task, problem, problem.theta(), inverse.covariance);
   const Eigen::Index k = stated.sd.size();
   if (k == 0 || !stated.shift.allFinite() || !stated.information.allFinite()) return {};
   // By the problem's weights, which a misfit has made smaller, and by those of the noise: the misfit may be theirs.
-  const double unit = beyond_noise(optimum);
+  const double unit = own ? 1 : beyond_noise(optimum);
   const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(k, k);
   constexpr double kBetter = 9, kOfExcess = 0.2, kWider = 1.2;
   const auto told_by = [&](double units) { return numbers_told(stated, units); };
@@ -133,8 +148,15 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   // By chance each lowers chi-square by one at most; of a misfit that is not theirs, by as much in its own units.
   const std::vector<int> told = told_by(unit);
   const double enough = kBetter + static_cast<double>(told.size()),
-               excess = optimum.chi_square(task) - static_cast<double>(optimum.problem->pixel_rows());
+               chi_square = own ? problem.objective() : optimum.chi_square(task),
+               excess = chi_square - static_cast<double>(problem.pixel_rows());
+  // Where the scatter of a few frames is what is known of a misfit, more unknowns would leave it no degrees of freedom:
+  // by derivatives then.
+  constexpr int kFreedom = 4;
+  const bool by_frames = task.frames() > 1 && (scatter || optimum.misfit.beyond_noise);
+  if (by_frames && task.frames() < task.unknowns.size() + static_cast<int>(told.size()) + kFreedom) return {};
   if (gain_by(unit) > enough && (gain_by(unit) > kOfExcess * excess || gain_by(1) > enough)) return {told, true};
+  if (by_frames) return {};
   const Eigen::MatrixXd posterior = (prior + stated.information).ldlt().solve(prior);
   for (Eigen::Index j = 0; j < optimum.searched.size(); ++j) {
     const double noise = inverse.covariance(j, j), stated_alone = stated.shift.row(j).squaredNorm(),
@@ -204,13 +226,14 @@ Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum
   return best_minimum(wider, places, false);
 }
 
-bool has_unstated_focus(const FitJob& job) {
-  bool found = false;
+bool has_more_stated(const FitJob& job) {
+  bool found = has_own_dials(job);
   for_each_scene(job.measurements, [&](const Scene& scene) { found = found || may_be_out_of_focus(job, scene); });
   return found;
 }
 
-FitJob with_unstated_focus(FitJob job) {
+FitJob with_all_stated(FitJob job) {
+  job = with_shared_zeros(std::move(job));
   ParameterRef focus;
   for_each_scene(job.measurements, [&](Scene& scene) {
     if (!may_be_out_of_focus(job, scene)) return;

@@ -48,9 +48,11 @@ Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optim
 /// one and two standard deviations to either side as well.
 Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima);
 
-/// The focus, where an objective is stated, that is not exact, and no focus: set by eye within the depth of field,
-/// wavelength index / (2 NA^2), or 0.3 um if that is more. The same job where there is nothing to add.
-FitJob with_unstated_focus(FitJob job);
-bool has_unstated_focus(const FitJob& job);
+/// With what is stated without being written: the zeros of dials that frames are read off (fit/problem/shared_zeros.h);
+/// the focus, where an objective is stated that is not exact, and no focus: set by eye within the depth of field,
+/// wavelength index / (2 NA^2), or 0.3 um if that is more.
+FitJob with_all_stated(FitJob job);
+/// Whether there is any.
+bool has_more_stated(const FitJob& job);
 
 }  // namespace birefit::estimation

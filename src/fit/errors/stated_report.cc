@@ -158,7 +158,8 @@ void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& c
     if (const auto at = estimate_at(task, result, static_cast<int>(j)); at && at->unit != "px")
       felt = felt || std::pow(covariances.by_discrepancy[j], 2) - covariances.of_noise.covariance(j, j) >
                          kOfVariance * std::pow(at->stderr_, 2);
-  if (felt || (optimum.misfit.beyond_noise && result.reduced_chi_square > kOfNote))
+  const MisfitFound& found = optimum.misfit;
+  if (felt || ((found.beyond_noise || found.frames_scatter) && result.reduced_chi_square > kOfNote))
     result.misfit.push_back("the model leaves over what noise does not explain");
   for (const MicrographResult& m : result.micrographs)
     if (m.outliers > 0) {

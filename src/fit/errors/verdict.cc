@@ -63,11 +63,19 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
   const int n = unknowns.size();
   if (n == 0) return;
   // Each parameter in units of what was asked: its bounds' width, or its own size. Offsets may be zero: theirs is the
-  // size of the largest linear parameter.
+  // size of the largest linear parameter, gains that are known included.
   Eigen::VectorXd scale(n);
   double linear_size = 0;
   for (int j = 0; j < n; ++j)
     if (result.parameters[j].linear) linear_size = std::max(linear_size, std::abs(result.parameters[j].value));
+  const Theta theta =
+      result.theta.empty() ? job.parameters.values() : result.theta;  // not of a fit, but of its outlook
+  for (const Measurement& measurement : job.measurements)
+    std::visit(
+        [&](const auto& one) {
+          if (one.gain) linear_size = std::max(linear_size, std::abs(one.gain.in(theta)));
+        },
+        measurement);
   for (int j = 0; j < n; ++j) {
     const ParameterEstimate& estimate = result.parameters[j];
     const double width = estimate.upper - estimate.lower;

@@ -47,7 +47,9 @@ DiscZone::DiscZone(const Scene& scene, const Theta& theta) {
 bool DiscZone::fitted(double column, double row) const {
   const double x = (column - center_x_px_) / radius_px_, y = (center_y_px_ - row) / radius_px_;
   const double to_force = std::min(std::hypot(x - load_cos_, y - load_sin_), std::hypot(x + load_cos_, y + load_sin_));
-  return std::hypot(x, y) <= 1 - margins_.rim && to_force >= margins_.contact;
+  // Whole pixels: what of one lies outside changes by jumps with the centre and the diameter.
+  const double half_pixel = std::numbers::sqrt2 / 2 / radius_px_;
+  return std::hypot(x, y) + half_pixel <= 1 - margins_.rim && to_force - half_pixel >= margins_.contact;
 }
 
 std::vector<Zone::Mover> DiscZone::movers() const {

@@ -50,7 +50,7 @@ class DiscZone final : public Zone {
   DiscZone(const Scene& scene, const Theta& theta);
   const DiscMargins& margins() const { return margins_; }
   double radius_px() const { return radius_px_; }
-  /// Inside of the rim and clear of both forces.
+  /// All of the pixel is inside of the rim and clear of both forces.
   bool fitted(double column, double row) const override;
   std::vector<Mover> movers() const override;
 

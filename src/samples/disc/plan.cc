@@ -87,7 +87,12 @@ RenderPlan plan_disc(const Planning& planning) {
   return plan;
 }
 
-Traits disc_traits(const Scene&) { return {.strips = Traits::Strips::rows, .isoclinics = true}; }
+Traits disc_traits(const Scene& scene) {
+  const StressedDisc& disc = std::get<StressedDisc>(scene.sample);
+  return {.round = Traits::Round{disc.diameter_um, disc.load_azimuth_deg},
+          .strips = Traits::Strips::rows,
+          .isoclinics = true};
+}
 
 std::unique_ptr<Zone> disc_zone(const Scene& scene, const Theta& theta) {
   return std::make_unique<DiscZone>(scene, theta);

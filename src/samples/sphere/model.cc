@@ -31,7 +31,10 @@ BIREFIT_FOR_EACH_SCALAR_OF_TABLES(BIREFIT_INSTANTIATE)
 namespace {
 
 bool sphere_has_curved_rays(const Scene& scene) { return rays_stay_meridional(std::get<Droplet>(scene.sample)); }
-Traits sphere_traits(const Scene& scene) { return {.sphere_diameter_um = std::get<Droplet>(scene.sample).diameter_um}; }
+Traits sphere_traits(const Scene& scene) {
+  const ParameterRef diameter_um = std::get<Droplet>(scene.sample).diameter_um;
+  return {.sphere_diameter_um = diameter_um, .round = Traits::Round{diameter_um, scene.microscope.polarizer_deg}};
+}
 
 }  // namespace
 

@@ -1,0 +1,16 @@
+#pragma once
+// What several frames state each for itself on one dial.
+
+#include "birefit/fit.h"
+
+namespace birefit::estimation {
+
+/// Pictures at several angles, or rows at several temperatures, are read off one dial, whose zero is known no better
+/// than one of its readings: where frames state numbers of their own that are known within a standard deviation
+/// (Parameter::known_to.sd), what all of them are off by is a number of its own, stated as 0. A job without such is as
+/// it was.
+FitJob with_shared_zeros(FitJob job);
+/// Whether that would change it.
+bool has_own_dials(const FitJob& job);
+
+}  // namespace birefit::estimation

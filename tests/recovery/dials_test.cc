@@ -1,0 +1,110 @@
+// Pictures at many angles are read off dials, whose zeros nobody knows exactly: one number for all of them. Truth: the
+// closed matrix of a uniform twist, in code of its own.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <string>
+
+#include "birefit/fit.h"
+#include "independent_cell.h"
+#include "scene_builder.h"
+
+namespace birefit {
+namespace {
+using namespace testing;
+
+constexpr int kSide = 12, kPictures = 16;
+constexpr double kGain = 1000, kOffset = 50, kNoise = 10, kDialDeg = 1;
+
+struct Zeros {
+  double polarizer_deg = 0, analyzer_deg = 0, azimuth_deg = 0;
+};
+
+/// Twist and birefringence of a cell between polarizers at random angles, all of them off by the zeros.
+FitResult fit_of(const IndependentCell& cell, const Zeros& zeros, std::mt19937_64& random, bool twist_known = false) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> angle(0, 180);
+  TableBuilder b;
+  const auto dial = [&](const std::string& name, double value) {
+    const ParameterRef ref = b.fixed(name, value);
+    b.table[ref].known_to.sd = kDialDeg;
+    return ref;
+  };
+  Scene scene;
+  Cell as_stated;
+  as_stated.thickness_um = b.fixed("thickness_um", cell.thickness_um);
+  as_stated.director = TwistedDirector{
+      .twist_deg = twist_known ? b.fixed("twist_deg", cell.twist_deg) : b.fitted("twist_deg", 85, 60, 120),
+      .azimuth_deg = dial("azimuth_deg", cell.azimuth_deg),
+      .pretilt_deg = b.fixed("pretilt_deg", 0)};
+  scene.sample = as_stated;
+  scene.material = ConstantIndices{b.fixed("ordinary", 1.5), b.fitted("birefringence", 0.12, 0.09, 0.17)};
+  scene.surround_index = b.fixed("surround", 1.5);
+  scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 1000 * cell.wavelength_um);
+  scene.view.width = scene.view.height = kSide;
+  scene.view.rotation_deg = b.fixed("rotation", 0);
+  const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
+  IndependentCell seen = cell;
+  seen.azimuth_deg += zeros.azimuth_deg;
+  FitJob job;
+  for (int k = 0; k < kPictures; ++k) {
+    const double p = angle(random), a = angle(random);
+    Scene here = scene;
+    const std::string name = "micrographs[" + std::to_string(k) + "].microscope.";
+    here.microscope.polarizer_deg = dial(name + "polarizer_deg", p);
+    here.microscope.analyzer_deg = dial(name + "analyzer_deg", a);
+    std::vector<double> values(kSide * kSide);
+    for (double& v : values)
+      v = kOffset + kGain * seen.intensity(p + zeros.polarizer_deg, a + zeros.analyzer_deg) + kNoise * normal(random);
+    job.measurements.push_back(micrograph_of(name, here, std::move(values), gain, offset, {kNoise, 0}));
+  }
+  job.parameters = b.table;
+  job.demand.ceiling = Ceiling::e_only;
+  job.options.threads = 1;
+  return fit(job);
+}
+
+bool holds(const FitResult& r, const char* name, double truth) {
+  const ParameterEstimate* e = find_estimate(r, name);
+  return e->interval95_low <= truth && truth <= e->interval95_high;
+}
+
+TEST(Dials, ZerosDrawnFromTheirUncertaintyLeaveIntervalsThatHold) {
+  std::mt19937_64 random(17);
+  std::normal_distribution<double> normal(0, kDialDeg);
+  std::uniform_real_distribution<double> twist(70, 110), birefringence(0.11, 0.15);
+  constexpr int kProblems = 25;
+  int answers = 0, inside = 0;
+  for (int problem = 0; problem < kProblems; ++problem) {
+    IndependentCell cell;
+    cell.twist_deg = twist(random), cell.birefringence = birefringence(random);
+    const FitResult r = fit_of(cell, {normal(random), normal(random), normal(random)}, random);
+    if (!r.has_answer()) continue;
+    ++answers;
+    inside += holds(r, "twist_deg", cell.twist_deg) + holds(r, "birefringence", cell.birefringence);
+  }
+  std::printf("  %d answers of %d, %d of %d intervals hold\n", answers, kProblems, inside, 2 * answers);
+  // 95 %, and three sd of that many: the two of a cell move together.
+  EXPECT_GE(inside, 2 * answers * (0.95 - 3 * std::sqrt(0.05 * 0.95 / answers)));
+  EXPECT_GE(answers, kProblems * 4 / 5);
+}
+
+// What the pictures tell of a zero is found, and one far beyond its uncertainty is named. (A twist that is not known
+// would take it over.)
+TEST(Dials, AnAnalyserFarOffIsNamed) {
+  std::mt19937_64 random(5);
+  const IndependentCell cell;
+  const FitResult r = fit_of(cell, {0, 6, 0}, random, true);
+  ASSERT_TRUE(r.has_answer()) << r.verdict;
+  EXPECT_TRUE(holds(r, "birefringence", cell.birefringence)) << r.verdict;
+  // Turned all together they are as they were: what is found is what polarizers and director have against each other.
+  bool named = false;
+  for (const StatedNumber& number : r.stated) named = named || std::abs(number.away()) > kContradicted;
+  EXPECT_TRUE(named) << r.verdict;
+}
+
+}  // namespace
+}  // namespace birefit
