@@ -36,7 +36,7 @@ struct Parameter {
   double physical_upper = std::numeric_limits<double>::infinity();
   bool linear = false;  ///< gain or offset: solved exactly inside the fit, never searched
   /// Of a number that is not fitted: it enters every error, by its derivative or, where pictures tell it themselves, as
-  /// a nuisance (docs/methods.md, "What nobody knows exactly").
+  /// a nuisance (docs/methods.md, "What nobody knows exactly"). Of a gain that pictures share: first to last, a drift.
   Uncertainty known_to;
   /// Free for that reason alone: `prior_sd` has the tails of Student's t with four degrees of freedom, which let go of
   /// what pictures contradict.

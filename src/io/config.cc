@@ -116,6 +116,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
   shared.scene = read_scene(reader, root);
   config.observable.quantity = quantity;
   MicrographSettings settings = read_micrograph(reader, root, shared.scene, quantity);
+  if (own_analyzers) reader.table[settings.gain].known_to = {};  // one exposure
   if (own_analyzers)
     if (const YamlNode* microscope = root.find("microscope"); microscope && microscope->is_map())
       for (const char* key : {"analyzer_deg", "analyser_deg"})

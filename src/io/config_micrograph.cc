@@ -10,6 +10,9 @@
 namespace birefit {
 namespace {
 
+/// Of a lamp's light from the first picture of several to the last.
+constexpr double kLampDrift = 0.005;
+
 NumberSpec linear_spec() {
   NumberSpec spec;
   spec.lower = -1e12;
@@ -40,11 +43,15 @@ Parameter& make_automatic(ConfigReader& reader, ParameterRef ref) {
 ParameterRef read_linear(ConfigReader& reader, const Block& block, const std::string& key, double start,
                          bool automatic) {
   const bool given = block.find(key) != nullptr;
-  const ParameterRef ref = reader.number(block, key, linear_spec(), start);
+  const NumberSpec spec = key == "gain" ? linear_spec().known_within_share(kLampDrift) : linear_spec();
+  const ParameterRef ref = reader.number(block, key, spec, start);
   if (!given && automatic) make_automatic(reader, ref);
   Parameter& parameter = reader.table[ref];
   if (!std::isfinite(parameter.value)) parameter.value = start;
-  if (key == "gain") keep_positive(parameter);
+  if (key == "gain") {
+    keep_positive(parameter);
+    if (!given) parameter.known_to.share = kLampDrift;
+  }
   return ref;
 }
 

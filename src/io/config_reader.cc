@@ -240,7 +240,10 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
       problems.add(node.where, name + " needs a value", "write a number or {value: .., fit: [low, high]}");
     return ref;
   }
-  if (exact_node) problems.add(exact_node->where, name + " is fitted and exact", "give one of the two");
+  if (exact_node && spec.linear && exact_node->is_scalar() && exact_node->text == "true")
+    parameter.known_to = {};  // the same for all that share it
+  else if (exact_node)
+    problems.add(exact_node->where, name + " is fitted and exact", "give one of the two");
   parameter.free = true;
   const bool is_auto = fit_node->is_scalar() && fit_node->text == "auto";
   if (is_auto) {

@@ -263,23 +263,26 @@ class ByPatterns {
   double evidence_ = 0, free_ = 0;
 };
 
-/// The variances of the unknowns by fits without a part at a time, nearly all of it.
-Eigen::VectorXd by_parts(const Partition& parts, const Eigen::MatrixXd& information) {
+/// The covariance of the unknowns by fits without a part at a time, nearly all of it.
+Eigen::MatrixXd by_parts(const Partition& parts, const Eigen::MatrixXd& information) {
   constexpr double kLeftOut = 0.98;
   const double m = static_cast<double>(parts.size());
   Eigen::VectorXd mean_pull = Eigen::VectorXd::Zero(information.rows());
   for (const Part& part : parts) mean_pull += part.jr / m;
   std::vector<Eigen::VectorXd> steps;
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(information.rows()), variance = mean;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(information.rows());
   for (const Part& part : parts) {
     steps.push_back(-(information - kLeftOut * part.jj).ldlt().solve(part.jr - mean_pull));
     mean += steps.back() / m;
   }
-  for (const Eigen::VectorXd& step : steps) variance += (step - mean).cwiseAbs2() * (m - 1) / m;
-  return variance;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(information.rows(), information.rows());
+  for (const Eigen::VectorXd& step : steps) covariance += (m - 1) / m * (step - mean) * (step - mean).transpose();
+  return covariance;
 }
 
-/// Pictures whose model changes from place to place, each with enough of it to tell patterns apart.
+/// One picture whose model changes from place to place, with enough of it to tell patterns apart. (Of several, three in
+/// a calibration, the patterns and the pictures left out in turn widen far beyond what the pictures' own scatter is,
+/// which is in the errors already.)
 bool tells_patterns(const Task& task, const LeastSquares& problem) {
   constexpr std::size_t kFewestPixels = 400;
   constexpr double kContrast = 0.05;  // else it is one number
@@ -290,7 +293,8 @@ bool tells_patterns(const Task& task, const LeastSquares& problem) {
         !(high - low > kContrast * std::max(std::abs(high), std::abs(low))))
       return false;
   }
-  return task.frames() > 0 && task.unknowns.size() > 0;
+  // Behind a calibration what one picture misses is known from the calibration's frames.
+  return task.frames() == 1 && !task.job.prior && task.unknowns.size() > 0;
 }
 
 /// Frames of one number each, enough of them to tell a pattern from what is fitted.
@@ -330,6 +334,9 @@ std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
   Eigen::MatrixXd information;
   Inverse inverse;
   Discrepancy found;
+  // A misfit of thousands of times the noise leaves no digits for sums in units of that.
+  constexpr double kLargest = 100;
+  sums.measure_by(std::max(1.0, chi_square / pixels / kLargest));
   // A noise that is larger than it was thought to be is no pattern: in its units they are sought again.
   constexpr int kTimes = 3;
   constexpr double kAsThought = 1.1;
@@ -364,21 +371,16 @@ double missed_of_contrast(const Task& task, const Optimum& optimum) {
 
 bool leaves_discrepancy(const Task& task, const Optimum& optimum) { return left_over(task, optimum).has_value(); }
 
-Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum) {
+std::vector<Eigen::MatrixXd> covariances_by_discrepancy(const Task& task, const Optimum& optimum) {
   constexpr double kFactor = 1.5;
   const std::optional<LeftOver> left = left_over(task, optimum);
   if (!left) return {};
-  Eigen::VectorXd variance =
-      (left->found.white * left->sampled * left->inverse.covariance + left->found.covariance).diagonal();
-  for (const Partition& partition : left->parted.within)
-    variance = variance.cwiseMax(by_parts(partition, left->information));
-  constexpr std::size_t kFewestPictures = 3;
-  if (left->parted.pictures.size() >= kFewestPictures) {
-    Partition pictures;
-    for (const Sums& s : left->parted.pictures) pictures.push_back({s.jj, s.jr});
-    variance = variance.cwiseMax(by_parts(pictures, left->information));
-  }
-  return variance.allFinite() ? Eigen::VectorXd(kFactor * variance.cwiseMax(0).cwiseSqrt()) : Eigen::VectorXd();
+  std::vector<Eigen::MatrixXd> all{left->found.white * left->sampled * left->inverse.covariance +
+                                   left->found.covariance};
+  for (const Partition& partition : left->parted.within) all.push_back(by_parts(partition, left->information));
+  std::erase_if(all, [](const Eigen::MatrixXd& covariance) { return !covariance.allFinite(); });
+  for (Eigen::MatrixXd& covariance : all) covariance *= kFactor * kFactor;
+  return all;
 }
 
 }  // namespace birefit::estimation

@@ -1,6 +1,8 @@
 #pragma once
 // What a residual that noise does not explain could have done to the parameters.
 
+#include <vector>
+
 #include <Eigen/Dense>
 
 #include "fit/search/optimum.h"
@@ -15,10 +17,10 @@ namespace birefit::estimation {
 /// Biometrika 43, 353 (1956)). The larger of the two counts, times 1.5, which is measured, not derived
 /// (docs/methods.md, "Nearly the model").
 ///
-/// Standard deviations of all unknowns, searched first; empty where nothing is left over, or where pictures do not
-/// change from place to place (tables, even cells).
-Eigen::VectorXd sd_of_discrepancy(const Task& task, const Optimum& optimum);
-/// Whether it is not empty.
+/// Covariances of all unknowns, searched first, by either opinion; none where nothing is left over, or where pictures
+/// do not change from place to place and rows follow no pattern.
+std::vector<Eigen::MatrixXd> covariances_by_discrepancy(const Task& task, const Optimum& optimum);
+/// Whether there are any.
 bool leaves_discrepancy(const Task& task, const Optimum& optimum);
 
 /// What the model of the first picture misses beyond its noise, as RMS over the range of the model's light.

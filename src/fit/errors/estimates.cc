@@ -150,6 +150,7 @@ ParameterEstimate estimate_of(const Task& task, const Optimum& optimum, const Ei
 /// An estimate at a bound that the data pull across: at nature's a limit, at the user's no answer. True at the upper
 /// one.
 bool settle_at_bound(const Parameter& parameter, double gradient, ParameterEstimate& estimate, FitResult& result) {
+  if (parameter.nuisance) return false;  // contradicted, and named as that
   const double width = parameter.upper - parameter.lower;
   const double close = std::isfinite(width) ? 1e-6 * width : 1e-9 * std::abs(estimate.value);
   const bool at_lower = estimate.value <= parameter.lower + close && gradient >= 0;

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 /// Groups, in the order in which at() lists their patterns; what stands between is about what is round.
-enum Group { kSlow, kFast, kMultiplied, kNonlinear, kRings, kShape = kRings + 4, kBlur, kWhole };
-static_assert(kWhole + 1 == Patterns::kGroups);
+enum Group { kSlow, kFast, kMultiplied, kNonlinear, kRings, kShape = kRings + 4, kBlur };
+static_assert(kBlur + 1 == Patterns::kGroups);
 constexpr int kDiscRings = 8, kOrders = 6;
 
 KnownLight light_of(const Task& task, int picture, const LeastSquares& problem) {
@@ -39,10 +39,7 @@ PixelRect around(const std::vector<std::array<int, 2>>& pixels) {
 }  // namespace
 
 Patterns::Patterns(const Task& task, int picture, const LeastSquares& problem)
-    : pixels_(problem.pixels(picture).pixels),
-      used_(around(pixels_)),
-      light_(light_of(task, picture, problem)),
-      several_(task.frames() > 1) {
+    : pixels_(problem.pixels(picture).pixels), used_(around(pixels_)), light_(light_of(task, picture, problem)) {
   const Scene& scene = task.picture(picture).scene;
   const Traits traits = traits_of(scene);
   sphere_ = static_cast<bool>(traits.sphere_diameter_um);
@@ -62,7 +59,6 @@ Patterns::Patterns(const Task& task, int picture, const LeastSquares& problem)
     for (int ring = 0; ring < 4; ++ring) add_group(kRings + ring, kDiscRings);
   if (radius_px_) add_group(kShape, 3);
   add_group(kBlur, 1);
-  if (several_) add_group(kWhole, 1);
 }
 
 void Patterns::add_group(int group, int patterns) {
@@ -109,7 +105,6 @@ void Patterns::at(Eigen::Index pixel, Eigen::Ref<Eigen::VectorXd> out) const {
     for (const Kind kind : {Kind::stretch_x, Kind::stretch_diagonal, Kind::growth})
       out[k++] = effect_at(kind, light_, x, y);
   out[k++] = effect_at(Kind::blur, light_, x, y);
-  if (several_) out[k++] = 1;  // a lamp that is not the same in all of them
 }
 
 std::array<std::size_t, 2> Patterns::parts_at(Eigen::Index pixel) const {

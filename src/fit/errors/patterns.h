@@ -17,7 +17,7 @@ namespace birefit::estimation {
 /// Of one picture, at the last evaluated point of a problem.
 class Patterns {
  public:
-  static constexpr int kGroups = 11;
+  static constexpr int kGroups = 10;
   static constexpr int kParts = 12;
 
   Patterns(const Task& task, int picture, const LeastSquares& problem);
@@ -42,7 +42,7 @@ class Patterns {
   PixelRect used_;          ///< around the used pixels
   KnownLight light_;        ///< the model's over the picture, from 0 to 1
   Eigen::MatrixXd cosine_;  ///< of an order along either side of those, by the pixel
-  bool sphere_, several_;
+  bool sphere_;
   std::optional<double> radius_px_;  ///< of what is round
   double from_ = 0;                  ///< rad
   std::vector<int> group_;

@@ -26,6 +26,23 @@ double pay_for_misfit(const LeastSquares& problem, const Inverse& of_noise, Inve
   return factor.size() > 0 ? factor.maxCoeff() : 1;
 }
 
+/// In every direction of the unknowns the larger of two variances: what is known well as a combination of several stays
+/// so unless the other one says otherwise.
+Eigen::MatrixXd larger_of(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
+  const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt(), per_sd = sd.cwiseInverse();
+  const Eigen::LLT<Eigen::MatrixXd> root(per_sd.asDiagonal() * covariance * per_sd.asDiagonal());
+  if (root.info() != Eigen::Success) {
+    const Eigen::VectorXd wider = other.diagonal().cwiseMax(0).cwiseSqrt().cwiseQuotient(sd).cwiseMax(1);
+    return wider.asDiagonal() * covariance * wider.asDiagonal();
+  }
+  // In units in which the first is 1 the other one's axes are those of both.
+  const Eigen::MatrixXd half = root.matrixL().solve(Eigen::MatrixXd(per_sd.asDiagonal() * other * per_sd.asDiagonal())),
+                        relative = root.matrixL().solve(Eigen::MatrixXd(half.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(0.5 * (relative + relative.transpose()));
+  const Eigen::MatrixXd along = sd.asDiagonal() * (root.matrixL() * axes.eigenvectors());
+  return along * axes.eigenvalues().cwiseMax(1).asDiagonal() * along.transpose();
+}
+
 /// What the standard errors contain, in words.
 std::string covariance_words(const Task& task, const Optimum& optimum, const Covariances& covariances,
                              const LeftOut& left_out) {
@@ -67,6 +84,7 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
                                   [&](int index) { return task.job.parameters[index].nuisance; });
   if (fitted || (covariances.stated.shift.size() > 0 && !covariances.stated.shift.isZero(0)))
     words += ", and what is stated and not known exactly";
+  if (covariances.lamp_drift) words += ", and a lamp that drifts";
   if (left_out.by_waves) words += ", and what rays lose of a wave-optical image";
   return words;
 }
@@ -146,12 +164,12 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
 
 void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances) {
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
-  if (!optimum.explained) covariances.by_discrepancy = sd_of_discrepancy(task, optimum);
-  if (covariances.discrepancy()) {
-    const Eigen::VectorXd wider =
-        covariances.by_discrepancy.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMax(1);
-    covariance = wider.asDiagonal() * covariance * wider.asDiagonal();
-  }
+  if (!optimum.explained)
+    for (const Eigen::MatrixXd& one : covariances_by_discrepancy(task, optimum)) {
+      const Eigen::VectorXd sd = one.diagonal().cwiseMax(0).cwiseSqrt();
+      covariances.by_discrepancy = covariances.discrepancy() ? covariances.by_discrepancy.cwiseMax(sd) : sd;
+      covariance = larger_of(covariance, one);
+    }
   if (!optimum.came_from) return;
   // What the fit without the catalogue would have answered: no explanation is sure enough to make it impossible.
   Eigen::VectorXd step = Eigen::VectorXd::Zero(task.unknowns.size());
@@ -168,8 +186,14 @@ void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covar
   if (optimum.stopped || task.unknowns.searched.empty()) return;
   Stated stated = stated_numbers(task, optimum, covariances.of_noise.covariance);
   if (!stated.shift.allFinite()) return;
-  covariances.with_misfit.covariance += stated.shift * stated.shift.transpose();
+  Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
+  covariance += stated.shift * stated.shift.transpose();
   covariances.stated = std::move(stated);
+  const Eigen::VectorXd drift = shift_by_drift(task, *optimum.problem, covariances.of_noise.covariance);
+  if (drift.size() == 0) return;
+  covariance += drift * drift.transpose();
+  constexpr double kOfNote = 0.05;  // of a variance
+  covariances.lamp_drift = (drift.array().square() > kOfNote * covariance.diagonal().array()).any();
 }
 
 FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,

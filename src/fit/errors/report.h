@@ -17,7 +17,8 @@ struct Covariances {
   double along = 1;                ///< largest factor on a standard error by the latter
   Eigen::VectorXd by_discrepancy;  ///< standard deviations of all unknowns by one that is left over; empty: none
   bool discrepancy() const { return by_discrepancy.size() > 0; }
-  Stated stated;  ///< what it would be to state these otherwise is in `with_misfit`, too
+  bool lamp_drift = false;  ///< makes a part of note of `with_misfit`
+  Stated stated;            ///< what it would be to state these otherwise is in `with_misfit`, too
 };
 /// `propagation`: LeftOut::propagation.
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);
