@@ -189,6 +189,7 @@ void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covar
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
   covariance += stated.shift * stated.shift.transpose();
   covariances.stated = std::move(stated);
+  if (optimum.misfit.frames_scatter) return;  // which holds what the lamp does as well
   const Eigen::VectorXd drift = shift_by_drift(task, *optimum.problem, covariances.of_noise.covariance);
   if (drift.size() == 0) return;
   covariance += drift * drift.transpose();
