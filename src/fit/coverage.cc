@@ -87,7 +87,7 @@ void redraw_priors(FitJob& job, const Theta& truth, std::mt19937_64& random) {
     Parameter& p = job.parameters[i];
     if (p.free && p.prior_sd)
       p.value = std::clamp(truth[static_cast<std::size_t>(i)] + *p.prior_sd * normal(random), p.lower, p.upper);
-    else if (const double sd = p.known_to.of(p.value); !p.free && !p.linear && sd > 0)
+    else if (const double sd = p.known_to.of(p.value); !p.free && !p.linear && sd > 0)  // a gain's is a drift
       p.value = truth[static_cast<std::size_t>(i)] + sd * normal(random);
   }
   if (!job.prior) return;

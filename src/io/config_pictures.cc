@@ -127,7 +127,8 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   Mask saturated(width, height, 0);
   mark_saturated(image.values, saturation.from, saturated);
   const double step = smallest_step(image);
-  if (const std::optional<CutBlack> cut = find_cut_black(image, area, step))
+  const bool codes = image.top_code > 0;
+  if (const auto cut = codes ? find_cut_end(End::lowest, image.values, area) : std::nullopt)
     reader.warnings.push_back(fmt::format(
         "{}: {:.2g} % of the pixels sit at the lowest code, {:g}: the black was cut off, by a background that "
         "was subtracted or a contrast that was stretched. Their mean is not that of the light: take "
@@ -226,6 +227,28 @@ std::optional<LoadedImage> try_load(ConfigReader& reader, const MicrographSettin
   }
 }
 
+/// Pixels of the bright frame at its end, and those that noise may have kept from it: left out. False, with a problem,
+/// where next to all are.
+bool leave_out_clipped(ConfigReader& reader, const std::string& name, const Where& where, const Image& values,
+                       const PixelRect& area, std::optional<double> noise_of_dark, Mask& clipped) {
+  constexpr double kNextToAll = 0.9, kNoise = 3;  // standard deviations
+  const std::optional<CutEnd> cut = find_cut_end(End::highest, values, area, noise_of_dark);
+  if (!cut) return true;
+  const std::string found = fmt::format(
+      "{}: {:.3g} % of the pixels sit at {:g}, the highest code of the frame, where others "
+      "scatter: it is clipped",
+      name, 100 * cut->share, cut->code);
+  const char* help = "take it with less light, or a shorter exposure of all frames";
+  if (cut->share > kNextToAll) {
+    reader.problems.add(where, found, help);
+    return false;
+  }
+  reader.warnings.push_back(found + " and left out there; " + help + ".");
+  const std::optional<double> own = noise_of_neighbours(values, area, cut->code);
+  mark_saturated(values, cut->code - kNoise * (own ? *own : noise_of_dark.value_or(0)), clipped);
+  return true;
+}
+
 std::optional<Calibration> load_calibration(ConfigReader& reader, const MicrographSettings& settings) {
   struct Frame {
     const std::optional<std::string>& name;
@@ -257,9 +280,14 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
   calibration.name = *first->name, calibration.where = first->where;
   calibration.usable = Mask(size.width(), size.height(), 1);
   calibration.saturated = Mask(size.width(), size.height(), 0);
+  const auto noise_of_dark = dark.image ? noise_of_neighbours(dark.image->values, area) : std::nullopt;
   for (std::optional<LoadedImage>* frame_image : {&dark.image, &bright.image, &crossed.image}) {
     if (!*frame_image) continue;
     LoadedImage* frame = &**frame_image;
+    if (frame_image == &bright.image && frame->top_code > 0 &&
+        !leave_out_clipped(reader, *bright.name, bright.where, frame->values, area, noise_of_dark,
+                           calibration.saturated))
+      return std::nullopt;
     // The frames come from one camera: the code at which one saturates is the code for all.
     mark_saturated(frame->values, find_saturation(*frame, area, settings.saturation_counts).from,
                    calibration.saturated);

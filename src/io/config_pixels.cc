@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -80,34 +82,40 @@ Saturation find_saturation(const LoadedImage& image, const PixelRect& area, std:
   return saturation;
 }
 
-std::optional<CutBlack> find_cut_black(const LoadedImage& image, const PixelRect& area, double step) {
-  constexpr double kShare = 0.005, kOverNext = 3, kNoise = 0.7;  // half a code, and rounding by the same measure
-  if (!(image.top_code > 0) || !(step > 0)) return std::nullopt;
-  double lowest = std::numeric_limits<double>::infinity();
-  const auto for_pixels = [&](const auto& what) {
-    for (int y = area.y0; y < area.y1; ++y)
-      for (int x = area.x0; x < area.x1; ++x)
-        if (const double value = image.values(x, y); std::isfinite(value)) what(x, y, value);
-  };
-  for_pixels([&](int, int, double value) { lowest = std::min(lowest, value); });
-  double pixels = 0, here = 0, next = 0;
-  // Of three neighbours that are not cut, the middle one off the others' mean: noise without the picture's slope.
+std::optional<double> noise_of_neighbours(const Image& values, const PixelRect& area,
+                                          std::optional<double> without_code) {
   std::vector<double> off;
-  for_pixels([&](int x, int y, double value) {
-    ++pixels;
-    here += value == lowest;
-    next += value > lowest && value < lowest + 1.5 * step;
-    if (x > area.x0 && x + 1 < area.x1 && value > lowest) {
-      const double left = image.values(x - 1, y), right = image.values(x + 1, y);
-      if (left > lowest && right > lowest) off.push_back(std::abs(value - 0.5 * (left + right)));
+  const auto counts = [&](double value) { return std::isfinite(value) && value != without_code; };
+  for (int y = area.y0; y < area.y1; ++y)
+    for (int x = area.x0 + 1; x + 1 < area.x1; ++x) {
+      const double left = values(x - 1, y), value = values(x, y), right = values(x + 1, y);
+      if (counts(left) && counts(value) && counts(right)) off.push_back(std::abs(value - 0.5 * (left + right)));
     }
-  });
-  if (!(here > kShare * pixels) || !(here >= kOverNext * next) || off.empty()) return std::nullopt;
+  if (off.empty()) return std::nullopt;
   const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
   std::nth_element(off.begin(), middle, off.end());
-  const double noise = 1.4826 * *middle / std::sqrt(1.5);
-  if (!(noise > kNoise * step)) return std::nullopt;
-  return CutBlack{lowest, here / pixels};
+  return 1.4826 * *middle / std::sqrt(1.5);
+}
+
+std::optional<CutEnd> find_cut_end(End end, const Image& values, const PixelRect& area,
+                                   std::optional<double> noise_sd) {
+  constexpr double kShare = 0.005, kOverNext = 3, kNoise = 0.7;  // half a code, and rounding by the same measure
+  std::map<double, int> pixels;
+  int all = 0;
+  for (int y = area.y0; y < area.y1; ++y)
+    for (int x = area.x0; x < area.x1; ++x)
+      if (const double value = values(x, y); std::isfinite(value)) ++pixels[value], ++all;
+  if (all == 0) return std::nullopt;
+  double step = std::numeric_limits<double>::infinity();
+  for (auto above = std::next(pixels.begin()); above != pixels.end(); ++above)
+    step = std::min(step, above->first - std::prev(above)->first);
+  if (!std::isfinite(step)) step = 1;
+  const auto [code, here] = end == End::lowest ? *pixels.begin() : *pixels.rbegin();
+  const auto next = pixels.find(end == End::lowest ? code + step : code - step);
+  if (!(here > kShare * all) || (next != pixels.end() && here < kOverNext * next->second)) return std::nullopt;
+  const std::optional<double> own = noise_of_neighbours(values, area, code), noise = own ? own : noise_sd;
+  if (!noise || !(*noise > kNoise * step)) return std::nullopt;
+  return CutEnd{code, static_cast<double>(here) / all};
 }
 
 int exclude_outliers(const Image& values, const PixelRect& area, double smallest_step, Smoothness smoothness,

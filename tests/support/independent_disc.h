@@ -13,6 +13,7 @@ struct IndependentDisc {
   double load_n = 300, stress_optic_brewster = 50, thickness_um = 6000;
   double wavelength_nm = 546;
   double load_azimuth_deg = 90, polarizer_deg = 0;
+  double residual_pa = 0;  ///< uniform stress across the load, there without it
   bool circular = true;
 
   struct Stress {
@@ -24,7 +25,7 @@ struct IndependentDisc {
     const double up = R - y, down = R + y;
     const double r1 = std::hypot(x, up), r2 = std::hypot(x, down);
     const double f1 = 1 / std::pow(r1, 4), f2 = 1 / std::pow(r2, 4);
-    return {-c * (up * x * x * f1 + down * x * x * f2 - 1 / (2 * R)),
+    return {residual_pa - c * (up * x * x * f1 + down * x * x * f2 - 1 / (2 * R)),
             -c * (std::pow(up, 3) * f1 + std::pow(down, 3) * f2 - 1 / (2 * R)),
             c * (up * up * x * f1 - down * down * x * f2)};
   }

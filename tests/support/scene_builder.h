@@ -70,6 +70,12 @@ inline const ParameterEstimate* find_estimate(const FitResult& result, const std
   return nullptr;
 }
 
+/// Whether the 95 % interval of a parameter holds its truth.
+inline bool holds(const FitResult& result, const std::string& name, double truth) {
+  const ParameterEstimate* estimate = find_estimate(result, name);
+  return estimate->interval95_low <= truth && truth <= estimate->interval95_high;
+}
+
 /// Errors of one parameter over many repetitions, for comparing their spread with the stated standard errors.
 struct Spread {
   std::vector<double> error, stderr_;

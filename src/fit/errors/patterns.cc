@@ -11,20 +11,16 @@ namespace birefit::estimation {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-/// Groups, in the order in which at() lists their patterns; what stands between is about what is round.
-enum Group { kSlow, kFast, kMultiplied, kNonlinear, kRings, kShape = kRings + 4, kBlur };
+/// Groups, in the order in which at() lists their patterns; what stands between is about what is round. Rows have a few
+/// of these, and their law.
+enum Group { kSlow, kFast, kMultiplied, kNonlinear, kRings, kShape = kRings + 4, kBlur, kLaw = kShape };
 static_assert(kBlur + 1 == Patterns::kGroups);
 constexpr int kDiscRings = 8, kOrders = 6;
 
-KnownLight light_of(const Task& task, int picture, const LeastSquares& problem) {
-  const std::array<double, 2> range = problem.intensity_range(picture);
-  const double contrast = std::max(range[1] - range[0], 1e-300);
-  Eigen::Index begin = 0;
-  for (int before = 0; before < picture; ++before)
-    begin += static_cast<Eigen::Index>(problem.pixels(before).pixels.size());
-  const auto& pixels = problem.pixels(picture).pixels;
-  const auto here = problem.intensity().segment(begin, static_cast<Eigen::Index>(pixels.size()));
-  return {task.picture(picture).scene.view, problem.theta(), pixels, (here.array() - range[0]).matrix() / contrast};
+KnownLight light_of(const Task& task, const LeastSquares& problem) {
+  const auto [low, high] = problem.intensity_range(0);
+  return {task.picture(0).scene.view, problem.theta(), problem.pixels(0).pixels,
+          (problem.intensity().array() - low).matrix() / std::max(high - low, 1e-300)};
 }
 
 PixelRect around(const std::vector<std::array<int, 2>>& pixels) {
@@ -38,9 +34,9 @@ PixelRect around(const std::vector<std::array<int, 2>>& pixels) {
 
 }  // namespace
 
-Patterns::Patterns(const Task& task, int picture, const LeastSquares& problem)
-    : pixels_(problem.pixels(picture).pixels), used_(around(pixels_)), light_(light_of(task, picture, problem)) {
-  const Scene& scene = task.picture(picture).scene;
+Patterns::Patterns(const Task& task, const LeastSquares& problem)
+    : pixels_(problem.pixels(0).pixels), used_(around(pixels_)), light_(light_of(task, problem)) {
+  const Scene& scene = task.picture(0).scene;
   const Traits traits = traits_of(scene);
   sphere_ = static_cast<bool>(traits.sphere_diameter_um);
   if (traits.round) {
@@ -132,9 +128,19 @@ RowPatterns::RowPatterns(const Task& task, const LeastSquares& problem) {
     for (Eigen::Index g = 0; g < rows; ++g) column[g] = std::cos(kPi * order * (g + 0.5) / static_cast<double>(rows));
     add(kSlow, column);
   }
-  // A detector that is not linear.
   Eigen::VectorXd light(rows);
-  for (Eigen::Index g = 0; g < rows; ++g) light[g] = problem.frame_misfit(static_cast<int>(g)).mean_light;
+  Eigen::MatrixXd by_unknown(rows, task.unknowns.size());
+  for (Eigen::Index g = 0; g < rows; ++g) {
+    const LeastSquares::FrameMisfit frame = problem.frame_misfit(static_cast<int>(g));
+    light[g] = frame.mean_light;
+    by_unknown.row(g) = frame.mean_noise_sd * frame.mean_jacobian_whitened.transpose();
+  }
+  // A law that is bent, and what is taken to be the same in all rows: unknowns that drift.
+  constexpr int kBends = 3;
+  for (Eigen::Index unknown = 0; unknown < std::ssize(task.unknowns.searched); ++unknown)
+    for (int order = 1; order <= kBends; ++order)
+      add(kLaw, by_unknown.col(unknown).cwiseProduct(columns[static_cast<std::size_t>(order - 1)]));
+  // A detector that is not linear.
   const double low = light.minCoeff(), contrast = light.maxCoeff() - low;
   if (contrast > 0) light = (light.array() - low) / contrast;
   add(kNonlinear, light.array().square()), add(kNonlinear, light.array().cube());

@@ -14,15 +14,15 @@
 
 namespace birefit::estimation {
 
-/// Of one picture, at the last evaluated point of a problem.
+/// Of the first picture of a fit, at the last evaluated point of its problem.
 class Patterns {
  public:
   static constexpr int kGroups = 10;
   static constexpr int kParts = 12;
 
-  Patterns(const Task& task, int picture, const LeastSquares& problem);
+  Patterns(const Task& task, const LeastSquares& problem);
   int count() const { return static_cast<int>(group_.size()); }
-  /// Of a pattern, below kGroups; the same in every picture of a job.
+  /// Of a pattern, below kGroups.
   int group(int pattern) const { return group_[static_cast<std::size_t>(pattern)]; }
   /// All of them at a used pixel, in no unit.
   void at(Eigen::Index pixel, Eigen::Ref<Eigen::VectorXd> patterns) const;

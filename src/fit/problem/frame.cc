@@ -37,7 +37,7 @@ void borrow_noise(const Task& task, Frames& frames) {
     Frame& frame = frames[static_cast<std::size_t>(g)];
     if (!frame.noise.estimated || !(sd(g) < kNone * sd(noisiest))) continue;
     frame.noise = frames[static_cast<std::size_t>(noisiest)].noise;
-    frame.noise.estimated = false;  // the residual tells no more of it
+    frame.noise_of_all = true;
     frame.sigma = standard_deviation(task.picture(g), frame.noise, smoothed(task.picture(g)));
     frame.pixels = usable_pixels(task.picture(g), frame.sigma);
   }
@@ -62,7 +62,8 @@ void note_rounding(const Task& task, Frames& frames) {
     Frame& frame = frames[static_cast<std::size_t>(g)];
     frame.rounding_sd = codes.shared_sd;
     if (!frame.noise.estimated || codes.shared_sd < kCoarse * codes.pixel_sd) continue;
-    frame.noise = {codes.pixel_sd, 0, false};
+    frame.noise = {codes.pixel_sd, 0, true};
+    frame.noise_of_all = true;
     frame.sigma = standard_deviation(picture, frame.noise, smoothed(picture));
   }
 }

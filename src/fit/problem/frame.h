@@ -12,7 +12,8 @@ namespace birefit::estimation {
 struct Frame {
   RenderPlan plan;
   NoiseModel noise;
-  Image sigma;             ///< standard deviation of every pixel's value, in its units
+  bool noise_of_all = false;  ///< told by all frames together: the residual of one tells no more of it
+  Image sigma;                ///< standard deviation of every pixel's value, in its units
   double rounding_sd = 0;  ///< of what rounding does to all pixels alike: those of even light, less noisy than a code
   Pixels pixels;           ///< that take part
 };

@@ -515,24 +515,10 @@ void LeastSquares::for_noise_whitened_rows(
     int micrograph,
     const std::function<void(Eigen::Index, const Eigen::MatrixXd&, const Eigen::VectorXd&)>& what) const {
   const Frame& frame = frames_[micrograph];
-  const auto along = [&](const Tile& tile) {
-    return frame.inverse_sigma.segment(tile.begin, tile.count) / frame.inverse_sigma_norm;
-  };
-  const auto residual = [&](const Tile& tile) { return residual_.segment(frame.begin + tile.begin, tile.count); };
-  // The part along the mean, which has a factor of its own.
-  const double beyond = 1 / frame.mean_factor - 1 / frame.shape_factor;
-  Eigen::VectorXd mean_rows = Eigen::VectorXd::Zero(unknowns_.size());
-  double mean_residual = 0;
-  if (beyond != 0)
-    for (const Tile& tile : tiles_)
-      if (tile.micrograph == micrograph) {
-        mean_rows += full_rows(tile).transpose() * along(tile);
-        mean_residual += along(tile).dot(residual(tile));
-      }
   for (const Tile& tile : tiles_)
     if (tile.micrograph == micrograph)
-      what(tile.begin, full_rows(tile) / frame.shape_factor + beyond * along(tile) * mean_rows.transpose(),
-           residual(tile) / frame.shape_factor + beyond * mean_residual * along(tile));
+      what(tile.begin, full_rows(tile) / frame.shape_factor,
+           residual_.segment(frame.begin + tile.begin, tile.count) / frame.shape_factor);
 }
 
 Eigen::MatrixXd LeastSquares::factor(bool with_priors) const {

@@ -79,7 +79,8 @@ class LeastSquares {
   /// Whitened residual of one micrograph without its misfit weights, in the pixels' order.
   Eigen::VectorXd noise_whitened_residual(int micrograph) const;
   /// what(first, rows, residual) for some thousand pixels of one micrograph at a time, from its pixel `first` on: the
-  /// whitened rows [d/d searched, d/d linear] and the whitened residual, both without its misfit weights.
+  /// whitened rows [d/d searched, d/d linear] and the whitened residual, both without its misfit weights. Only where
+  /// its mean has the weight of all else (Misfit::mean_follows_shape).
   void for_noise_whitened_rows(
       int micrograph,
       const std::function<void(Eigen::Index, const Eigen::MatrixXd&, const Eigen::VectorXd&)>& what) const;

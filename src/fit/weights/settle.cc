@@ -37,7 +37,7 @@ bool lower_noise(const Task& task, Optimum& optimum) {
   bool lower = false;
   for (int g = 0; g < task.frames() && !optimum.stopped; ++g) {
     Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
-    if (!frame.noise.estimated) continue;
+    if (!frame.noise.estimated || frame.noise_of_all) continue;
     const Picture& micrograph = task.picture(g);
     const Image image = fitted_image(task, optimum.frames, g, optimum.theta);
     const NoiseModel again = estimate_noise(micrograph, &image);
@@ -142,7 +142,7 @@ bool leave_out(const Task& task, Optimum& optimum, int g, bool first_round) {
   frame.pixels.clear();
   for (const auto& [x, y] : usable)
     if (found.count == 0 || !found.pixels(x, y)) frame.pixels.push_back({x, y});
-  if (frame.noise.estimated) {  // a scratch looks like noise
+  if (frame.noise.estimated && !frame.noise_of_all) {  // a scratch looks like noise
     Picture seen = micrograph;
     for (std::size_t i = 0; found.count > 0 && i < seen.mask.values().size(); ++i)
       if (found.pixels.values()[i]) seen.mask.values()[i] = 0;
