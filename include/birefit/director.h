@@ -69,15 +69,18 @@ struct FreederickszDirector {
     visit.number("voltage_v", self.voltage_v, numbers::within(0, 1e5, "V").physical().left_out(),
                  "rms; instead, with threshold_v, or with k11_pn and both permittivities");
     visit.number("threshold_v", self.threshold_v, numbers::positive(1e4, "V").left_out(), "of the untwisted cell");
-    visit.number("k33_over_k11", self.k33_over_k11, numbers::positive(20).left_out(), "bend over splay constant");
-    visit.number("k22_over_k11", self.k22_over_k11, numbers::positive(20).left_out(),
+    visit.number("k33_over_k11", self.k33_over_k11, numbers::positive(20).left_out().known_within_share(0.05),
+                 "bend over splay constant");
+    visit.number("k22_over_k11", self.k22_over_k11, numbers::positive(20).left_out().known_within_share(0.05),
                  "twist over splay constant; only with twist or pitch");
-    visit.number("eps_ratio", self.eps_ratio, numbers::positive(100).left_out(), "eps_parallel / eps_perpendicular");
-    visit.number("k11_pn", self.k11_pn, numbers::positive(1000, "pN").left_out(),
+    visit.number("eps_ratio", self.eps_ratio, numbers::positive(100).left_out().known_within_share(0.02),
+                 "eps_parallel / eps_perpendicular");
+    visit.number("k11_pn", self.k11_pn, numbers::positive(1000, "pN").left_out().known_within_share(0.05),
                  "splay constant; the constants instead of their ratios");
-    visit.number("k22_pn", self.k22_pn, numbers::positive(1000, "pN").left_out(),
+    visit.number("k22_pn", self.k22_pn, numbers::positive(1000, "pN").left_out().known_within_share(0.05),
                  "twist constant; only with twist or pitch");
-    visit.number("k33_pn", self.k33_pn, numbers::positive(1000, "pN").left_out(), "bend constant");
+    visit.number("k33_pn", self.k33_pn, numbers::positive(1000, "pN").left_out().known_within_share(0.05),
+                 "bend constant");
     visit.number("eps_parallel", self.eps_parallel, numbers::positive(1000).left_out(),
                  "permittivity along the axis, instead of eps_ratio");
     visit.number("eps_perpendicular", self.eps_perpendicular, numbers::positive(1000).left_out(),

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include <fmt/format.h>
+
+#include "io/config_discs.h"
 #include "io/described.h"
 
 namespace birefit {
@@ -29,10 +33,71 @@ ParameterRef stated_in_file(ConfigReader& reader, double file_pixel_um) {
   return reader.constant(path, described<View>("pixel_size_um"), file_pixel_um);
 }
 
+double distance(const DiscGuess& a, const DiscGuess& b) {
+  return std::hypot(a.center_x_px - b.center_x_px, a.center_y_px - b.center_y_px);
+}
+
+std::string describe(const DiscGuess& disc, const View& view, double pixel) {
+  const auto& [x0, y0, bin, width, height] = view.file;
+  const auto in_file = [bin = bin](double at, int first) { return bin * (at + 0.5) - 0.5 + first; };
+  return fmt::format("{:.3g} um at ({:.0f}, {:.0f})", 2 * disc.radius_px * pixel, in_file(disc.center_x_px, x0),
+                     in_file(disc.center_y_px, y0));
+}
+
+/// Of several discs in the picture the one that the config means: of a size within the bounds, of these nearest to
+/// where the diameter starts. The others' pixels are left out. Nothing where there is one disc, or none is meant: said
+/// where there are several.
+std::optional<DiscGuess> disc_meant(ConfigReader& reader, const Scene& scene, const Parameter& diameter,
+                                    const DiscGuess& whole, const Image& values, Mask& mask, const std::string& name) {
+  constexpr double kSmaller = 0.8, kTolerance = 1.15, kRim = 1.2;
+  const double pixel = pixel_um(reader, scene.view);
+  if (!(pixel > 0) || !std::isfinite(diameter.value)) return std::nullopt;
+  const double lower = (diameter.free ? diameter.lower : diameter.value) / kTolerance,
+               upper = (diameter.free ? diameter.upper : diameter.value) * kTolerance;
+  const auto within = [&](const DiscGuess& disc) {
+    const double found = 2 * disc.radius_px * pixel;
+    return found >= lower && found <= upper;
+  };
+  const std::vector<DiscGuess> discs = find_discs(values, mask, kSmaller * diameter.value / pixel);
+  if (discs.empty()) return std::nullopt;
+  // Parts of one object, whose rings lie far apart.
+  const auto parts = std::count_if(discs.begin(), discs.end(),
+                                   [&](const DiscGuess& disc) { return distance(disc, whole) < whole.radius_px; });
+  if (within(whole) && parts > 1) return std::nullopt;
+  const DiscGuess* meant = nullptr;
+  const auto off = [&](const DiscGuess& disc) { return std::abs(2 * disc.radius_px * pixel - diameter.value); };
+  for (const DiscGuess& disc : discs)
+    if (within(disc) && (!meant || off(disc) < off(*meant))) meant = &disc;
+  std::string list;
+  for (const DiscGuess& disc : discs) list += (list.empty() ? "" : "; ") + describe(disc, scene.view, pixel);
+  if (!meant) {
+    reader.warnings.push_back(
+        fmt::format("{}: several discs are visible ({}), none of them of a size within the bounds: state "
+                    "center_px or roi_px.",
+                    name, list));
+    return std::nullopt;
+  }
+  int left_out = 0;
+  for (int y = 0; y < mask.height(); ++y)
+    for (int x = 0; x < mask.width(); ++x) {
+      const auto covers = [&](const DiscGuess& disc) {
+        return std::hypot(x - disc.center_x_px, y - disc.center_y_px) < kRim * disc.radius_px;
+      };
+      const bool others =
+          std::any_of(discs.begin(), discs.end(), [&](const DiscGuess& d) { return &d != meant && covers(d); });
+      if (others && !covers(*meant) && mask(x, y)) mask(x, y) = 0, ++left_out;
+    }
+  reader.warnings.push_back(
+      fmt::format("{}: several discs are visible ({}). The one of {} is fitted, {} pixels of the others are left out; "
+                  "state center_px or "
+                  "roi_px for another.",
+                  name, list, describe(*meant, scene.view, pixel), left_out));
+  return *meant;
+}
+
 }  // namespace
 
-void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, const Mask* mask,
-                       const std::string& name) {
+void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, Mask* mask, const std::string& name) {
   View& view = scene.view;
   auto* droplet = std::get_if<Droplet>(&scene.sample);
   // A droplet is looked for in the region; what else has a centre has that of the whole image.
@@ -45,7 +110,12 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
   const bool wanted = open(view.center_x_px) || open(view.center_y_px) || (droplet && open(droplet->diameter_um));
   if (wanted && droplet && values) {
     const DiscGuess found = find_disc(*values, *mask);
-    if (found.contrast >= kLeastDiscContrast)
+    const auto meant = droplet->diameter_um
+                           ? disc_meant(reader, scene, reader.table[droplet->diameter_um], found, *values, *mask, name)
+                           : std::nullopt;
+    if (meant)
+      disc = *meant;
+    else if (found.contrast >= kLeastDiscContrast)
       disc = found;
     else
       reader.warnings.push_back(name + ": no disc is visible; the centre starts in the middle of the image. Give " +

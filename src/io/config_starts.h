@@ -8,9 +8,9 @@
 
 namespace birefit {
 
-/// Starts and bounds of `fit: auto` from the image; the image's middle where there is none to look at.
-void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, const Mask* mask,
-                       const std::string& name);
+/// Starts and bounds of `fit: auto` from the image; the image's middle where there is none to look at. Of several discs
+/// those that are not meant are left out of the mask.
+void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, Mask* mask, const std::string& name);
 /// A droplet in a field is a hedgehog or has a ring: both are fitted.
 void add_branches(FitJob& job);
 /// A droplet that the image cannot show is a mistake in a unit or a centre.

@@ -1,0 +1,66 @@
+#pragma once
+// Where fits fail, and whether they know: pictures that are nearly the model's, fitted as a job asks.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "birefit/fit.h"
+
+namespace birefit {
+
+/// One picture (or all of a job's), drawn at random, disturbed and fitted.
+struct AuditFit {
+  std::string departure;  ///< "none" of what is exactly as stated
+  std::string amount;     ///< "2.5 %"
+  int size = 0;           ///< 1 to 3, small to large; 0 where the departure is none
+  std::string grade;      ///< FitResult::grade()
+  bool answered = false;
+  /// The departure is of a stated number, by more than two of its standard deviations, and the pictures told nothing of
+  /// it: what leaves no trace cannot be found.
+  bool apart = false;
+  struct Of {
+    std::string name;
+    double truth = 0, value = 0, low = 0, high = 0;
+    bool holds() const { return low <= truth && truth <= high; }
+    /// Half-widths of the interval by which the value is off.
+    double off() const;
+  };
+  std::vector<Of> parameters;  ///< searched ones, where answered
+  double seconds = 0;
+};
+
+struct AuditOptions {
+  int problems = 1;  ///< of every departure and size
+  std::uint64_t seed = 1;
+  std::vector<std::string> departures;  ///< those alone; empty: all that apply
+  std::function<void(const std::string&)> say;
+};
+
+/// Draws the searched parameters about their values, within a quarter of the width of their bounds, the centre of a
+/// picture within a pixel of where it is stated; renders by the job's own model, disturbs, adds the noise that is
+/// stated (else that of the picture, else 1 % of the range), rounds to codes what is in counts, and fits as the job
+/// asks, on all threads. Levels are those of the job's picture where there is one. Deterministic; ends early where the
+/// job is interrupted. Throws UserError where a departure that is asked for does not apply, and of jobs with a joint
+/// prior or tables of other than intensities.
+std::vector<AuditFit> audit(const FitJob& job, const AuditOptions& options);
+/// The departures that apply to a job, in their order, and their three sizes in words.
+struct DepartureWords {
+  std::string name, what;
+  std::array<std::string, 3> amounts;
+};
+std::vector<DepartureWords> departures_of(const FitJob& job);
+
+/// Of one departure and size, without those apart.
+struct AuditRow {
+  std::string departure, amount;
+  int size = 0, problems = 0, answers = 0, with_misfit = 0, apart = 0;
+  int intervals = 0, held = 0;
+  double width = 0;  ///< median half-width over that of pictures as stated; not a number without those
+  double worst = 0;  ///< half-widths by which an estimate of an answer is off
+};
+std::vector<AuditRow> tally(const std::vector<AuditFit>& fits);
+
+}  // namespace birefit

@@ -1,0 +1,327 @@
+// Where fits fail, and whether they know: pictures that are nearly the model's, drawn at random.
+
+#include "birefit/audit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <random>
+
+#include <fmt/format.h>
+
+#include "birefit/render.h"
+#include "core/threads.h"
+#include "fit/errors/stated.h"
+#include "fit/weights/noise.h"
+#include "study/audit/disturbance.h"
+
+namespace birefit {
+namespace {
+
+using namespace estimation;
+using study::Disturbance;
+using study::Exposure;
+using study::Levels;
+
+constexpr const char* kNone = "none";
+/// Of the range, where no noise is stated and there is no picture to read it off.
+constexpr double kAssumedNoise = 0.01;
+/// Of counts over the range, where there is no picture to show its levels.
+constexpr double kAssumedRange = 3000, kAssumedDark = 100;
+
+std::string amount_of(const Disturbance& departure, double size) {
+  if (departure.unit == "%") return fmt::format("{:.3g} %", 100 * size);
+  return fmt::format("{:.3g}{}{}", size, departure.unit.empty() ? "" : " ", departure.unit);
+}
+
+std::uint64_t seed_of(std::uint64_t seed, const std::string& departure, int size, int problem) {
+  std::uint64_t hash = 1469598103934665603u ^ seed;
+  const auto stir = [&](std::uint64_t more) { hash = (hash ^ more) * 1099511628211u; };
+  for (const char c : departure) stir(static_cast<unsigned char>(c));
+  stir(static_cast<std::uint64_t>(size)), stir(static_cast<std::uint64_t>(problem));
+  return hash ^ (hash >> 29);
+}
+
+/// A sample of the job's kind: what is searched for, drawn about where it is stated.
+Theta drawn(const FitJob& job, std::mt19937_64& random) {
+  constexpr double kReach = 0.25, kRim = 0.05;  // of the width of the bounds
+  Theta theta = job.parameters.values();
+  for (int i = 0; i < job.parameters.size(); ++i) {
+    const Parameter& p = job.parameters[i];
+    if (!p.free || p.linear) continue;
+    double& value = theta[static_cast<std::size_t>(i)];
+    if (p.prior_sd) {
+      value = std::clamp(value + *p.prior_sd * std::normal_distribution<double>()(random), p.lower, p.upper);
+    } else if (p.unit == "px") {  // of a picture that shows all of it
+      value += std::uniform_real_distribution<double>(-1, 1)(random);
+    } else if (std::isfinite(p.lower) && std::isfinite(p.upper)) {
+      const double width = p.upper - p.lower, reach = kReach * width, rim = kRim * width;
+      value = std::uniform_real_distribution<double>(std::max(p.lower + rim, value - reach),
+                                                     std::min(p.upper - rim, value + reach))(random);
+    }
+  }
+  return theta;
+}
+
+/// Value that `share` of the usable pixels stay below.
+double quantile(const Picture& picture, double share) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < picture.values.size(); ++i)
+    if (picture.mask.values()[i] && std::isfinite(picture.values.values()[i]))
+      values.push_back(picture.values.values()[i]);
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// Darkest and brightest of a job's pictures and readings; what is assumed where it has none.
+struct Seen {
+  double dark = kAssumedDark, top = kAssumedDark + kAssumedRange;
+};
+Seen seen_by(const std::vector<Sight>& sights) {
+  double dark = std::numeric_limits<double>::infinity(), top = -dark;
+  for (const Sight& sight : sights)
+    if (const double low = quantile(*sight.picture, 0.005), high = quantile(*sight.picture, 0.995); std::isfinite(low))
+      dark = std::min(dark, low), top = std::max(top, high);
+  return dark < top ? Seen{dark, top} : Seen{};
+}
+
+/// What a frame is exposed with: gain and offset as stated, else those of the job's pictures.
+struct Camera {
+  double gain = 1, offset = 0, noise_sd = 0, photon = 0;
+  bool codes = false;  ///< rounded to whole counts
+};
+Camera camera_of(const FitJob& job, const Picture& picture, const Seen& seen, double brightest) {
+  Camera camera;
+  const auto stated = [&](ParameterRef ref) { return !job.parameters[ref].free || job.parameters[ref].prior_sd; };
+  if (picture.offset) camera.offset = stated(picture.offset) ? job.parameters[picture.offset].value : seen.dark;
+  if (picture.gain)
+    camera.gain = stated(picture.gain) ? job.parameters[picture.gain].value
+                  : brightest > 0      ? (seen.top - camera.offset) / brightest
+                                       : 1;
+  const double range = std::abs(camera.gain) * brightest;
+  const bool taken = picture.values.size() > 1;
+  if (picture.noise || taken) {
+    const NoiseModel noise = picture.noise ? *picture.noise : estimate_noise(picture);
+    camera.noise_sd = noise.read_counts, camera.photon = noise.counts_per_photon;
+  } else {
+    camera.noise_sd = kAssumedNoise * range;
+  }
+  constexpr double kCounts = 50;  // what has fewer over its range is in other units
+  camera.codes = picture.variance_scale.empty() && range > kCounts && picture.values.size() != 1;
+  return camera;
+}
+
+/// Frames of the job as a departure shows them, in the order of its sights.
+std::vector<Image> exposed(const FitJob& whole, const Disturbance* departure, Exposure& exposure, Theta& truth) {
+  const std::vector<Sight> sights = sights_of(whole);
+  Demand demand = whole.demand;
+  demand.intensity_accuracy = std::min(demand.intensity_accuracy, 1e-5);
+  Theta shown = truth;
+  if (departure && departure->scene) departure->scene(exposure, shown);
+  const auto mixed = departure && departure->mixed ? departure->mixed(exposure, shown)
+                                                   : std::vector<std::pair<double, Theta>>{{1, shown}};
+  std::vector<Image> frames;
+  double brightest = 0;
+  for (const Sight& sight : sights) {
+    const Scene& scene = sight.picture->scene;
+    Image light;
+    for (const auto& [weight, theta] : mixed) {
+      const Image part = render(scene, plan(scene, demand, theta, sight.observable), theta, {}, 1).intensity;
+      if (light.empty()) light = Image(part.width(), part.height());
+      for (std::size_t i = 0; i < light.size(); ++i) light.values()[i] += weight * part.values()[i];
+    }
+    if (departure && departure->light) departure->light(exposure, scene, shown, light);
+    brightest = std::max(brightest, *std::max_element(light.values().begin(), light.values().end()));
+    frames.push_back(std::move(light));
+  }
+  const Seen seen = seen_by(sights);
+  std::normal_distribution<double> normal;
+  for (std::size_t g = 0; g < frames.size(); ++g) {
+    const Picture& picture = *sights[g].picture;
+    const Camera camera = camera_of(whole, picture, seen, brightest);
+    const Levels levels{camera.offset, std::max(1e-300, std::abs(camera.gain) * brightest),
+                        frames.size() > 1 ? static_cast<double>(g) / static_cast<double>(frames.size() - 1) - 0.5 : 0};
+    Image& values = frames[g];
+    for (double& v : values.values()) v = camera.offset + camera.gain * v;
+    if (departure && departure->values) departure->values(exposure, levels, values);
+    Image noise(values.width(), values.height());
+    for (std::size_t i = 0; i < noise.size(); ++i)
+      noise.values()[i] =
+          normal(exposure.random) * std::sqrt(camera.noise_sd * camera.noise_sd +
+                                              camera.photon * std::max(0.0, values.values()[i] - camera.offset));
+    if (departure && departure->noise) departure->noise(exposure, noise);
+    for (std::size_t i = 0; i < noise.size(); ++i) values.values()[i] += noise.values()[i];
+    if (departure && departure->codes) departure->codes(exposure, levels, values);
+    if (camera.codes)
+      for (double& v : values.values()) v = std::round(v);
+  }
+  return frames;
+}
+
+/// The job with these frames in place of its own.
+FitJob with_frames(const FitJob& job, const std::vector<Image>& frames) {
+  FitJob again = job;
+  again.options.progress = nullptr;
+  again.options.threads = 1;
+  std::size_t frame = 0;
+  for (Measurement& measurement : again.measurements) {
+    if (Picture* picture = std::get_if<Picture>(&measurement)) {
+      const Image& seen = frames[frame++];
+      const bool taken = picture->values.size() == seen.size();
+      Mask mask = taken && picture->mask.size() == seen.size() ? picture->mask : Mask(seen.width(), seen.height(), 1);
+      picture->values = seen, picture->mask = std::move(mask);
+      continue;
+    }
+    Readings& readings = std::get<Readings>(measurement);
+    for (double& value : readings.values) value = frames[frame++].values().front();
+  }
+  return again;
+}
+
+bool told(const FitResult& result, const std::string& name) {
+  return std::any_of(result.stated.begin(), result.stated.end(),
+                     [&](const StatedNumber& n) { return n.name == name && n.fitted; });
+}
+
+AuditFit one(const FitJob& job, const FitJob& whole, const Disturbance* departure, int size, int problem,
+             std::uint64_t seed) {
+  AuditFit found;
+  found.departure = departure ? departure->name : kNone;
+  found.size = departure ? size : 0;
+  std::mt19937_64 random(seed_of(seed, found.departure, found.size, problem));
+  Exposure exposure{whole, random, departure ? departure->sizes[static_cast<std::size_t>(size - 1)] : 0,
+                    random() % 2 ? 1.0 : -1.0};
+  if (departure) found.amount = amount_of(*departure, exposure.size);
+  Theta truth = drawn(whole, random);
+  FitResult result;
+  try {
+    result = fit(with_frames(job, exposed(whole, departure, exposure, truth)));
+  } catch (const UserError& error) {  // nothing to fit is left of it: no answer
+    found.grade = error.what();
+    return found;
+  }
+  found.grade = result.grade();
+  found.answered = result.has_answer();
+  found.seconds = result.seconds;
+  if (departure && departure->parameter >= 0) {
+    const Parameter& p = whole.parameters[departure->parameter];
+    const double off = exposure.size * (departure->of_share ? std::abs(p.value) : 1);
+    constexpr double kFar = 2.001;  // standard deviations
+    found.apart = off > kFar * p.known_to.of(p.value) && !told(result, p.name);
+  }
+  if (!found.answered) return found;
+  for (const ParameterEstimate& p : result.parameters) {
+    const ParameterRef ref = whole.parameters.find(p.name);
+    if (p.linear || !ref) continue;
+    found.parameters.push_back(
+        {p.name, truth[static_cast<std::size_t>(ref.index)], p.value, p.interval95_low, p.interval95_high});
+  }
+  return found;
+}
+
+void check(const FitJob& job) {
+  if (job.prior) throw UserError(Where{}, "an audit of a fit with a prior from another fit", "leave `prior` out");
+  for (const Measurement& measurement : job.measurements)
+    if (const auto* readings = std::get_if<Readings>(&measurement);
+        readings && readings->observable.quantity != Quantity::intensity)
+      throw UserError(Where{}, readings->name + " is a table of other than intensities",
+                      "an audit is of pictures and of tables of intensities");
+}
+
+FitJob completed(const FitJob& job) { return has_more_stated(job) ? with_all_stated(job) : job; }
+
+}  // namespace
+
+double AuditFit::Of::off() const { return std::abs(value - truth) / std::max(0.5 * (high - low), 1e-300); }
+
+std::vector<DepartureWords> departures_of(const FitJob& job) {
+  check(job);
+  std::vector<DepartureWords> words;
+  for (const Disturbance& d : study::disturbances(completed(job)))
+    words.push_back({d.name, d.what, {amount_of(d, d.sizes[0]), amount_of(d, d.sizes[1]), amount_of(d, d.sizes[2])}});
+  return words;
+}
+
+std::vector<AuditFit> audit(const FitJob& job, const AuditOptions& options) {
+  check(job);
+  const FitJob whole = completed(job);
+  const std::vector<Disturbance> all = study::disturbances(whole);
+  struct Asked {
+    const Disturbance* departure;
+    int size, problem;
+  };
+  std::vector<Asked> asked;
+  for (int problem = 0; problem < options.problems * 3; ++problem) asked.push_back({nullptr, 0, problem});
+  const auto wanted = [&](const std::string& name) {
+    return options.departures.empty() ||
+           std::find(options.departures.begin(), options.departures.end(), name) != options.departures.end();
+  };
+  for (const std::string& name : options.departures)
+    if (name != kNone && std::none_of(all.begin(), all.end(), [&](const Disturbance& d) { return d.name == name; })) {
+      std::string known = kNone;
+      for (const Disturbance& d : all) known += ", " + d.name;
+      throw UserError(Where{}, name + " is no departure of such a fit", "those are: " + known);
+    }
+  for (const Disturbance& departure : all)
+    if (wanted(departure.name))
+      for (int size = 1; size <= 3; ++size)
+        for (int problem = 0; problem < options.problems; ++problem) asked.push_back({&departure, size, problem});
+
+  std::vector<AuditFit> fits(asked.size());
+  std::vector<char> done(asked.size(), 0);
+  // A fit keeps two cores busy about half the time; two fits beside each other keep them busy.
+  parallel_for(static_cast<int>(asked.size()), thread_count(job.options.threads), [&](int i) {
+    if (job.options.interrupted && job.options.interrupted->load()) return;
+    const Asked& a = asked[static_cast<std::size_t>(i)];
+    AuditFit& fit = fits[static_cast<std::size_t>(i)] = one(job, whole, a.departure, a.size, a.problem, options.seed);
+    done[static_cast<std::size_t>(i)] = 1;
+    if (options.say)
+      options.say(fmt::format("{}{}{}: {}", fit.departure, fit.amount.empty() ? "" : " ", fit.amount, fit.grade));
+  });
+  std::vector<AuditFit> finished;
+  for (std::size_t i = 0; i < fits.size(); ++i)
+    if (done[i]) finished.push_back(std::move(fits[i]));
+  return finished;
+}
+
+std::vector<AuditRow> tally(const std::vector<AuditFit>& fits) {
+  const auto median = [](std::vector<double> values) {
+    if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  std::map<std::string, std::vector<double>> clean;
+  for (const AuditFit& fit : fits)
+    if (fit.size == 0)
+      for (const AuditFit::Of& p : fit.parameters) clean[p.name].push_back(p.high - p.low);
+  std::vector<AuditRow> rows;
+  std::vector<std::vector<double>> widths;
+  for (const AuditFit& fit : fits) {
+    auto row = std::find_if(rows.begin(), rows.end(),
+                            [&](const AuditRow& r) { return r.departure == fit.departure && r.size == fit.size; });
+    if (row == rows.end()) {
+      rows.push_back({fit.departure, fit.amount, fit.size});
+      widths.emplace_back();
+      row = rows.end() - 1;
+    }
+    if (fit.apart) {
+      ++row->apart;
+      continue;
+    }
+    ++row->problems, row->answers += fit.answered, row->with_misfit += fit.answered && fit.grade != "answer";
+    for (const AuditFit::Of& p : fit.parameters) {
+      ++row->intervals, row->held += p.holds(), row->worst = std::max(row->worst, p.off());
+      if (const double usual = median(clean[p.name]); usual > 0)
+        widths[static_cast<std::size_t>(row - rows.begin())].push_back((p.high - p.low) / usual);
+    }
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].width = median(widths[i]);
+  return rows;
+}
+
+}  // namespace birefit

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# `birefit audit`: pictures that are nearly the model's are paid for or refused, and what it says of them is what the
+# files hold. usage: audit.sh BIREFIT SOURCE_DIR
+set -u
+birefit=$(realpath "$1")
+source=$(realpath "$2")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+fail() { echo "FAIL $1"; failures=$((failures + 1)); }
+says() { grep -q -- "$2" "$1" || { fail "$1 does not say: $2"; cat "$1"; }; }
+cp "$source/fit_configs/audit/droplet.yaml" .
+"$birefit" audit droplet.yaml --list > list.txt 2>&1 || fail 'list'
+for departure in microscope.polarizer_deg sample.surround.index bandwidth leak 'field stop' blur neighbour gamma 'black cut' compressed; do
+  says list.txt "^$departure "
+done
+grep -q 'lamp' list.txt && fail 'one picture has no drift'
+
+some=()
+for departure in microscope.polarizer_deg sample.surround.index leak 'field stop' 'uneven light' blur 'pixel aspect' gamma 'black cut'; do
+  some+=(--departure "$departure")
+done
+"$birefit" audit droplet.yaml --problems 1 "${some[@]}" --out a > a.txt 2>&1 || { fail 'audit'; cat a.txt; }
+cat a.txt
+awk -f "$source/tests/support/audit_law.awk" a/audit.csv || failures=$((failures + 1))
+says a/audit.svg '>blur<'
+says a/intervals.csv '^"none","",0,"answer",0,"sample.droplet.diameter_um",'
+
+# The same numbers from the same seed, on as many threads as one likes; others from another.
+"$birefit" audit droplet.yaml --departure gamma --problems 1 --out b -q --threads 1 || fail 'one departure'
+"$birefit" audit droplet.yaml --departure gamma --problems 1 --out c -q --threads 2 || fail 'two threads'
+cmp -s b/intervals.csv c/intervals.csv || fail 'not the same numbers from the same seed'
+"$birefit" audit droplet.yaml --departure gamma --problems 1 --out d -q --seed 2 || fail 'seed'
+cmp -s b/intervals.csv d/intervals.csv && fail 'the same numbers from another seed'
+
+"$birefit" audit droplet.yaml --departure fog --out e > e.txt 2>&1
+[ $? -eq 2 ] || fail 'an unknown departure does not end in 2'
+says e.txt 'fog is no departure'
+says e.txt 'field stop'
+[ -e e ] && fail 'a folder of nothing is left'
+"$birefit" audit "$source/fit_configs/twisted_cell.yaml" --list > cell.txt 2>&1 || fail 'cell'
+says cell.txt '^lamp drift '
+grep -q '^blur ' cell.txt && fail 'a cell is one number a picture'
+[ "$failures" -eq 0 ] && echo ok
+exit "$failures"
