@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "app/each.h"
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/watch.h"
@@ -28,7 +29,7 @@ struct Arguments {
   std::string image;
   std::string out;
   int threads = -1, coverage = 0;
-  bool quiet = false, json = false, npy = false;
+  bool quiet = false, json = false, npy = false, each = false;
 };
 
 /// The time that the job is foreseen to take, less what went by; NaN where it cannot be foreseen.
@@ -59,18 +60,63 @@ auto watched(bool quiet, FitJob& job, const Work& work) {
   return result;
 }
 
+Config read(const Arguments& arguments, std::vector<std::string> more = {}) {
+  more.insert(more.begin(), arguments.set.begin(), arguments.set.end());
+  return load_config(arguments.config, ConfigUse::fit,
+                     arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image),
+                     more);
+}
+
+std::vector<std::string> picture_formats(const Arguments& arguments) {
+  return arguments.npy ? std::vector<std::string>{".tif", ".npy"} : std::vector<std::string>{".tif"};
+}
+
+std::filesystem::path folder_of(const Arguments& arguments) {
+  return arguments.out.empty() ? std::filesystem::path(arguments.config).stem().string() + "-fit" : arguments.out;
+}
+
+/// Every droplet in view by a fit of its own: a folder of results each, and a table.
+int run_each(const Arguments& arguments) {
+  const std::vector<EachDroplet> droplets = droplets_in_view(read(arguments));
+  const std::filesystem::path out = folder_of(arguments);
+  OutputFolder folder(out);
+  const Interrupt interrupt;
+  std::vector<FitResult> results;
+  for (std::size_t i = 0; i < droplets.size() && !interrupt.flag().load(); ++i) {
+    Config config = read(arguments, droplets[i].set);
+    FitJob& job = config.job;
+    if (arguments.threads >= 0) job.options.threads = arguments.threads;
+    job.options.interrupted = &interrupt.flag();
+    const double memory = memory_to_fit(job);
+    results.push_back(watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); }));
+    do_work(config, memory, [&] {
+      write_results(out / "droplets" / std::to_string(i + 1), config, results.back(), picture_formats(arguments));
+    });
+    folder.keep();
+    if (!arguments.quiet)
+      std::cout << fmt::format("Droplet {} at ({:.1f}, {:.1f}): {}\n", i + 1, droplets[i].x_px, droplets[i].y_px,
+                               results.back().grade())
+                << summary(results.back());
+    results.back().micrographs.clear();  // a picture of each
+  }
+  write_file(out / "droplets.csv", droplets_csv(droplets, results));
+  folder.keep();
+  if (!arguments.quiet) std::cout << "Table: " << printable((out / "droplets.csv").string()) << "\n";
+  const bool all = results.size() == droplets.size() &&
+                   std::all_of(results.begin(), results.end(), [](const FitResult& r) { return r.has_answer(); });
+  return all ? kExitDone : kExitNoAnswer;
+}
+
 int run_fit(const Arguments& arguments) {
+  if (arguments.each) return run_each(arguments);
   Problems problems;
   Config config;
   try {
-    config = load_config(arguments.config, ConfigUse::fit,
-                         arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image),
-                         arguments.set);
+    config = read(arguments);
   } catch (const UserError& error) {
     problems.add(error);
   }
-  const std::filesystem::path config_path(arguments.config);
-  const std::filesystem::path out = arguments.out.empty() ? config_path.stem().string() + "-fit" : arguments.out;
+  const std::filesystem::path out = folder_of(arguments);
   std::unique_ptr<OutputFolder> folder;
   try {
     folder = std::make_unique<OutputFolder>(out);
@@ -84,8 +130,7 @@ int run_fit(const Arguments& arguments) {
   const Interrupt interrupt;
   job.options.interrupted = &interrupt.flag();
   const double memory = memory_to_fit(job);
-  std::vector<std::string> formats = {".tif"};
-  if (arguments.npy) formats.push_back(".npy");
+  const std::vector<std::string> formats = picture_formats(arguments);
   FitResult result = watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); });
   for (std::string& words : describe_rows(config)) result.warnings.push_back(std::move(words));
   if (arguments.coverage > 0 && result.has_answer() && config.signals.empty()) {
@@ -124,6 +169,8 @@ Command add_fit_command(CLI::App& app) {
       ->add_option("--coverage", arguments->coverage,
                    "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
       ->check(CLI::Range(1, 100000));
+  command->add_flag("--each", arguments->each,
+                    "a fit of every droplet that stands apart in the picture: droplets.csv and a folder each");
   command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
   command->add_flag("--npy", arguments->npy,
                     "also write fitted and residual images for NumPy: fitted.npy, residual.npy");

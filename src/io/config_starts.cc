@@ -48,8 +48,9 @@ std::string describe(const DiscGuess& disc, const View& view, double pixel) {
 /// where the diameter starts. The others' pixels are left out. Nothing where there is one disc, or none is meant: said
 /// where there are several.
 std::optional<DiscGuess> disc_meant(ConfigReader& reader, const Scene& scene, const Parameter& diameter,
-                                    const DiscGuess& whole, const Image& values, Mask& mask, const std::string& name) {
-  constexpr double kSmaller = 0.8, kTolerance = 1.15, kRim = 1.2;
+                                    const std::optional<DiscGuess>& stated, const Image& values, Mask& mask,
+                                    const std::string& name) {
+  constexpr double kSmaller = 0.8, kTolerance = 1.15, kRim = 1.4;
   const double pixel = pixel_um(reader, scene.view);
   if (!(pixel > 0) || !std::isfinite(diameter.value)) return std::nullopt;
   const double lower = (diameter.free ? diameter.lower : diameter.value) / kTolerance,
@@ -61,13 +62,17 @@ std::optional<DiscGuess> disc_meant(ConfigReader& reader, const Scene& scene, co
   const std::vector<DiscGuess> discs = find_discs(values, mask, kSmaller * diameter.value / pixel);
   if (discs.empty()) return std::nullopt;
   // Parts of one object, whose rings lie far apart.
+  const DiscGuess whole = find_disc(values, mask);
   const auto parts = std::count_if(discs.begin(), discs.end(),
                                    [&](const DiscGuess& disc) { return distance(disc, whole) < whole.radius_px; });
   if (within(whole) && parts > 1) return std::nullopt;
   const DiscGuess* meant = nullptr;
-  const auto off = [&](const DiscGuess& disc) { return std::abs(2 * disc.radius_px * pixel - diameter.value); };
+  const auto off = [&](const DiscGuess& disc) {
+    return stated ? distance(disc, *stated) : std::abs(2 * disc.radius_px * pixel - diameter.value);
+  };
   for (const DiscGuess& disc : discs)
-    if (within(disc) && (!meant || off(disc) < off(*meant))) meant = &disc;
+    if ((stated ? off(disc) < disc.radius_px : within(disc)) && (!meant || off(disc) < off(*meant))) meant = &disc;
+  if (!meant && stated) return std::nullopt;
   std::string list;
   for (const DiscGuess& disc : discs) list += (list.empty() ? "" : "; ") + describe(disc, scene.view, pixel);
   if (!meant) {
@@ -108,16 +113,15 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
   };
   DiscGuess disc{middle_x, middle_y, 0.25 * std::min(view.width, view.height), 0};
   const bool wanted = open(view.center_x_px) || open(view.center_y_px) || (droplet && open(droplet->diameter_um));
-  if (wanted && droplet && values) {
-    const DiscGuess found = find_disc(*values, *mask);
-    const auto meant = droplet->diameter_um
-                           ? disc_meant(reader, scene, reader.table[droplet->diameter_um], found, *values, *mask, name)
-                           : std::nullopt;
-    if (meant)
+  if (droplet && droplet->diameter_um && values) {
+    std::optional<DiscGuess> stated;
+    if (!open(view.center_x_px) && !open(view.center_y_px))
+      stated = DiscGuess{in_scene(reader, view.center_x_px), in_scene(reader, view.center_y_px), 0, 0};
+    if (const auto meant = disc_meant(reader, scene, reader.table[droplet->diameter_um], stated, *values, *mask, name))
       disc = *meant;
-    else if (found.contrast >= kLeastDiscContrast)
+    else if (const DiscGuess found = wanted ? find_disc(*values, *mask) : disc; found.contrast >= kLeastDiscContrast)
       disc = found;
-    else
+    else if (wanted)
       reader.warnings.push_back(name + ": no disc is visible; the centre starts in the middle of the image. Give " +
                                 "center_px and diameter_um to start elsewhere.");
   }

@@ -66,5 +66,20 @@ aperture_off 9.3 0.22
 host_off 10 0.16
 CASES
 
+# Three droplets of 9.3, 7.1 and 6.2 um: the one within the bounds, and each.
+fit_case several_droplets || fail 'several_droplets: no answer'
+holds several_droplets diameter_um 9.3
+holds several_droplets birefringence 0.22
+grep -q 'several discs are visible' several_droplets.txt several_droplets.err || fail 'several_droplets: not said'
+"$birefit" fit "$cases/several_droplets/config.yaml" --each --out each > each.txt 2> each.err || { fail 'each'; cat each.txt each.err; }
+awk -F, '
+  NR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; split("9.3 7.1 6.2", truth, " "); next }
+  $(column["sample.droplet.diameter_um_low95"]) <= truth[NR - 1] && truth[NR - 1] <= $(column["sample.droplet.diameter_um_high95"]) &&
+    $(column["sample.material.birefringence_low95"]) <= 0.22 && 0.22 <= $(column["sample.material.birefringence_high95"]) && $NF ~ /^answer/ { ++right }
+  END { exit right != 3 }' each/droplets.csv || { fail 'each: not three right droplets'; cat each/droplets.csv; }
+[ -f each/droplets/3/report.html ] || fail 'each: no report of the third'
+"$birefit" fit "$cases/host_off/config.yaml" --each --out one > one.txt 2> one.err
+[ $? -eq 2 ] || fail '--each of one droplet does not end in 2'
+
 [ $failures -eq 0 ] && echo 'all as required'  || echo "$failures failures"
 exit $((failures > 0))
