@@ -109,7 +109,7 @@ TEST(DiscRecovery, CoefficientAndLoadTogetherAreNotIdentifiable) {
 TEST(DiscRecovery, ZonesAroundTheForcesFollowTheDirection) {
   std::mt19937_64 random(49);
   const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-  for (int draw = 0; draw < problems_or(12); ++draw) {
+  for (int draw = 0; draw < problems_or(6); ++draw) {
     IndependentDisc d;
     d.um_per_px = 200;
     d.radius_um = d.um_per_px * uniform(40, 60);

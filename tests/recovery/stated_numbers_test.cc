@@ -112,7 +112,7 @@ void draw(Stated& s, std::mt19937_64& random) {
 }
 
 TEST(StatedNumbers, DrawnFromTheirUncertaintyLeaveIntervalsThatHold) {
-  constexpr unsigned kPictures = 20;
+  constexpr unsigned kPictures = 14;
   for (const Ceiling ceiling : {Ceiling::one_way, Ceiling::wave}) {
     const Stated of = droplet(ceiling);
     Count count;
