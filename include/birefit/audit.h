@@ -16,6 +16,7 @@ struct AuditFit {
   std::string departure;  ///< "none" of what is exactly as stated
   std::string amount;     ///< "2.5 %"
   int size = 0;           ///< 1 to 3, small to large; 0 where the departure is none
+  int problem = 0;        ///< of the sample, the same for all departures
   std::string grade;      ///< FitResult::grade()
   bool answered = false;
   /// The departure is of a stated number, by more than two of its standard deviations, and the pictures told nothing of
@@ -58,7 +59,7 @@ struct AuditRow {
   std::string departure, amount;
   int size = 0, problems = 0, answers = 0, with_misfit = 0, apart = 0;
   int intervals = 0, held = 0;
-  double width = 0;  ///< median half-width over that of pictures as stated; not a number without those
+  double width = 0;  ///< median half-width over that of the same sample as stated; not a number without those
   double worst = 0;  ///< half-widths by which an estimate of an answer is off
 };
 std::vector<AuditRow> tally(const std::vector<AuditFit>& fits);

@@ -18,6 +18,7 @@
 #include "birefit/audit.h"
 #include "birefit/io.h"
 #include "core/printable.h"
+#include "core/threads.h"
 #include "io/report_format.h"
 
 namespace birefit {
@@ -36,8 +37,10 @@ struct Arguments {
 std::string intervals_csv(const std::vector<AuditFit>& fits) {
   std::string text = "departure,amount,size,grade,apart,parameter,truth,value,low95,high95,half_widths_off\n";
   for (const AuditFit& fit : fits) {
-    const std::string head = fmt::format("\"{}\",\"{}\",{},\"{}\",{}", fit.departure, fit.amount, fit.size,
-                                         printable(fit.grade), fit.apart ? 1 : 0);
+    std::string grade = printable(fit.grade);  // of what could not be fitted the error
+    std::replace(grade.begin(), grade.end(), '"', '\'');
+    const std::string head =
+        fmt::format("\"{}\",\"{}\",{},\"{}\",{}", fit.departure, fit.amount, fit.size, grade, fit.apart ? 1 : 0);
     for (const AuditFit::Of& p : fit.parameters)
       text += fmt::format("{},\"{}\",{},{},{},{},{:.3g}\n", head, p.name, csv_number(p.truth), csv_number(p.value),
                           csv_number(p.low), csv_number(p.high), p.off());
@@ -142,7 +145,7 @@ int run_audit(const Arguments& arguments) {
     Watch watch(arguments.quiet, [](double) { return std::numeric_limits<double>::quiet_NaN(); });
     AuditOptions options{arguments.problems, arguments.seed, arguments.departures, {}};
     options.say = [&](const std::string& line) { watch.say(fmt::format("{} fits; {}", ++done, line)); };
-    fits = do_work(config, memory_to_fit(job), [&] { return audit(job, options); });
+    fits = do_work(config, memory_to_fit(job) * thread_count(job.options.threads), [&] { return audit(job, options); });
   }
   const std::vector<AuditRow> rows = tally(fits);
   write_file(out / "audit.csv", rows_csv(rows));
@@ -158,7 +161,7 @@ int run_audit(const Arguments& arguments) {
                              problems, held, intervals,
                              intervals > 0 ? fmt::format(" ({:.1f} %)", 100.0 * held / intervals) : "",
                              printable((out / "audit.svg").string()));
-  return kExitDone;
+  return interrupt.flag().load() ? kExitNoAnswer : kExitDone;
 }
 
 }  // namespace

@@ -7,25 +7,32 @@
 #include <fmt/format.h>
 
 #include "app/plot.h"
+#include "core/sub_grid.h"
 #include "io/config_discs.h"
 
 namespace birefit {
 
 std::vector<EachDroplet> droplets_in_view(const Config& config) {
-  constexpr double kSmallest = 0.8;  // of the stated diameter: as where one of several is looked for
   const FitJob& job = config.job;
   const Picture* picture = job.measurements.size() == 1 ? std::get_if<Picture>(&job.measurements.front()) : nullptr;
   const Droplet* droplet = picture ? std::get_if<Droplet>(&picture->scene.sample) : nullptr;
   if (!droplet || !droplet->diameter_um || !picture->scene.view.pixel_size_um)
     throw UserError(Where{}, "--each is for one picture of droplets", "leave it out");
+  if (picture->masked_by_user > 0)
+    throw UserError(Where{}, "--each does not know what a mask of " + picture->name + " stands for",
+                    "leave the mask out, or choose a part by roi_px");
   const Theta theta = job.parameters.values();
   const View& view = picture->scene.view;
   const Parameter& diameter = job.parameters[droplet->diameter_um];
   const double pixel = view.pixel_size_um.in(theta);
+  // Others than the one that the config means were left out: of a mosaic's colour all that there is, else all that is a
+  // number.
+  const SubGrid grid = sub_grid(picture->mask);
   Mask seen(picture->values.width(), picture->values.height());
-  for (std::size_t i = 0; i < seen.size(); ++i) seen.values()[i] = std::isfinite(picture->values.values()[i]);
+  for (int y = grid.y0; y < seen.height(); y += grid.spacing)
+    for (int x = grid.x0; x < seen.width(); x += grid.spacing) seen(x, y) = std::isfinite(picture->values(x, y));
   std::vector<EachDroplet> found;
-  for (const DiscGuess& disc : find_discs(picture->values, seen, kSmallest * diameter.value / pixel)) {
+  for (const DiscGuess& disc : find_discs(picture->values, seen, diameter_px(diameter, pixel))) {
     EachDroplet each;
     each.x_px = view.center_x_px.stated(disc.center_x_px), each.y_px = view.center_y_px.stated(disc.center_y_px);
     each.diameter_um = 2 * disc.radius_px * pixel;
@@ -45,21 +52,26 @@ std::vector<EachDroplet> droplets_in_view(const Config& config) {
 }
 
 std::string droplets_csv(const std::vector<EachDroplet>& droplets, const std::vector<FitResult>& results) {
+  std::vector<std::string> names;  // branches have parameters of their own
+  for (const FitResult& r : results)
+    for (const ParameterEstimate& p : r.parameters)
+      if (std::find(names.begin(), names.end(), p.name) == names.end()) names.push_back(p.name);
   std::string text = "droplet,seen_at_x_px,seen_at_y_px,seen_diameter_um";
-  const auto first =
-      std::find_if(results.begin(), results.end(), [](const FitResult& r) { return !r.parameters.empty(); });
-  if (first != results.end())
-    for (const ParameterEstimate& p : first->parameters)
-      text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", p.name);
+  for (const std::string& name : names) text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", name);
   text += ",reduced_chi_square,verdict\n";
   for (std::size_t i = 0; i < results.size(); ++i) {
     const EachDroplet& d = droplets[i];
     const FitResult& r = results[i];
     text += fmt::format("{},{:.1f},{:.1f},{:.3g}", i + 1, d.x_px, d.y_px, d.diameter_um);
-    for (const ParameterEstimate& p : r.parameters)
-      text += fmt::format(",{},{},{},{}", csv_number(p.value), csv_number(p.stderr_), csv_number(p.interval95_low),
-                          csv_number(p.interval95_high));
-    text += fmt::format(",{},{}\n", csv_number(r.reduced_chi_square), r.grade());
+    for (const std::string& name : names) {
+      const auto p = std::find_if(r.parameters.begin(), r.parameters.end(),
+                                  [&](const ParameterEstimate& one) { return one.name == name; });
+      text += p == r.parameters.end() ? ",,,,"
+                                      : fmt::format(",{},{},{},{}", csv_number(p->value), csv_number(p->stderr_),
+                                                    csv_number(p->interval95_low), csv_number(p->interval95_high));
+    }
+    text +=
+        r.parameters.empty() ? ",,unreadable\n" : fmt::format(",{},{}\n", csv_number(r.reduced_chi_square), r.grade());
   }
   return text;
 }

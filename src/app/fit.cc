@@ -82,23 +82,34 @@ int run_each(const Arguments& arguments) {
   OutputFolder folder(out);
   const Interrupt interrupt;
   std::vector<FitResult> results;
+  const auto folder_of_droplet = [&](std::size_t i) { return out / "droplets" / std::to_string(i + 1); };
   for (std::size_t i = 0; i < droplets.size() && !interrupt.flag().load(); ++i) {
-    Config config = read(arguments, droplets[i].set);
-    FitJob& job = config.job;
-    if (arguments.threads >= 0) job.options.threads = arguments.threads;
-    job.options.interrupted = &interrupt.flag();
-    const double memory = memory_to_fit(job);
-    results.push_back(watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); }));
-    do_work(config, memory, [&] {
-      write_results(out / "droplets" / std::to_string(i + 1), config, results.back(), picture_formats(arguments));
-    });
-    folder.keep();
-    if (!arguments.quiet)
-      std::cout << fmt::format("Droplet {} at ({:.1f}, {:.1f}): {}\n", i + 1, droplets[i].x_px, droplets[i].y_px,
-                               results.back().grade())
-                << summary(results.back());
-    results.back().micrographs.clear();  // a picture of each
+    results.emplace_back();
+    FitResult& result = results.back();
+    try {
+      Config config = read(arguments, droplets[i].set);
+      FitJob& job = config.job;
+      if (arguments.threads >= 0) job.options.threads = arguments.threads;
+      job.options.interrupted = &interrupt.flag();
+      const double memory = memory_to_fit(job);
+      result = watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); });
+      do_work(config, memory, [&] { write_results(folder_of_droplet(i), config, result, picture_formats(arguments)); });
+      folder.keep();
+      if (!arguments.quiet)
+        std::cout << fmt::format("Droplet {} at ({:.1f}, {:.1f}): {}\n", i + 1, droplets[i].x_px, droplets[i].y_px,
+                                 result.grade())
+                  << summary(result);
+      result.micrographs.clear();       // a picture of each
+    } catch (const UserError& error) {  // of this one; the others go on
+      result = {};
+      std::cerr << fmt::format("Droplet {} at ({:.1f}, {:.1f}): {}\n", i + 1, droplets[i].x_px, droplets[i].y_px,
+                               printable_lines(error.what()));
+    }
   }
+  // Nothing of an earlier run, which found more, beside these.
+  std::error_code ignored;
+  for (std::size_t i = droplets.size(); std::filesystem::exists(folder_of_droplet(i) / "fit.json", ignored); ++i)
+    std::filesystem::remove_all(folder_of_droplet(i), ignored);
   write_file(out / "droplets.csv", droplets_csv(droplets, results));
   folder.keep();
   if (!arguments.quiet) std::cout << "Table: " << printable((out / "droplets.csv").string()) << "\n";
@@ -165,16 +176,21 @@ Command add_fit_command(CLI::App& app) {
   command->add_option("--image", arguments->image, "use this image in place of micrograph.image");
   command->add_option("--out", arguments->out, "folder for the results; default: the config's name + \"-fit\", here");
   add_threads_option(*command, arguments->threads);
-  command
-      ->add_option("--coverage", arguments->coverage,
-                   "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
-      ->check(CLI::Range(1, 100000));
-  command->add_flag("--each", arguments->each,
-                    "a fit of every droplet that stands apart in the picture: droplets.csv and a folder each");
+  CLI::Option* coverage =
+      command
+          ->add_option(
+              "--coverage", arguments->coverage,
+              "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
+          ->check(CLI::Range(1, 100000));
   command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
   command->add_flag("--npy", arguments->npy,
                     "also write fitted and residual images for NumPy: fitted.npy, residual.npy");
-  command->add_flag("--json", arguments->json, "print fit.json in place of the summary");
+  CLI::Option* json = command->add_flag("--json", arguments->json, "print fit.json in place of the summary");
+  command
+      ->add_flag("--each", arguments->each,
+                 "a fit of every droplet that stands apart in the picture: droplets.csv and a folder each")
+      ->excludes(json)
+      ->excludes(coverage);
   return {command, [arguments] { return run_fit(*arguments); }};
 }
 

@@ -364,7 +364,10 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     for (std::vector<Picture>& pictures : filled)
       for (Picture& picture : pictures) {
         if (!sound || !reader.problems.empty() || !starts) continue;
+        const auto used = [&] { return std::count(picture.mask.values().begin(), picture.mask.values().end(), 1); };
+        const auto before = used();
         resolve_automatic(reader, picture.scene, &picture.values, &picture.mask, picture.name);
+        picture.outside_roi += static_cast<int>(before - used());  // other discs than the one that is meant
         check_overlap(reader, picture.scene, picture.name);
         check_stressed_disc(reader, picture);
       }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/robust.h"
+#include "core/sub_grid.h"
 #include "io/config_pixels.h"
 
 namespace birefit {
@@ -51,7 +52,7 @@ Activity activity_in(const Image& values, const Mask& mask, double least_diamete
   constexpr double kStrong = 0.98, kShare = 0.15, kOverNoise = 4;
   const auto strong = sorted.begin() + static_cast<std::ptrdiff_t>(kStrong * static_cast<double>(sorted.size() - 1));
   std::nth_element(sorted.begin(), strong, sorted.end());
-  activity.threshold = std::max(kShare * *strong, kOverNoise * noise / std::sqrt(side * side));
+  activity.threshold = std::max(kShare * *strong, kOverNoise * noise / std::sqrt(side));
   return activity;
 }
 
@@ -115,7 +116,27 @@ DiscGuess disc_in(const Image& values, const Mask& mask, const Activity& activit
 
 }  // namespace
 
-std::vector<DiscGuess> find_discs(const Image& values, const Mask& mask, double least_diameter_px) {
+DiameterPx diameter_px(const Parameter& diameter_um, double pixel_um) {
+  constexpr double kTolerance = 1.15;
+  const double start = diameter_um.value / pixel_um;
+  const auto bound = [&](double stated, double otherwise) {
+    return (!diameter_um.free ? start : std::isfinite(stated) ? stated / pixel_um : otherwise * start);
+  };
+  return {start, bound(diameter_um.lower, 0.8) / kTolerance, bound(diameter_um.upper, 1.25) * kTolerance};
+}
+
+std::vector<DiscGuess> find_discs(const Image& values, const Mask& mask, const DiameterPx& diameter) {
+  if (const SubGrid grid = sub_grid(mask); grid.spacing > 1) {  // one colour of a mosaic
+    const double s = grid.spacing;
+    auto discs = find_discs(on_grid(values, grid), on_grid(mask, grid),
+                            {diameter.start / s, diameter.least / s, diameter.most / s});
+    for (DiscGuess& disc : discs)
+      disc.center_x_px = grid.x0 + s * disc.center_x_px, disc.center_y_px = grid.y0 + s * disc.center_y_px,
+      disc.radius_px *= s;
+    return discs;
+  }
+  constexpr double kSmaller = 0.8;
+  const double least_diameter_px = kSmaller * diameter.start;
   if (!(least_diameter_px >= 3) || values.empty() || mask.size() != values.size()) return {};
   const Activity activity = activity_in(values, mask, least_diameter_px);
   Grid<int> label;
@@ -137,7 +158,23 @@ std::vector<DiscGuess> find_discs(const Image& values, const Mask& mask, double 
         discs.push_back(disc);
   std::sort(discs.begin(), discs.end(),
             [](const DiscGuess& a, const DiscGuess& b) { return a.radius_px > b.radius_px; });
-  if (discs.size() < 2) discs.clear();
+  if (discs.size() < 2) return {};
+  // Rings and lobes of one object lie apart, too: all around them is of a size within the bounds, and none of them is
+  // as large as what is looked for, or opposite of each there is another.
+  const DiscGuess whole = find_disc(values, mask);
+  if (!diameter.holds(whole)) return discs;
+  const auto as_large = [&](const DiscGuess& disc) {
+    return 2 * disc.radius_px > 0.7 * diameter.start && 2 * disc.radius_px < 1.4 * diameter.start;
+  };
+  const auto has_opposite = [&](const DiscGuess& disc) {
+    return std::any_of(discs.begin(), discs.end(), [&](const DiscGuess& other) {
+      constexpr double kNear = 0.15;
+      return std::hypot(disc.center_x_px + other.center_x_px - 2 * whole.center_x_px,
+                        disc.center_y_px + other.center_y_px - 2 * whole.center_y_px) < kNear * whole.radius_px;
+    });
+  };
+  if (std::none_of(discs.begin(), discs.end(), as_large) || std::all_of(discs.begin(), discs.end(), has_opposite))
+    return {};
   return discs;
 }
 

@@ -127,7 +127,7 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   Mask saturated(width, height, 0);
   mark_saturated(image.values, saturation.from, saturated);
   const double step = smallest_step(image);
-  const bool codes = image.top_code > 0;
+  const bool codes = image.top_code > 0 && settings.mosaic.parts.empty();
   if (const auto cut = codes ? find_cut_end(End::lowest, image.values, area) : std::nullopt)
     reader.warnings.push_back(fmt::format(
         "{}: {:.2g} % of the pixels sit at the lowest code, {:g}: the black was cut off, by a background that "
@@ -284,7 +284,8 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
   for (std::optional<LoadedImage>* frame_image : {&dark.image, &bright.image, &crossed.image}) {
     if (!*frame_image) continue;
     LoadedImage* frame = &**frame_image;
-    if (frame_image == &bright.image && frame->top_code > 0 &&
+    // Neighbours of a mosaic see other things: their differences are no noise.
+    if (frame_image == &bright.image && frame->top_code > 0 && settings.mosaic.parts.empty() &&
         !leave_out_clipped(reader, *bright.name, bright.where, frame->values, area, noise_of_dark,
                            calibration.saturated))
       return std::nullopt;

@@ -100,21 +100,25 @@ std::optional<double> noise_of_neighbours(const Image& values, const PixelRect& 
 std::optional<CutEnd> find_cut_end(End end, const Image& values, const PixelRect& area,
                                    std::optional<double> noise_sd) {
   constexpr double kShare = 0.005, kOverNext = 3, kNoise = 0.7;  // half a code, and rounding by the same measure
+  constexpr double kNoiseElsewhere = 2;  // an even picture of many frames may have one code by right
   std::map<double, int> pixels;
   int all = 0;
   for (int y = area.y0; y < area.y1; ++y)
     for (int x = area.x0; x < area.x1; ++x)
       if (const double value = values(x, y); std::isfinite(value)) ++pixels[value], ++all;
   if (all == 0) return std::nullopt;
-  double step = std::numeric_limits<double>::infinity();
+  // Codes are as far apart as neighbours are at the median: single values lie between.
+  std::vector<double> steps;
   for (auto above = std::next(pixels.begin()); above != pixels.end(); ++above)
-    step = std::min(step, above->first - std::prev(above)->first);
-  if (!std::isfinite(step)) step = 1;
+    steps.push_back(above->first - std::prev(above)->first);
+  const double step = steps.empty() ? 1 : median(std::move(steps));
   const auto [code, here] = end == End::lowest ? *pixels.begin() : *pixels.rbegin();
-  const auto next = pixels.find(end == End::lowest ? code + step : code - step);
-  if (!(here > kShare * all) || (next != pixels.end() && here < kOverNext * next->second)) return std::nullopt;
+  int next = 0;
+  for (const auto& [value, count] : pixels)
+    if (const double off = std::abs(value - code); off > 0 && off < 1.5 * step) next += count;
+  if (!(here > kShare * all) || here < kOverNext * next) return std::nullopt;
   const std::optional<double> own = noise_of_neighbours(values, area, code), noise = own ? own : noise_sd;
-  if (!noise || !(*noise > kNoise * step)) return std::nullopt;
+  if (!noise || !(*noise > (own ? kNoise : kNoiseElsewhere) * step)) return std::nullopt;
   return CutEnd{code, static_cast<double>(here) / all};
 }
 

@@ -50,28 +50,19 @@ std::string describe(const DiscGuess& disc, const View& view, double pixel) {
 std::optional<DiscGuess> disc_meant(ConfigReader& reader, const Scene& scene, const Parameter& diameter,
                                     const std::optional<DiscGuess>& stated, const Image& values, Mask& mask,
                                     const std::string& name) {
-  constexpr double kSmaller = 0.8, kTolerance = 1.15, kRim = 1.4;
+  constexpr double kRim = 1.4;
   const double pixel = pixel_um(reader, scene.view);
   if (!(pixel > 0) || !std::isfinite(diameter.value)) return std::nullopt;
-  const double lower = (diameter.free ? diameter.lower : diameter.value) / kTolerance,
-               upper = (diameter.free ? diameter.upper : diameter.value) * kTolerance;
-  const auto within = [&](const DiscGuess& disc) {
-    const double found = 2 * disc.radius_px * pixel;
-    return found >= lower && found <= upper;
-  };
-  const std::vector<DiscGuess> discs = find_discs(values, mask, kSmaller * diameter.value / pixel);
+  const DiameterPx wanted = diameter_px(diameter, pixel);
+  const std::vector<DiscGuess> discs = find_discs(values, mask, wanted);
   if (discs.empty()) return std::nullopt;
-  // Parts of one object, whose rings lie far apart.
-  const DiscGuess whole = find_disc(values, mask);
-  const auto parts = std::count_if(discs.begin(), discs.end(),
-                                   [&](const DiscGuess& disc) { return distance(disc, whole) < whole.radius_px; });
-  if (within(whole) && parts > 1) return std::nullopt;
   const DiscGuess* meant = nullptr;
   const auto off = [&](const DiscGuess& disc) {
-    return stated ? distance(disc, *stated) : std::abs(2 * disc.radius_px * pixel - diameter.value);
+    return stated ? distance(disc, *stated) : std::abs(2 * disc.radius_px - wanted.start);
   };
   for (const DiscGuess& disc : discs)
-    if ((stated ? off(disc) < disc.radius_px : within(disc)) && (!meant || off(disc) < off(*meant))) meant = &disc;
+    if ((stated ? off(disc) < disc.radius_px : wanted.holds(disc)) && (!meant || off(disc) < off(*meant)))
+      meant = &disc;
   if (!meant && stated) return std::nullopt;
   std::string list;
   for (const DiscGuess& disc : discs) list += (list.empty() ? "" : "; ") + describe(disc, scene.view, pixel);
@@ -117,7 +108,10 @@ void resolve_automatic(ConfigReader& reader, Scene& scene, const Image* values, 
     std::optional<DiscGuess> stated;
     if (!open(view.center_x_px) && !open(view.center_y_px))
       stated = DiscGuess{in_scene(reader, view.center_x_px), in_scene(reader, view.center_y_px), 0, 0};
-    if (const auto meant = disc_meant(reader, scene, reader.table[droplet->diameter_um], stated, *values, *mask, name))
+    const auto meant = reader.use == ConfigUse::render ? std::nullopt
+                                                       : disc_meant(reader, scene, reader.table[droplet->diameter_um],
+                                                                    stated, *values, *mask, name);
+    if (meant)
       disc = *meant;
     else if (const DiscGuess found = wanted ? find_disc(*values, *mask) : disc; found.contrast >= kLeastDiscContrast)
       disc = found;

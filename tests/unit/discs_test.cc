@@ -39,12 +39,12 @@ Image picture(int side, const std::vector<Ball>& balls) {
 }
 const std::vector<Ball> kThree = {{60.2, 58.4, 46.5, 5.5}, {170.5, 65.3, 35.5, 4.2}, {111.4, 168.1, 31, 3.8}};
 
-std::vector<DiscGuess> found(const Image& image, double least_diameter) {
-  return find_discs(image, Mask(image.width(), image.height(), 1), least_diameter);
+std::vector<DiscGuess> found(const Image& image, const DiameterPx& diameter) {
+  return find_discs(image, Mask(image.width(), image.height(), 1), diameter);
 }
 
 TEST(Discs, AreFoundWhereTheyAreTheLargestFirst) {
-  const std::vector<DiscGuess> discs = found(picture(224, kThree), 75);
+  const std::vector<DiscGuess> discs = found(picture(224, kThree), {93, 70, 120});
   ASSERT_EQ(discs.size(), kThree.size());
   for (std::size_t i = 0; i < discs.size(); ++i) {
     EXPECT_NEAR(discs[i].center_x_px, kThree[i].x, 1);
@@ -56,8 +56,10 @@ TEST(Discs, AreFoundWhereTheyAreTheLargestFirst) {
 
 TEST(Discs, OneIsNotSeveralWhateverItsRings) {
   for (const double retardance : {1.5, 3.1, 6.0, 12.0, 25.0})
-    EXPECT_TRUE(found(picture(160, {{78, 83, 60, retardance}}), 90).empty()) << retardance;
-  EXPECT_TRUE(found(picture(160, {}), 90).empty());
+    EXPECT_TRUE(found(picture(160, {{78, 83, 60, retardance}}), {112, 90, 140}).empty()) << retardance;
+  // Looked for among much smaller ones, its rings lie apart.
+  EXPECT_TRUE(found(picture(160, {{78, 83, 60, 6.0}}), {30, 20, 150}).empty());
+  EXPECT_TRUE(found(picture(160, {}), {112, 90, 140}).empty());
 }
 
 using DiscsInConfigs = birefit::testing::ConfigFolder;
@@ -89,6 +91,13 @@ microscope:
   EXPECT_EQ(picture.mask(170, 65), 0);
   EXPECT_EQ(picture.mask(111, 168), 0);
   EXPECT_THAT(read.job.warnings, ::testing::Contains(HasSubstr("several discs are visible")));
+
+  // The largest, from a start without bounds, or with wide ones.
+  for (const char* wide : {"{value: 9.0, fit: auto}", "{value: 9.0, fit: [5, 25]}"}) {
+    const auto again = load(replaced(text, "{value: 9.0, fit: [8, 10.5]}", wide), ConfigUse::fit);
+    EXPECT_NEAR(again.job.parameters[again.job.parameters.find("micrograph.center_px.x")].value, kThree[0].x, 1)
+        << wide;
+  }
 
   // The smallest, by its bounds.
   const auto small =

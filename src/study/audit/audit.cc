@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <random>
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include "birefit/render.h"
 #include "core/threads.h"
 #include "fit/errors/stated.h"
+#include "fit/problem/light.h"
 #include "fit/weights/noise.h"
 #include "study/audit/disturbance.h"
 
@@ -55,7 +57,7 @@ Theta drawn(const FitJob& job, std::mt19937_64& random) {
     if (p.prior_sd) {
       value = std::clamp(value + *p.prior_sd * std::normal_distribution<double>()(random), p.lower, p.upper);
     } else if (p.unit == "px") {  // of a picture that shows all of it
-      value += std::uniform_real_distribution<double>(-1, 1)(random);
+      value = std::clamp(value + std::uniform_real_distribution<double>(-1, 1)(random), p.lower, p.upper);
     } else if (std::isfinite(p.lower) && std::isfinite(p.upper)) {
       const double width = p.upper - p.lower, reach = kReach * width, rim = kRim * width;
       value = std::uniform_real_distribution<double>(std::max(p.lower + rim, value - reach),
@@ -91,7 +93,8 @@ Seen seen_by(const std::vector<Sight>& sights) {
 
 /// What a frame is exposed with: gain and offset as stated, else those of the job's pictures.
 struct Camera {
-  double gain = 1, offset = 0, noise_sd = 0, photon = 0;
+  double gain = 1, offset = 0;
+  NoiseModel noise;
   bool codes = false;  ///< rounded to whole counts
 };
 Camera camera_of(const FitJob& job, const Picture& picture, const Seen& seen, double brightest) {
@@ -103,13 +106,12 @@ Camera camera_of(const FitJob& job, const Picture& picture, const Seen& seen, do
                   : brightest > 0      ? (seen.top - camera.offset) / brightest
                                        : 1;
   const double range = std::abs(camera.gain) * brightest;
-  const bool taken = picture.values.size() > 1;
-  if (picture.noise || taken) {
-    const NoiseModel noise = picture.noise ? *picture.noise : estimate_noise(picture);
-    camera.noise_sd = noise.read_counts, camera.photon = noise.counts_per_photon;
-  } else {
-    camera.noise_sd = kAssumedNoise * range;
-  }
+  if (picture.noise)
+    camera.noise = *picture.noise;
+  else if (picture.values.size() > 1)
+    camera.noise = estimate_noise(picture);
+  else
+    camera.noise.read_counts = kAssumedNoise * range;
   constexpr double kCounts = 50;  // what has fewer over its range is in other units
   camera.codes = picture.variance_scale.empty() && range > kCounts && picture.values.size() != 1;
   return camera;
@@ -145,14 +147,19 @@ std::vector<Image> exposed(const FitJob& whole, const Disturbance* departure, Ex
     const Camera camera = camera_of(whole, picture, seen, brightest);
     const Levels levels{camera.offset, std::max(1e-300, std::abs(camera.gain) * brightest),
                         frames.size() > 1 ? static_cast<double>(g) / static_cast<double>(frames.size() - 1) - 0.5 : 0};
+    Theta levelled = shown;
+    for (const UnevenLight& uneven : picture.uneven)  // what is stated of it stays
+      if (whole.parameters[uneven.coefficient].free) levelled[static_cast<std::size_t>(uneven.coefficient.index)] = 0;
+    if (picture.gain) levelled[static_cast<std::size_t>(picture.gain.index)] = camera.gain;
+    if (picture.offset) levelled[static_cast<std::size_t>(picture.offset.index)] = camera.offset;
     Image& values = frames[g];
-    for (double& v : values.values()) v = camera.offset + camera.gain * v;
+    values = lit(picture, levelled, std::move(values));
     if (departure && departure->values) departure->values(exposure, levels, values);
-    Image noise(values.width(), values.height());
-    for (std::size_t i = 0; i < noise.size(); ++i)
-      noise.values()[i] =
-          normal(exposure.random) * std::sqrt(camera.noise_sd * camera.noise_sd +
-                                              camera.photon * std::max(0.0, values.values()[i] - camera.offset));
+    Picture as_seen;  // of its noise: in counts, where a calibration turned those into transmission
+    as_seen.values = values, as_seen.variance_scale = picture.variance_scale;
+    as_seen.mask = picture.mask.size() == values.size() ? picture.mask : Mask(values.width(), values.height(), 1);
+    Image noise = standard_deviation(as_seen, camera.noise, values);
+    for (double& v : noise.values()) v = std::isfinite(v) ? v * normal(exposure.random) : 0;
     if (departure && departure->noise) departure->noise(exposure, noise);
     for (std::size_t i = 0; i < noise.size(); ++i) values.values()[i] += noise.values()[i];
     if (departure && departure->codes) departure->codes(exposure, levels, values);
@@ -167,6 +174,7 @@ FitJob with_frames(const FitJob& job, const std::vector<Image>& frames) {
   FitJob again = job;
   again.options.progress = nullptr;
   again.options.threads = 1;
+  again.options.choose_rays = false;  // the picture is by the rays of its plan
   std::size_t frame = 0;
   for (Measurement& measurement : again.measurements) {
     if (Picture* picture = std::get_if<Picture>(&measurement)) {
@@ -187,16 +195,19 @@ bool told(const FitResult& result, const std::string& name) {
                      [&](const StatedNumber& n) { return n.name == name && n.fitted; });
 }
 
-AuditFit one(const FitJob& job, const FitJob& whole, const Disturbance* departure, int size, int problem,
-             std::uint64_t seed) {
+/// Nothing where the fit was interrupted.
+std::optional<AuditFit> one(const FitJob& job, const FitJob& whole, const Disturbance* departure, int size, int problem,
+                            std::uint64_t seed) {
   AuditFit found;
   found.departure = departure ? departure->name : kNone;
   found.size = departure ? size : 0;
-  std::mt19937_64 random(seed_of(seed, found.departure, found.size, problem));
+  found.problem = problem;
+  // The same samples for all departures, so that widths can be compared.
+  std::mt19937_64 of_sample(seed_of(seed, "", 0, problem)), random(seed_of(seed, found.departure, found.size, problem));
   Exposure exposure{whole, random, departure ? departure->sizes[static_cast<std::size_t>(size - 1)] : 0,
                     random() % 2 ? 1.0 : -1.0};
   if (departure) found.amount = amount_of(*departure, exposure.size);
-  Theta truth = drawn(whole, random);
+  Theta truth = drawn(whole, of_sample);
   FitResult result;
   try {
     result = fit(with_frames(job, exposed(whole, departure, exposure, truth)));
@@ -204,6 +215,7 @@ AuditFit one(const FitJob& job, const FitJob& whole, const Disturbance* departur
     found.grade = error.what();
     return found;
   }
+  if (result.interrupted) return std::nullopt;
   found.grade = result.grade();
   found.answered = result.has_answer();
   found.seconds = result.seconds;
@@ -211,7 +223,7 @@ AuditFit one(const FitJob& job, const FitJob& whole, const Disturbance* departur
     const Parameter& p = whole.parameters[departure->parameter];
     const double off = exposure.size * (departure->of_share ? std::abs(p.value) : 1);
     constexpr double kFar = 2.001;  // standard deviations
-    found.apart = off > kFar * p.known_to.of(p.value) && !told(result, p.name);
+    found.apart = off > kFar * p.known_to.of(p.value) && found.grade == "answer" && !told(result, p.name);
   }
   if (!found.answered) return found;
   for (const ParameterEstimate& p : result.parameters) {
@@ -271,20 +283,18 @@ std::vector<AuditFit> audit(const FitJob& job, const AuditOptions& options) {
       for (int size = 1; size <= 3; ++size)
         for (int problem = 0; problem < options.problems; ++problem) asked.push_back({&departure, size, problem});
 
-  std::vector<AuditFit> fits(asked.size());
-  std::vector<char> done(asked.size(), 0);
+  std::vector<std::optional<AuditFit>> fits(asked.size());
   // A fit keeps two cores busy about half the time; two fits beside each other keep them busy.
   parallel_for(static_cast<int>(asked.size()), thread_count(job.options.threads), [&](int i) {
     if (job.options.interrupted && job.options.interrupted->load()) return;
     const Asked& a = asked[static_cast<std::size_t>(i)];
-    AuditFit& fit = fits[static_cast<std::size_t>(i)] = one(job, whole, a.departure, a.size, a.problem, options.seed);
-    done[static_cast<std::size_t>(i)] = 1;
-    if (options.say)
-      options.say(fmt::format("{}{}{}: {}", fit.departure, fit.amount.empty() ? "" : " ", fit.amount, fit.grade));
+    auto& fit = fits[static_cast<std::size_t>(i)] = one(job, whole, a.departure, a.size, a.problem, options.seed);
+    if (options.say && fit)
+      options.say(fmt::format("{}{}{}: {}", fit->departure, fit->amount.empty() ? "" : " ", fit->amount, fit->grade));
   });
   std::vector<AuditFit> finished;
-  for (std::size_t i = 0; i < fits.size(); ++i)
-    if (done[i]) finished.push_back(std::move(fits[i]));
+  for (std::optional<AuditFit>& fit : fits)
+    if (fit) finished.push_back(std::move(*fit));
   return finished;
 }
 
@@ -295,10 +305,10 @@ std::vector<AuditRow> tally(const std::vector<AuditFit>& fits) {
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
   };
-  std::map<std::string, std::vector<double>> clean;
+  std::map<std::pair<int, std::string>, double> clean;  // of the same sample
   for (const AuditFit& fit : fits)
     if (fit.size == 0)
-      for (const AuditFit::Of& p : fit.parameters) clean[p.name].push_back(p.high - p.low);
+      for (const AuditFit::Of& p : fit.parameters) clean[{fit.problem, p.name}] = p.high - p.low;
   std::vector<AuditRow> rows;
   std::vector<std::vector<double>> widths;
   for (const AuditFit& fit : fits) {
@@ -316,8 +326,8 @@ std::vector<AuditRow> tally(const std::vector<AuditFit>& fits) {
     ++row->problems, row->answers += fit.answered, row->with_misfit += fit.answered && fit.grade != "answer";
     for (const AuditFit::Of& p : fit.parameters) {
       ++row->intervals, row->held += p.holds(), row->worst = std::max(row->worst, p.off());
-      if (const double usual = median(clean[p.name]); usual > 0)
-        widths[static_cast<std::size_t>(row - rows.begin())].push_back((p.high - p.low) / usual);
+      if (const auto usual = clean.find({fit.problem, p.name}); usual != clean.end() && usual->second > 0)
+        widths[static_cast<std::size_t>(row - rows.begin())].push_back((p.high - p.low) / usual->second);
     }
   }
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].width = median(widths[i]);
