@@ -20,7 +20,7 @@ struct AuditFit {
   std::string grade;      ///< FitResult::grade()
   bool answered = false;
   /// The departure is of a stated number, by more than two of its standard deviations, and the pictures told nothing of
-  /// it: what leaves no trace cannot be found.
+  /// it (a plain answer, the number not fitted): what leaves no trace cannot be found.
   bool apart = false;
   struct Of {
     std::string name;
@@ -30,14 +30,13 @@ struct AuditFit {
     double off() const;
   };
   std::vector<Of> parameters;  ///< searched ones, where answered
-  double seconds = 0;
 };
 
 struct AuditOptions {
-  int problems = 1;  ///< of every departure and size
+  int problems = 1;  ///< of every departure and size; three times as many of "none"
   std::uint64_t seed = 1;
-  std::vector<std::string> departures;  ///< those alone; empty: all that apply
-  std::function<void(const std::string&)> say;
+  std::vector<std::string> departures;          ///< those alone, beside "none"; empty: all that apply
+  std::function<void(const std::string&)> say;  ///< of every fit, from any thread
 };
 
 /// Draws the searched parameters about their values, within a quarter of the width of their bounds, the centre of a

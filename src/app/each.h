@@ -14,11 +14,11 @@ struct EachDroplet {
   /// The config's values by which it is the one that is fitted, as of `--set`.
   std::vector<std::string> set;
 };
-/// The droplets that stand apart in the config's picture, the largest first. Throws UserError where it
-/// is not one picture of a droplet, or there are fewer than two.
+/// The droplets that stand apart in the config's picture, the largest first. Throws UserError where it is not one
+/// picture of droplets, has a mask, or there are fewer than two.
 std::vector<EachDroplet> droplets_in_view(const Config& config);
 
-/// A row for each, in their order; results that are missing are those of fits that were not done.
+/// A row for each that was fitted, in their order; one without parameters could not be (`unreadable`).
 std::string droplets_csv(const std::vector<EachDroplet>& droplets, const std::vector<FitResult>& results);
 
 }  // namespace birefit

@@ -19,4 +19,12 @@ inline double median(std::vector<double> values) {
   return values.size() % 2 ? *middle : 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
+/// The value that `share` of them, 0 to 1, stay below; 0 of none.
+inline double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
 }  // namespace birefit

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "birefit/fit.h"
+#include "core/robust.h"
 #include "fit/errors/stated.h"
 #include "fit/errors/statistics.h"
 #include "fit/errors/verdict.h"
@@ -33,17 +34,6 @@ struct Planned {
   std::string noise;
 };
 
-/// Value that `share` of the usable pixels stay below.
-double quantile(const Picture& m, double share) {
-  std::vector<double> values;
-  for (std::size_t i = 0; i < m.values.size(); ++i)
-    if (m.mask.values()[i] && std::isfinite(m.values.values()[i])) values.push_back(m.values.values()[i]);
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 const Picture& first_picture(const FitJob& job) { return std::get<Picture>(job.measurements.front()); }
 
 Planned planned(const FitJob& job) {
@@ -60,7 +50,8 @@ Planned planned(const FitJob& job) {
     if (!taken && m.mask.empty()) m.mask = Mask(light.width(), light.height(), 1);
     m.mask = fitted_pixels(m, theta);
     if (taken) {  // the image's own level; which fringe is where does not matter for that
-      const double dark = quantile(m, 0.005), bright = quantile(m, 0.995);
+      const std::vector<double> values = usable_values(m);
+      const double dark = quantile(values, 0.005), bright = quantile(values, 0.995);
       if (m.gain && p.job.parameters[m.gain].free && range > 0)
         p.job.parameters[m.gain].value = (bright - dark) / range;
       if (m.offset && p.job.parameters[m.offset].free && !p.job.parameters[m.offset].prior_sd)

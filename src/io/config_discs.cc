@@ -47,12 +47,9 @@ Activity activity_in(const Image& values, const Mask& mask, double least_diamete
           if (mask(x, y) && std::isfinite(values(x, y))) squares += std::pow(values(x, y) - ground, 2), ++count;
       if (count > 0) activity.of_cell(column, row) = std::sqrt(std::max(0.0, squares / count - noise * noise));
     }
-  std::vector<double> sorted = activity.of_cell.values();
-  if (sorted.empty()) return activity;
   constexpr double kStrong = 0.98, kShare = 0.15, kOverNoise = 4;
-  const auto strong = sorted.begin() + static_cast<std::ptrdiff_t>(kStrong * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), strong, sorted.end());
-  activity.threshold = std::max(kShare * *strong, kOverNoise * noise / std::sqrt(side));
+  activity.threshold =
+      std::max(kShare * quantile(activity.of_cell.values(), kStrong), kOverNoise * noise / std::sqrt(side));
   return activity;
 }
 

@@ -92,9 +92,7 @@ std::optional<double> noise_of_neighbours(const Image& values, const PixelRect& 
       if (counts(left) && counts(value) && counts(right)) off.push_back(std::abs(value - 0.5 * (left + right)));
     }
   if (off.empty()) return std::nullopt;
-  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-  std::nth_element(off.begin(), middle, off.end());
-  return 1.4826 * *middle / std::sqrt(1.5);
+  return kNormalSdPerMad * median(std::move(off)) / std::sqrt(1.5);
 }
 
 std::optional<CutEnd> find_cut_end(End end, const Image& values, const PixelRect& area,

@@ -33,8 +33,8 @@ struct CutEnd {
   double code = 0;
   double share = 0;  ///< of the area's pixels
 };
-/// Of values that are codes, as far apart as the closest two of them. `noise_sd`: stands for that of pixels which are
-/// not cut where there are none.
+/// Of values that are codes. `noise_sd`: stands for that of pixels which are not cut where there are none, and has to
+/// be two codes then.
 std::optional<CutEnd> find_cut_end(End end, const Image& values, const PixelRect& area,
                                    std::optional<double> noise_sd = {});
 /// Of neighbours, none of them at this code: the middle one of three off the others' mean, a measure without the

@@ -44,9 +44,9 @@ std::string describe(const DiscGuess& disc, const View& view, double pixel) {
                      in_file(disc.center_y_px, y0));
 }
 
-/// Of several discs in the picture the one that the config means: of a size within the bounds, of these nearest to
-/// where the diameter starts. The others' pixels are left out. Nothing where there is one disc, or none is meant: said
-/// where there are several.
+/// Of several discs in the picture the one that the config means: around the centre that is stated, else of a size
+/// within the bounds, of these nearest to where the diameter starts. The others' pixels are left out. Nothing where
+/// there is one disc, or none is meant, which is said where no centre is stated.
 std::optional<DiscGuess> disc_meant(ConfigReader& reader, const Scene& scene, const Parameter& diameter,
                                     const std::optional<DiscGuess>& stated, const Image& values, Mask& mask,
                                     const std::string& name) {
@@ -85,8 +85,7 @@ std::optional<DiscGuess> disc_meant(ConfigReader& reader, const Scene& scene, co
     }
   reader.warnings.push_back(
       fmt::format("{}: several discs are visible ({}). The one of {} is fitted, {} pixels of the others are left out; "
-                  "state center_px or "
-                  "roi_px for another.",
+                  "state center_px or roi_px for another, or run fit --each.",
                   name, list, describe(*meant, scene.view, pixel), left_out));
   return *meant;
 }

@@ -45,7 +45,8 @@ without() {
     /^sample:/ { skip = 0 }
     !skip' "$1.yaml"
 }
-# one CURVE FILE WAVELENGTH PHASE GAIN OFFSET: a config of one series, every row of it, on the curve that an earlier fit found
+# one CURVE FILE WAVELENGTH PHASE GAIN OFFSET: a config of one series, every row of it, on the curve that an earlier fit found, which
+# is taken as it is: what is known of its numbers within their usual errors would bend it towards the series.
 one() {
   printf 'signal:\n  file: %s\n  value: Out\n  columns: {%s: V2}\n' "$2" "$voltage"
   printf 'micrograph: {gain: %s, offset: %s}\n' "$5" "$6"
@@ -55,9 +56,10 @@ one() {
       -v k33="$(value "$1" sample.cell.director.freedericksz.k33_over_k11)" \
       -v eps="$(value "$1" sample.cell.director.freedericksz.eps_ratio)" \
       -v pretilt="$(value "$1" sample.cell.director.freedericksz.pretilt_deg)" '
-      { sub(/thickness_um: {.*/, "thickness_um: " thickness); sub(/resonance_nm: {.*/, "resonance_nm: " resonance)
-        sub(/threshold_v: {.*/, "threshold_v: " threshold); sub(/k33_over_k11: {.*/, "k33_over_k11: " k33)
-        sub(/eps_ratio: {.*/, "eps_ratio: " eps); sub(/pretilt_deg: {.*/, "pretilt_deg: " pretilt); print }'
+      function exact(x) { return "{value: " x ", exact: true}" }
+      { sub(/thickness_um: {.*/, "thickness_um: " exact(thickness)); sub(/birefringence: 0.2 /, "birefringence: " exact(0.2) " "); sub(/resonance_nm: {.*/, "resonance_nm: " resonance)
+        sub(/threshold_v: {.*/, "threshold_v: " threshold); sub(/k33_over_k11: {.*/, "k33_over_k11: " exact(k33))
+        sub(/eps_ratio: {.*/, "eps_ratio: " exact(eps)); sub(/pretilt_deg: {.*/, "pretilt_deg: " pretilt); print }'
 }
 
 # All five together: 4 % of each signal's spread.

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -150,6 +151,48 @@ TEST_F(CalibrationFrames, ThatSayTooLittleAreRefused) {
   EXPECT_THAT(problems(with("flat: dark.tif, dark: light.tif")), HasSubstr("were the two exchanged?"));
   fs::copy_file(folder_ / "stack_imagej.tif", folder_ / "light.tif", fs::copy_options::overwrite_existing);
   EXPECT_THAT(problems(with("dark: dark.tif, flat: light.tif")), HasSubstr("has 6 pages"));
+}
+
+// All light there is, brighter on the right, beyond what the camera can tell: there it is left out, and where that is
+// everywhere there is no measure of light.
+TEST_F(CalibrationFrames, AClippedLightIsLeftOutOrRefused) {
+  constexpr int kSide = 48;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 12);
+  const auto take = [&](const std::string& name, double left, double right, double highest) {
+    Image image(kSide, kSide);
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x) {
+        const double code = left + (right - left) * x / (kSide - 1) + noise(random);
+        image(x, y) = std::round(std::min(code, highest)) / 65535;
+      }
+    save_image(image, folder_ / name);
+  };
+  take("image.png", 1200, 1200, 1e9), take("dark.png", 200, 200, 1e9);
+  const auto calibrated = [&](const char* light) {
+    std::string text = with(std::string("dark: dark.png, parallel: ") + light);
+    return text.replace(text.find("image.tif"), 9, "image.png");
+  };
+  take("light.png", 3300, 3700, 1e9);
+  const Config sound = load(calibrated("light.png"));
+  EXPECT_THAT(sound.job.warnings, Not(Contains(HasSubstr("clipped"))));
+  EXPECT_EQ(picture(sound.job, 0).saturated, 0);
+
+  take("light.png", 3300, 3700, 3500);
+  const Config part = load(calibrated("light.png"));
+  EXPECT_THAT(part.job.warnings, Contains(HasSubstr("clipped")));
+  const Picture& seen = picture(part.job, 0);
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const double light = 3300 + 400.0 * x / (kSide - 1);
+      if (light > 3500) EXPECT_EQ(seen.mask(x, y), 0) << x;
+      if (light < 3500 - 9 * 12) EXPECT_EQ(seen.mask(x, y), 1) << x;  // three deviations left out, and six of luck
+    }
+
+  take("light.png", 3300, 3700, 3000);
+  EXPECT_THAT(problems(calibrated("light.png")), HasSubstr("100 % of the pixels sit at 3000"));
+  // One code by right: no frame scatters.
+  EXPECT_EQ(problems(with("dark: dark.tif, parallel: light.tif")), "");
 }
 
 // ---- signal: {frames, roi_px} ---------------------------------------------------------------------------------------

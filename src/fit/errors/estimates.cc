@@ -86,6 +86,9 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
   constexpr double kMissed = 10;
   // (By the result: profiles of others have moved the problem.)
   if (q.result.reduced_chi_square > kMissed) return;
+  // What noise does to it is lost in what the model leaves out, however its likelihood bends.
+  constexpr double kOfError = 0.1;
+  if (sd < kOfError * estimate.stderr_) return;
   // A valley longer than the bounds is no interval but a verdict.
   if (!(t * sd < parameter.upper - parameter.lower)) return;
   constexpr double kBent = 0.1, kBentFar = 0.2;  // 5 % of the interval

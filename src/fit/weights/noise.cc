@@ -402,6 +402,14 @@ Image standard_deviation(const Picture& micrograph, const NoiseModel& noise, con
   return result;
 }
 
+std::vector<double> usable_values(const Picture& picture) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < picture.values.size(); ++i)
+    if (picture.mask.values()[i] && std::isfinite(picture.values.values()[i]))
+      values.push_back(picture.values.values()[i]);
+  return values;
+}
+
 double mean_variance(const Picture& micrograph, const NoiseModel& noise, const Image& signal) {
   const Image sd = standard_deviation(micrograph, noise, signal);
   double sum = 0, count = 0;

@@ -11,6 +11,8 @@ namespace birefit::estimation {
 /// With `fitted` (the model's image in the same values) the differences are those of the residual, which no fringe
 /// fills: fringes finer than about six pixels look like noise in the image itself.
 NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted = nullptr);
+/// Those of the pixels that a mask leaves, as far as they are numbers.
+std::vector<double> usable_values(const Picture& picture);
 /// Mean variance of the usable pixels' values under a model.
 double mean_variance(const Picture& micrograph, const NoiseModel& noise, const Image& signal);
 

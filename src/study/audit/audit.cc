@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "birefit/render.h"
+#include "core/robust.h"
 #include "core/threads.h"
 #include "fit/errors/stated.h"
 #include "fit/problem/light.h"
@@ -67,18 +68,6 @@ Theta drawn(const FitJob& job, std::mt19937_64& random) {
   return theta;
 }
 
-/// Value that `share` of the usable pixels stay below.
-double quantile(const Picture& picture, double share) {
-  std::vector<double> values;
-  for (std::size_t i = 0; i < picture.values.size(); ++i)
-    if (picture.mask.values()[i] && std::isfinite(picture.values.values()[i]))
-      values.push_back(picture.values.values()[i]);
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 /// Darkest and brightest of a job's pictures and readings; what is assumed where it has none.
 struct Seen {
   double dark = kAssumedDark, top = kAssumedDark + kAssumedRange;
@@ -86,8 +75,8 @@ struct Seen {
 Seen seen_by(const std::vector<Sight>& sights) {
   double dark = std::numeric_limits<double>::infinity(), top = -dark;
   for (const Sight& sight : sights)
-    if (const double low = quantile(*sight.picture, 0.005), high = quantile(*sight.picture, 0.995); std::isfinite(low))
-      dark = std::min(dark, low), top = std::max(top, high);
+    if (const std::vector<double> values = usable_values(*sight.picture); !values.empty())
+      dark = std::min(dark, quantile(values, 0.005)), top = std::max(top, quantile(values, 0.995));
   return dark < top ? Seen{dark, top} : Seen{};
 }
 
@@ -204,7 +193,7 @@ std::optional<AuditFit> one(const FitJob& job, const FitJob& whole, const Distur
   found.problem = problem;
   // The same samples for all departures, so that widths can be compared.
   std::mt19937_64 of_sample(seed_of(seed, "", 0, problem)), random(seed_of(seed, found.departure, found.size, problem));
-  Exposure exposure{whole, random, departure ? departure->sizes[static_cast<std::size_t>(size - 1)] : 0,
+  Exposure exposure{random, departure ? departure->sizes[static_cast<std::size_t>(size - 1)] : 0,
                     random() % 2 ? 1.0 : -1.0};
   if (departure) found.amount = amount_of(*departure, exposure.size);
   Theta truth = drawn(whole, of_sample);
@@ -218,7 +207,6 @@ std::optional<AuditFit> one(const FitJob& job, const FitJob& whole, const Distur
   if (result.interrupted) return std::nullopt;
   found.grade = result.grade();
   found.answered = result.has_answer();
-  found.seconds = result.seconds;
   if (departure && departure->parameter >= 0) {
     const Parameter& p = whole.parameters[departure->parameter];
     const double off = exposure.size * (departure->of_share ? std::abs(p.value) : 1);
@@ -299,12 +287,6 @@ std::vector<AuditFit> audit(const FitJob& job, const AuditOptions& options) {
 }
 
 std::vector<AuditRow> tally(const std::vector<AuditFit>& fits) {
-  const auto median = [](std::vector<double> values) {
-    if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
   std::map<std::pair<int, std::string>, double> clean;  // of the same sample
   for (const AuditFit& fit : fits)
     if (fit.size == 0)
@@ -330,7 +312,8 @@ std::vector<AuditRow> tally(const std::vector<AuditFit>& fits) {
         widths[static_cast<std::size_t>(row - rows.begin())].push_back((p.high - p.low) / usual->second);
     }
   }
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].width = median(widths[i]);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i].width = widths[i].empty() ? std::numeric_limits<double>::quiet_NaN() : median(widths[i]);
   return rows;
 }
 

@@ -11,9 +11,8 @@
 
 namespace birefit::study {
 
-/// The pictures of one problem, in whose making a departure may have a hand.
+/// The making of one problem's pictures, in which a departure may have a hand.
 struct Exposure {
-  const FitJob& job;  ///< its parameters as stated
   std::mt19937_64& random;
   double size = 0;  ///< the departure's
   double sign = 1;  ///< of what may go either way

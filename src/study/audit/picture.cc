@@ -4,7 +4,10 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
+
+#include "core/robust.h"
 
 namespace birefit::study {
 namespace {
@@ -109,9 +112,7 @@ double level_of_border(const Image& image) {
   std::vector<double> values;
   for (int x = 0; x < image.width(); ++x) values.push_back(image(x, 0)), values.push_back(image(x, image.height() - 1));
   for (int y = 0; y < image.height(); ++y) values.push_back(image(0, y)), values.push_back(image(image.width() - 1, y));
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median(std::move(values));
 }
 
 }  // namespace birefit::study

@@ -1,7 +1,6 @@
 #pragma once
-// What optics, cameras and files do to a picture. Shares are of its range.
-
-#include <random>
+// What optics, cameras and files do to a picture. Places and lengths are in pixels, (0, 0) the middle of the top left
+// one.
 
 #include "birefit/image.h"
 
@@ -9,8 +8,9 @@ namespace birefit::study {
 
 /// By a Gaussian; beyond the edge the picture goes on as it is there.
 Image blurred(const Image& image, double sd_px);
-/// The picture as it is at (x', y') = centre + (a (x - cx) , (y - cy)): cubic between pixels.
+/// About the centre, wider by a share and as much lower: cubic between pixels (Keys), exact for parabolas.
 Image stretched(const Image& image, double by, double center_x, double center_y);
+/// To the right and down; `beyond`: what comes in from outside.
 Image shifted(const Image& image, double by_x, double by_y, double beyond);
 /// As JPEG stores it: cosines of blocks of 8 x 8, rounded to the steps of the standard's table of brightness (ITU T.81,
 /// annex K) at a quality from 1 to 100. Values from 0 to 255.
