@@ -287,6 +287,13 @@ TEST(ScanInAFit, IsMadeByPlansFinerThanTheMeanOfAFrame) {
   EXPECT_EQ(count.undecided, 1);
 }
 
+// Two azimuths describe this helix as well as each other. Eight starts of twelve led into the one, none of the others
+// went on, and on the eight pixels of the search the two were within five errors of each other: the answer was ten
+// standard errors off.
+TEST(ScanInAFit, LeavesRoomForValleysThatFewStartsLeadInto) {
+  EXPECT_EQ(solve(family("HelixCell"), 1, 879).undecided, 1);
+}
+
 class LongGlobalSearch : public GlobalSearch {};
 TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   const Count count = solve(GetParam(), problems_or(GetParam().many), first_problem());

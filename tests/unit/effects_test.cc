@@ -67,6 +67,42 @@ TEST(PictureEffects, ChangeAPictureAsTheyAreNamed) {
       1e-9);
 }
 
+// As the light does, by the spot's width and by where its centre is, to which a stretch refers: against differences.
+TEST(PictureEffects, ChangeWithTheLight) {
+  constexpr double kSmall = 1e-4;
+  const auto moved = [](double by_x, double by_y) {  // the same spot elsewhere
+    KnownLight light(kSize, kSize);
+    light.center_x = kCenterX + by_x, light.center_y = kCenterY + by_y;
+    for (int y = 0; y < kSize; ++y)
+      for (int x = 0; x < kSize; ++x)
+        light.set(x, y, std::exp(-0.5 * (std::pow(x - light.center_x, 2) + std::pow(y - light.center_y, 2)) / 60));
+    return light;
+  };
+  struct Case {
+    std::function<KnownLight(double)> at;
+    double center_x, center_y;
+  };
+  const Case cases[] = {{[](double v) { return known(spot(kVariance + 100 * v)); }, 0, 0},
+                        {[&](double v) { return moved(v, 0); }, 1, 0},
+                        {[&](double v) { return moved(0, v); }, 0, 1}};
+  for (const Kind kind : {Kind::gamma, Kind::curve, Kind::blur, Kind::stretch_x, Kind::stretch_diagonal, Kind::growth})
+    for (const Case& one : cases) {
+      const KnownLight here = one.at(0), up = one.at(kSmall), down = one.at(-kSmall);
+      LightChange change{Image(kSize, kSize), one.center_x, one.center_y};
+      for (std::size_t i = 0; i < change.light.size(); ++i)
+        change.light.values()[i] = (up.light.values()[i] - down.light.values()[i]) / (2 * kSmall);
+      double largest = 0, error = 0;
+      for (int y = 1; y + 1 < kSize; ++y)
+        for (int x = 1; x + 1 < kSize; ++x) {
+          const double by = (effect_at(kind, up, x, y) - effect_at(kind, down, x, y)) / (2 * kSmall);
+          largest = std::max(largest, std::abs(by));
+          error = std::max(error, std::abs(by - effect_change_at(kind, here, change, x, y)));
+        }
+      EXPECT_GT(largest, 0);
+      EXPECT_LT(error, 1e-4 * largest) << static_cast<int>(kind) << ' ' << one.center_x << ' ' << one.center_y;
+    }
+}
+
 TEST(PictureEffects, TakeNoNeighbourThatIsNotKnown) {
   KnownLight light = known(spot(kVariance));
   light.known(40, 30) = 0;

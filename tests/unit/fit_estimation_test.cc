@@ -860,6 +860,52 @@ TEST(LeastSquares, WeightsMeanAndShapeApartOverAllParts) {
     EXPECT_NEAR(2 * reduced.col(j).dot(reduced.col(2)), gradient[j], 1e-9 * std::abs(gradient[j]));
 }
 
+// What the solver is told to go down by is the slope of what it compares, beside priors with Student's tails, too, of a
+// linear unknown that the image pulls deviations away and of a searched one, and where lens and camera act on the
+// light.
+TEST(LeastSquares, TheSolversGradientIsThatOfTheObjectiveBesideStudentPriorsAndEffects) {
+  Bar bar(700, 0.4);
+  bar.free(bar.bias, 690, 100, 4000);
+  bar.free(bar.tilt, 0.38, 0.1, 0.7);
+  bar.free_linear();
+  Parameter& offset = bar.job.parameters[bar.offset];
+  offset.nuisance = true, offset.value = 140, offset.prior_sd = 4;
+  Parameter& tilt = bar.job.parameters[bar.tilt];
+  tilt.nuisance = true, tilt.prior_sd = 0.005;  // about 0.38
+  Picture& micrograph = bar.add_image(40, 40, bar.bias);
+  Gaussian gaussian(23);
+  expose(micrograph, 3000, 100, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
+  using Effect = PictureEffect::Kind;
+  for (const auto& [effect, size] :
+       {std::pair{Effect::blur, 4.0}, {Effect::gamma, 0.2}, {Effect::curve, 0.2}, {Effect::stretch_x, 0.05}}) {
+    Parameter parameter;
+    parameter.name = "effect " + std::to_string(static_cast<int>(effect));
+    parameter.value = 3000 * size;
+    micrograph.effects.push_back({bar.job.parameters.add(parameter), effect});
+  }
+  estimation::PixelSet set;
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 40; ++x) set.pixels.push_back({x, y});
+  set.value = Eigen::Map<const Eigen::VectorXd>(micrograph.values.values().data(), 1600);
+  set.sigma = Eigen::VectorXd::Constant(1600, 300);  // the prior counts beside the image
+  const estimation::Task task(bar.job);
+  estimation::LeastSquares problem(task, {plan(micrograph.scene, bar.job.parameters.values())}, {set});
+  const Eigen::Vector2d at(690, 0.396);  // 3.2 deviations
+  const auto objective_at = [&](const Eigen::Vector2d& searched) {
+    problem.evaluate(searched, false);
+    return problem.objective();
+  };
+  const Eigen::Vector2d step(0.02, 1e-5);
+  for (int j = 0; j < 2; ++j) {
+    const Eigen::Vector2d by = step[j] * Eigen::Vector2d::Unit(j);
+    const double slope = (objective_at(at + by) - objective_at(at - by)) / (2 * step[j]);
+    problem.evaluate(at, true);
+    EXPECT_GT(std::abs(problem.theta()[bar.offset.index] - 140) / 4, 2) << "or the tails would not be reached";
+    const Eigen::MatrixXd factor = problem.projected_factor(Eigen::Vector2d::Ones());
+    EXPECT_NEAR(2 * factor.col(j).dot(factor.col(2)), slope, 1e-5 * std::abs(slope)) << j;
+  }
+}
+
 TEST(Fit, FramesWithVoltagesOfTheirOwnGiveTheSameBitsWithOneAndTwoThreads) {
   // Ten frames, one voltage each and a tilt they share: rendered a frame a core, each with derivatives by what its own
   // scene reads.

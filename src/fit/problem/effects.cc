@@ -20,6 +20,26 @@ KnownLight::KnownLight(const View& view, const Theta& theta, const std::vector<s
   for (std::size_t i = 0; i < pixels.size(); ++i) set(pixels[i][0], pixels[i][1], values[static_cast<Eigen::Index>(i)]);
 }
 
+namespace {
+
+/// Convolution with what has that variance along x and y: half the Laplacian (heat equation).
+double blur_at(const Image& light, int x, int y) {
+  return 0.5 * (light(x + 1, y) + light(x - 1, y) + light(x, y + 1) + light(x, y - 1) - 4 * light(x, y));
+}
+
+std::array<double, 2> slope_at(const Image& light, int x, int y) {
+  return {0.5 * (light(x + 1, y) - light(x - 1, y)), 0.5 * (light(x, y + 1) - light(x, y - 1))};
+}
+
+/// Of light with this slope, at a distance (dx, dy) from what stays where it is.
+double stretched(PictureEffect::Kind kind, const std::array<double, 2>& slope, double dx, double dy) {
+  const auto [by_x, by_y] = slope;
+  if (kind == PictureEffect::Kind::growth) return -(dx * by_x + dy * by_y);
+  return kind == PictureEffect::Kind::stretch_x ? dy * by_y - dx * by_x : -(dx * by_y + dy * by_x);
+}
+
+}  // namespace
+
 double effect_at(PictureEffect::Kind kind, const KnownLight& p, int x, int y) {
   const double here = p.light(x, y);
   switch (kind) {
@@ -31,14 +51,22 @@ double effect_at(PictureEffect::Kind kind, const KnownLight& p, int x, int y) {
       break;
   }
   if (!has_neighbours(p, x, y)) return 0;
-  const Image& light = p.light;
-  // Convolution with what has that variance along x and y: half the Laplacian (heat equation).
-  if (kind == PictureEffect::Kind::blur)
-    return 0.5 * (light(x + 1, y) + light(x - 1, y) + light(x, y + 1) + light(x, y - 1) - 4 * here);
-  const double by_x = 0.5 * (light(x + 1, y) - light(x - 1, y)), by_y = 0.5 * (light(x, y + 1) - light(x, y - 1)),
-               dx = x - p.center_x, dy = y - p.center_y;
-  if (kind == PictureEffect::Kind::growth) return -(dx * by_x + dy * by_y);
-  return kind == PictureEffect::Kind::stretch_x ? dy * by_y - dx * by_x : -(dx * by_y + dy * by_x);
+  if (kind == PictureEffect::Kind::blur) return blur_at(p.light, x, y);
+  return stretched(kind, slope_at(p.light, x, y), x - p.center_x, y - p.center_y);
+}
+
+double effect_change_at(PictureEffect::Kind kind, const KnownLight& p, const LightChange& change, int x, int y) {
+  const double here = p.light(x, y), by = change.light(x, y);
+  if (kind == PictureEffect::Kind::gamma || kind == PictureEffect::Kind::curve) {
+    if (!(p.brightest > 0)) return 0;
+    const double share = here / p.brightest, of_brightest = change.light(p.brightest_at[0], p.brightest_at[1]);
+    if (kind == PictureEffect::Kind::curve) return by * (2 * share - 1) - share * share * of_brightest;
+    return here > 0 ? by * (std::log(share) + 1) - share * of_brightest : 0;
+  }
+  if (!has_neighbours(p, x, y)) return 0;
+  if (kind == PictureEffect::Kind::blur) return blur_at(change.light, x, y);
+  return stretched(kind, slope_at(change.light, x, y), x - p.center_x, y - p.center_y) -
+         stretched(kind, slope_at(p.light, x, y), change.center_x, change.center_y);
 }
 
 }  // namespace birefit::estimation

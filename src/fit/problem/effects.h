@@ -16,6 +16,7 @@ struct KnownLight {
   Image light;
   Mask known;
   double brightest = 0;
+  std::array<int, 2> brightest_at{};
   double center_x = 0, center_y = 0;  ///< of the sample, px
 
   KnownLight(int width, int height) : light(width, height), known(width, height) {}
@@ -24,12 +25,20 @@ struct KnownLight {
              const Eigen::Ref<const Eigen::VectorXd>& values);
   void set(int x, int y, double value) {
     light(x, y) = value, known(x, y) = 1;
-    brightest = std::max(brightest, value);
+    if (value > brightest) brightest = value, brightest_at = {x, y};
   }
 };
 
 /// d(light of a pixel)/d(effect), in units of the light per unit of the effect (PictureEffect::Kind); 0 where it takes
 /// a neighbour that is not known.
 double effect_at(PictureEffect::Kind kind, const KnownLight& picture, int x, int y);
+
+/// How a picture changes by a parameter, per unit of it.
+struct LightChange {
+  Image light;                        ///< at all pixels that are known
+  double center_x = 0, center_y = 0;  ///< of the sample, px
+};
+/// d(effect_at)/d(that parameter).
+double effect_change_at(PictureEffect::Kind kind, const KnownLight& picture, const LightChange& change, int x, int y);
 
 }  // namespace birefit::estimation

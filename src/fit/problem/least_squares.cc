@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -13,7 +14,6 @@
 #include "birefit/render.h"
 #include "core/threads.h"
 #include "fit/errors/statistics.h"
-#include "fit/problem/effects.h"
 #include "fit/problem/small_systems.h"
 #include "medium/references.h"
 
@@ -236,24 +236,6 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
   }
 }
 
-/// How this light changes by the frame's effects.
-void LeastSquares::set_effects(Frame& frame, const Eigen::Ref<const Eigen::VectorXd>& intensity) const {
-  if (std::none_of(frame.terms.begin(), frame.terms.end(), [](const Term& term) { return term.effect.has_value(); }))
-    return;
-  const View& view = task_.picture(static_cast<int>(&frame - frames_.data())).scene.view;
-  const KnownLight known(view, theta_, frame.set.pixels, intensity);
-  for (Term& term : frame.terms) {
-    if (!term.effect) continue;
-    term.at_pixels.resize(frame.count);
-    for (Eigen::Index i = 0; i < frame.count; ++i) {
-      const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(i)];
-      term.at_pixels[i] = effect_at(*term.effect, known, x, y);
-    }
-    term.whitened = term.at_pixels;
-    whiten(frame, term.whitened, 1);
-  }
-}
-
 Eigen::MatrixXd LeastSquares::intensity_by(const std::vector<int>& table_indices) {
   Eigen::MatrixXd columns(pixel_rows_, static_cast<Eigen::Index>(table_indices.size()));
   for_frames([&](std::size_t g, int threads) {
@@ -272,7 +254,7 @@ Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change,
   Eigen::VectorXd change = intensity_change;
   for (const Frame& frame : frames_) {
     auto part = change.segment(frame.begin, frame.count);
-    part.array() *= light(frame, true, 0, frame.count).array();
+    to_values(frame, part, {}, thread_count(job_.options.threads));
     whiten(frame, part, thread_count(job_.options.threads));
   }
   for (const Tile& tile : tiles_)
@@ -286,8 +268,7 @@ LeastSquares::Beside LeastSquares::beside(Eigen::MatrixXd columns) const {
   Beside sums{Eigen::MatrixXd::Zero(k, k), Eigen::MatrixXd::Zero(n, k), Eigen::VectorXd::Zero(k)};
   for (const Frame& frame : frames_) {
     auto part = columns.middleRows(frame.begin, frame.count);
-    const Eigen::VectorXd gain = light(frame, true, 0, frame.count);
-    for (Eigen::Index j = 0; j < k; ++j) part.col(j).array() *= gain.array();
+    to_values(frame, part, {}, thread_count(job_.options.threads));
     whiten(frame, part, thread_count(job_.options.threads));
   }
   for (const Tile& tile : tiles_) {
@@ -299,21 +280,6 @@ LeastSquares::Beside LeastSquares::beside(Eigen::MatrixXd columns) const {
     sums.with_residual += here.transpose() * residual_.segment(begin, tile.count);
   }
   return sums;
-}
-
-/// Sum of the coefficients of the intensity, or of those by themselves, at these pixels.
-Eigen::VectorXd LeastSquares::light(const Frame& frame, bool of_intensity, Eigen::Index begin,
-                                    Eigen::Index rows) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows);
-  for (const Term& term : frame.terms) {
-    if (term.of_intensity != of_intensity) continue;
-    const double coefficient = term.coefficient_in(theta_);
-    if (term.shape || term.effect)
-      sum += coefficient * term.at_pixels.segment(begin, rows);
-    else
-      sum.array() += coefficient;
-  }
-  return sum;
 }
 
 /// Sums of products of the linear unknowns' rows with each other and with `columns`, over one frame.
@@ -359,14 +325,13 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   if (!derivatives) return;
 
   const int l = static_cast<int>(unknowns_.linear.size());
+  std::vector<int> all(static_cast<std::size_t>(p));
+  std::iota(all.begin(), all.end(), 0);
   for_frames([&](std::size_t g, int threads) {
     const Frame& frame = frames_[g];
-    for_parts(frame.count, threads, [&](std::size_t, Eigen::Index begin, Eigen::Index rows) {
-      const Eigen::VectorXd gain = light(frame, true, begin, rows);
-      for (Eigen::Index j = 0; j < p; ++j)
-        searched_columns_.col(j).segment(frame.begin + begin, rows).array() *= gain.array();
-    });
-    whiten(frame, searched_columns_.middleRows(frame.begin, frame.count), threads);
+    auto columns = searched_columns_.middleRows(frame.begin, frame.count);
+    to_values(frame, columns, all, threads);
+    whiten(frame, columns, threads);
   });
   if (prior_root_.rows() > 0)
     searched_columns_.bottomRows(prior_root_.rows()) = prior_slope_.asDiagonal() * prior_root_.leftCols(p);
@@ -427,8 +392,10 @@ void LeastSquares::solve_linear() {
   const Eigen::Index priors = prior_root_.rows();
   const Eigen::VectorXd apart =
       priors > 0 ? Eigen::VectorXd(prior_target_ - prior_root_.leftCols(p) * searched) : Eigen::VectorXd();
-  // Student's tails make a weight of each prior, which follows the solution.
-  constexpr int kTimes = 8;
+  // Student's tails make a weight of each prior, which follows the solution: to rounding, because the projected
+  // gradient is exact only there.
+  constexpr int kTimes = 100;
+  constexpr double kRounding = 1e-10;
   Eigen::VectorXd linear = Eigen::VectorXd::Zero(l), weight = Eigen::VectorXd::Ones(priors);
   for (int time = 0; time < kTimes; ++time) {
     if (priors > 0 && l > 0) {
@@ -442,7 +409,7 @@ void LeastSquares::solve_linear() {
     for (Eigen::Index i = 0; i < priors; ++i)
       if (student_[static_cast<std::size_t>(i)] && linear_prior_[static_cast<std::size_t>(i)])
         weight[i] = student_weight(prior_root_.row(i).rightCols(l).dot(linear) - apart[i]);
-    if (priors == 0 || (weight - before).cwiseAbs().maxCoeff() <= 1e-3) break;
+    if (priors == 0 || (weight - before).cwiseAbs().maxCoeff() <= kRounding) break;
   }
   for (int j = 0; j < l; ++j) theta_[unknowns_.linear[j]] = linear[j];
 
@@ -487,7 +454,7 @@ Eigen::MatrixXd LeastSquares::projected_factor(const Eigen::VectorXd& scale) con
         tile.micrograph < 0 ? pixel_rows_ : frames_[static_cast<std::size_t>(tile.micrograph)].begin + tile.begin;
     rows.leftCols(p) = searched_columns_.middleRows(begin, tile.count);
     if (tile.micrograph < 0) {
-      rows.leftCols(p) -= prior_root_.rightCols(projection_.rows()) * projection_;
+      rows.leftCols(p) -= prior_slope_.asDiagonal() * (prior_root_.rightCols(projection_.rows()) * projection_);
     } else {
       for (const Term& term : frames_[static_cast<std::size_t>(tile.micrograph)].terms)
         if (term.unknown >= 0)

@@ -151,6 +151,8 @@ class LeastSquares {
                     Eigen::MatrixXd& cross) const;
   void set_priors();
   void set_effects(Frame& frame, const Eigen::Ref<const Eigen::VectorXd>& intensity) const;
+  void to_values(const Frame& frame, Eigen::Ref<Eigen::MatrixXd> columns, const std::vector<int>& searched,
+                 int threads) const;
   void solve_linear();
   /// Some thousand rows of one micrograph, or the priors'.
   struct Tile {

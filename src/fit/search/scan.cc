@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -128,6 +129,15 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
   constexpr double kHopeless = 4, kReach = 60;
   if (starts.size() > finalists + 1) {
     walk(kFirstSteps);
+    // Where most lead into one valley they would leave no room for the others.
+    std::vector<std::pair<double, Eigen::VectorXd>> apart, besides;
+    for (auto& start : starts)
+      (same && std::any_of(apart.begin(), apart.end(), [&](const auto& a) { return same(a.second, start.second); })
+           ? besides
+           : apart)
+          .push_back(std::move(start));
+    starts = std::move(apart);
+    std::move(besides.begin(), besides.end(), std::back_inserter(starts));
     starts.resize(finalists);
   }
   walk(steps);
@@ -164,11 +174,18 @@ void keep_distinct(ScanResult& result, LeastSquares& problem, const Eigen::Vecto
   }
   std::stable_sort(result.candidates.begin(), result.candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.objective < b.objective; });
+  // By both measures: where one is flat, at an extremum of the fringes, everything is near it. A few pixels know less
+  // than all of them: what is near by their errors may be two minima, between which the objective rises.
+  constexpr double kNear = 5, kRise = 1e-4;
+  const auto one_valley = [&](const Candidate& a, const Candidate& b) {
+    problem.evaluate(0.5 * (a.searched + b.searched), false);
+    return problem.objective() <= (1 + kRise) * std::max(a.objective, b.objective);
+  };
   std::vector<Candidate> distinct;
   for (Candidate& candidate : result.candidates) {
     const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Candidate& other) {
-      // By both measures: where one is flat, at an extremum of the fringes, everything is near it.
-      return separation(other, candidate.searched) < 5 && separation(candidate, other.searched) < 5;
+      return separation(other, candidate.searched) < kNear && separation(candidate, other.searched) < kNear &&
+             one_valley(other, candidate);
     });
     if (!known) distinct.push_back(std::move(candidate));
   }
@@ -182,6 +199,13 @@ Eigen::VectorXd spread_point(int index, const std::vector<Axis>& axes, const Eig
   for (std::size_t k = 0; k < axes.size(); ++k)
     x[axes[k].searched] = axes[k].steps.value_at(share[k] * axes[k].steps.total());
   return x;
+}
+
+/// Fewer than so many steps apart in everything.
+bool near(const std::vector<Axis>& axes, const Eigen::VectorXd& a, const Eigen::VectorXd& b, double steps = 1) {
+  return std::all_of(axes.begin(), axes.end(), [&](const Axis& axis) {
+    return std::abs(axis.steps.at(a[axis.searched]) - axis.steps.at(b[axis.searched])) < steps;
+  });
 }
 
 /// Where the objective is looked at before any solver starts.
@@ -220,7 +244,8 @@ class Survey {
     for (std::size_t i = 0; i < product && others > 0 && std::isfinite(chi[order[i]]); ++i) {
       Eigen::VectorXd x = point_at(order[i]);
       constexpr double kApart = 1.5;
-      if (std::any_of(minima.begin(), minima.end(), [&](const auto& m) { return near(x, m.second, kApart); })) continue;
+      if (std::any_of(minima.begin(), minima.end(), [&](const auto& m) { return near(axes_, x, m.second, kApart); }))
+        continue;
       minima.emplace_back(chi[order[i]], std::move(x));
       --others;
     }
@@ -252,7 +277,8 @@ class Survey {
     Places apart;
     for (auto& place : places) {
       if (apart.size() >= wanted || !std::isfinite(place.first)) break;
-      if (std::none_of(apart.begin(), apart.end(), [&](const auto& other) { return near(place.second, other.second); }))
+      if (std::none_of(apart.begin(), apart.end(),
+                       [&](const auto& other) { return near(axes_, place.second, other.second); }))
         apart.push_back(std::move(place));
     }
     return apart;
@@ -273,12 +299,6 @@ class Survey {
       flat /= axis.values.size();
     }
     return x;
-  }
-  /// Fewer than so many steps apart in everything.
-  bool near(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double steps = 1) const {
-    return std::all_of(axes_.begin(), axes_.end(), [&](const Axis& axis) {
-      return std::abs(axis.steps.at(a[axis.searched]) - axis.steps.at(b[axis.searched])) < steps;
-    });
   }
   const std::string& name_of(const Axis& axis) const {
     return task_.searched(static_cast<std::size_t>(axis.searched)).name;
@@ -369,6 +389,9 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
     starts = product <= most ? survey.minima_of_grid(cheap ? kBesideMinima : 0)
                              : survey.best_of_box(most, 4 * kMostBatches * static_cast<std::size_t>(candidates));
   const Effort effort = effort_of(problem, result.points, candidates);
+  const SameMinimum same = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+    return !axes.empty() && near(axes, a, b);
+  };
   // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet
   // believed: the next ones, then, as long as there are any.
   const double rows = static_cast<double>(problem.pixel_rows());
@@ -380,8 +403,8 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
                 starts.begin() + static_cast<std::ptrdiff_t>(last));
     if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
-    best = std::min(best,
-                    polish_into(result, problem, options, std::move(some), effort.finalists, kSteps, hopeless_above));
+    best = std::min(
+        best, polish_into(result, problem, options, std::move(some), effort.finalists, kSteps, hopeless_above, same));
     // Where pictures cost next to nothing, all of them: minima may be as good as each other.
     if ((best < rows + kDoubtful * std::sqrt(2 * rows) && !cheap) || best > hopeless_above) break;
   }
