@@ -3,87 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "core/sub_grid.h"
 
 namespace birefit::estimation {
-namespace {
-
-/// Continued fraction of the incomplete beta function (DLMF 8.17.22), modified Lentz evaluation.
-double beta_fraction(double a, double b, double x) {
-  constexpr double kTiny = 1e-300;
-  double c = 1, d = 1 - (a + b) * x / (a + 1);
-  if (std::abs(d) < kTiny) d = kTiny;
-  d = 1 / d;
-  double h = d;
-  for (int m = 1; m < 500; ++m) {
-    const double even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
-    const double odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1));
-    for (const double term : {even, odd}) {
-      d = 1 + term * d;
-      if (std::abs(d) < kTiny) d = kTiny;
-      c = 1 + term / c;
-      if (std::abs(c) < kTiny) c = kTiny;
-      d = 1 / d;
-      h *= d * c;
-    }
-    if (std::abs(d * c - 1) < 1e-15) break;
-  }
-  return h;
-}
-
-/// Regularised incomplete beta function I_x(a, b), from x and 1 - x so that neither end loses digits.
-double incomplete_beta(double a, double b, double x, double one_minus_x) {
-  if (x <= 0) return 0;
-  if (one_minus_x <= 0) return 1;
-  const double front =
-      std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log(one_minus_x));
-  if (x < (a + 1) / (a + b + 2)) return front * beta_fraction(a, b, x) / a;
-  return 1 - front * beta_fraction(b, a, one_minus_x) / b;
-}
-
-/// Root of an increasing function by bisection to the last bit; the callers need it a handful of times per fit.
-template <class F>
-double increasing_root(F f, double low, double high) {
-  for (int i = 0; i < 200 && high - low > 1e-15 * std::max(std::abs(low), std::abs(high)); ++i) {
-    const double middle = 0.5 * (low + high);
-    (f(middle) < 0 ? low : high) = middle;
-  }
-  return 0.5 * (low + high);
-}
-
-}  // namespace
-
-double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
-
-double normal_quantile(double probability) {
-  if (probability == 0.5) return 0;
-  if (probability > 0.5) return -normal_quantile(1 - probability);  // the lower tail keeps its digits
-  return increasing_root([&](double x) { return normal_cdf(x) - probability; }, -40, 0);
-}
-
-double student_t_cdf(double t, double dof) {
-  if (!(dof < 1e8)) return normal_cdf(t);
-  const double q = dof + t * t;
-  const double tail = 0.5 * incomplete_beta(0.5 * dof, 0.5, dof / q, t * t / q);
-  return t < 0 ? tail : 1 - tail;
-}
-
-double student_t_quantile(double probability, double dof) {
-  if (!(dof < 1e8)) return normal_quantile(probability);
-  if (probability == 0.5) return 0;
-  if (probability > 0.5) return -student_t_quantile(1 - probability, dof);
-  double low = -1;
-  while (student_t_cdf(low, dof) > probability && low > -1e15) low *= 2;
-  return increasing_root([&](double t) { return student_t_cdf(t, dof) - probability; }, low, 0);
-}
-
-double chi_square_quantile(double probability, double dof) {
-  const double c = 2 / (9 * dof);
-  return dof * std::pow(std::max(0.0, 1 - c + normal_quantile(probability) * std::sqrt(c)), 3);
-}
-
 TallQr::TallQr(int columns) : factor_(Eigen::MatrixXd::Zero(columns, columns)) {}
 
 void TallQr::add(const Eigen::MatrixXd& rows) {

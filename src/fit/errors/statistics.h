@@ -9,12 +9,12 @@
 
 namespace birefit::estimation {
 
-/// Standard normal and Student t distribution; `dof` > 0, infinity allowed. Quantiles to about 1e-12.
+/// Standard normal, Student t (`dof` > 0, infinity allowed) and chi-square distribution, to rounding; not a number
+/// where there is no such value.
 double normal_cdf(double x);
 double normal_quantile(double probability);
 double student_t_cdf(double t, double dof);
 double student_t_quantile(double probability, double dof);
-/// Wilson & Hilferty 1931, within 3 % from two degrees of freedom upwards: enough to decide on significance.
 double chi_square_quantile(double probability, double dof);
 
 /// Triangular factor of a tall matrix that arrives in row blocks (Golub & Van Loan, Matrix Computations, 5.2): never
