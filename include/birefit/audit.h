@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,9 @@ struct AuditFit {
     std::string name;
     double truth = 0, value = 0, low = 0, high = 0;
     bool holds() const { return low <= truth && truth <= high; }
+    /// Between which 95 % of the draws from the posterior lie, where the job asks for draws (FitOptions::samples).
+    std::optional<std::array<double, 2>> drawn;
+    bool drawn_holds() const { return drawn && (*drawn)[0] <= truth && truth <= (*drawn)[1]; }
     /// Half-widths of the interval by which the value is off.
     double off() const;
   };
@@ -58,6 +62,7 @@ struct AuditRow {
   std::string departure, amount;
   int size = 0, problems = 0, answers = 0, with_misfit = 0, apart = 0;
   int intervals = 0, held = 0;
+  int drawn = 0, drawn_held = 0;  ///< of those with draws, by the draws' own
   double width = 0;  ///< median half-width over that of the same sample as stated; not a number without those
   double worst = 0;  ///< half-widths by which an estimate of an answer is off
 };

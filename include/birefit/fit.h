@@ -30,6 +30,7 @@ struct FitOptions {
   double max_seconds = 60;
   /// Nobody will read the errors: what is stated and what pictures depart by is taken as exact.
   bool values_only = false;
+  int samples = 0;           ///< draws from the posterior, for FitResult::samples
   bool choose_rays = false;  ///< straight or curved rays (Scene::rays) by what curved ones would change
   std::function<void(const std::string&)> progress;  ///< called with one line now and then; may be empty
   const std::atomic<bool>* interrupted = nullptr;    ///< set by Ctrl-C: end with the best state so far
@@ -201,6 +202,19 @@ struct Coverage {
   std::vector<Of> parameters;
 };
 
+/// Draws from the posterior (FitOptions::samples; docs/methods.md, "Samples").
+struct Samples {
+  Eigen::MatrixXd values;      ///< a draw a row, in the order of FitResult::parameters
+  double autocorrelation = 1;  ///< integrated, of the slowest parameter, in steps of every walker
+  double effective = 0;        ///< so many independent draws tell as much of that parameter
+  double accepted = 1;         ///< share of the proposals
+  struct Of {
+    std::string name;
+    double median = 0, low = 0, high = 0;  ///< 2.5 and 97.5 % of the draws lie below
+  };
+  std::vector<Of> parameters;
+};
+
 struct FitResult {
   bool converged = false;
   bool interrupted = false;
@@ -245,6 +259,7 @@ struct FitResult {
   std::vector<ScanTrace> scans;
   std::vector<ProfileTrace> profiles;  ///< of the parameters whose interval is `profiled`
   std::optional<Coverage> coverage;    ///< filled by whoever asked for measure_coverage()
+  std::optional<Samples> samples;      ///< where draws were asked for and the parameters have a posterior
   std::vector<Iteration> iterations;
   int evaluations = 0;
   double seconds = 0;

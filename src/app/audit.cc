@@ -28,33 +28,37 @@ struct Arguments {
   std::string config;
   std::vector<std::string> set, departures;
   std::string out;
-  int threads = -1, problems = 3;
+  int threads = -1, problems = 3, samples = 0;
   std::uint64_t seed = 1;
   bool list = false, quiet = false;
 };
 
 /// For a table that spreadsheets open: names of parameters and grades hold neither quotes nor line ends.
 std::string intervals_csv(const std::vector<AuditFit>& fits) {
-  std::string text = "departure,amount,size,grade,apart,parameter,truth,value,low95,high95,half_widths_off\n";
+  std::string text =
+      "departure,amount,size,grade,apart,parameter,truth,value,low95,high95,half_widths_off,drawn_low95,drawn_high95\n";
   for (const AuditFit& fit : fits) {
     std::string grade = printable(fit.grade);  // of what could not be fitted the error
     std::replace(grade.begin(), grade.end(), '"', '\'');
     const std::string head =
         fmt::format("\"{}\",\"{}\",{},\"{}\",{}", fit.departure, fit.amount, fit.size, grade, fit.apart ? 1 : 0);
     for (const AuditFit::Of& p : fit.parameters)
-      text += fmt::format("{},\"{}\",{},{},{},{},{:.3g}\n", head, p.name, csv_number(p.truth), csv_number(p.value),
-                          csv_number(p.low), csv_number(p.high), p.off());
-    if (fit.parameters.empty()) text += head + ",,,,,,\n";
+      text += fmt::format("{},\"{}\",{},{},{},{},{:.3g},{},{}\n", head, p.name, csv_number(p.truth),
+                          csv_number(p.value), csv_number(p.low), csv_number(p.high), p.off(),
+                          p.drawn ? csv_number((*p.drawn)[0]) : "", p.drawn ? csv_number((*p.drawn)[1]) : "");
+    if (fit.parameters.empty()) text += head + ",,,,,,,,\n";
   }
   return text;
 }
 
 std::string rows_csv(const std::vector<AuditRow>& rows) {
   std::string text =
-      "departure,amount,size,problems,answers,with_misfit,apart,intervals,held,width_over_clean,worst_half_widths\n";
+      "departure,amount,size,problems,answers,with_misfit,apart,intervals,held,width_over_clean,worst_half_widths,"
+      "drawn,drawn_held\n";
   for (const AuditRow& r : rows)
-    text += fmt::format("\"{}\",\"{}\",{},{},{},{},{},{},{},{},{:.3g}\n", r.departure, r.amount, r.size, r.problems,
-                        r.answers, r.with_misfit, r.apart, r.intervals, r.held, csv_number(r.width), r.worst);
+    text += fmt::format("\"{}\",\"{}\",{},{},{},{},{},{},{},{},{:.3g},{},{}\n", r.departure, r.amount, r.size,
+                        r.problems, r.answers, r.with_misfit, r.apart, r.intervals, r.held, csv_number(r.width),
+                        r.worst, r.drawn, r.drawn_held);
   return text;
 }
 
@@ -139,6 +143,7 @@ int run_audit(const Arguments& arguments) {
   OutputFolder folder(out);
   const Interrupt interrupt;
   job.options.interrupted = &interrupt.flag();
+  job.options.samples = arguments.samples;
   std::vector<AuditFit> fits;
   {
     std::atomic<int> done = 0;
@@ -152,15 +157,21 @@ int run_audit(const Arguments& arguments) {
   write_file(out / "intervals.csv", intervals_csv(fits));
   write_file(out / "audit.svg", picture(rows));
   folder.keep();
-  int problems = 0, answers = 0, intervals = 0, held = 0;
+  int problems = 0, answers = 0, intervals = 0, held = 0, drawn = 0, drawn_held = 0;
   for (const AuditRow& r : rows)
-    if (r.size > 0) problems += r.problems, answers += r.answers, intervals += r.intervals, held += r.held;
+    if (r.size > 0) {
+      problems += r.problems, answers += r.answers, intervals += r.intervals, held += r.held;
+      drawn += r.drawn, drawn_held += r.drawn_held;
+    }
   if (!arguments.quiet)
     std::cout << table(rows)
               << fmt::format("Disturbed: {} of {} answered, {} of {} intervals hold the truth{}. {}\n", answers,
                              problems, held, intervals,
                              intervals > 0 ? fmt::format(" ({:.1f} %)", 100.0 * held / intervals) : "",
-                             printable((out / "audit.svg").string()));
+                             printable((out / "audit.svg").string()))
+              << (drawn > 0 ? fmt::format("Of the draws' own intervals {} of {} do ({:.1f} %).\n", drawn_held, drawn,
+                                          100.0 * drawn_held / drawn)
+                            : "");
   return interrupt.flag().load() ? kExitNoAnswer : kExitDone;
 }
 
@@ -182,6 +193,10 @@ Command add_audit_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--departure", arguments->departures, "this one alone; may be repeated")->allow_extra_args(false);
   command->add_option("--seed", arguments->seed, "of the random numbers")->capture_default_str();
+  command
+      ->add_option("--samples", arguments->samples,
+                   "draw N times from the posterior of each fit: do the draws' own intervals hold?")
+      ->check(CLI::Range(10, 1000000));
   command->add_flag("--list", arguments->list, "say which departures apply, and end");
   add_threads_option(*command, arguments->threads);
   command->add_flag("-q,--quiet", arguments->quiet, "no table and no progress");

@@ -28,7 +28,7 @@ struct Arguments {
   std::vector<std::string> set;
   std::string image;
   std::string out;
-  int threads = -1, coverage = 0;
+  int threads = -1, coverage = 0, samples = 0;
   bool quiet = false, json = false, npy = false, each = false;
 };
 
@@ -90,6 +90,7 @@ int run_each(const Arguments& arguments) {
       Config config = read(arguments, droplets[i].set);
       FitJob& job = config.job;
       if (arguments.threads >= 0) job.options.threads = arguments.threads;
+      job.options.samples = arguments.samples;
       job.options.interrupted = &interrupt.flag();
       const double memory = memory_to_fit(job);
       result = watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); });
@@ -138,6 +139,7 @@ int run_fit(const Arguments& arguments) {
 
   FitJob& job = config.job;
   if (arguments.threads >= 0) job.options.threads = arguments.threads;
+  job.options.samples = arguments.samples;
   const Interrupt interrupt;
   job.options.interrupted = &interrupt.flag();
   const double memory = memory_to_fit(job);
@@ -182,6 +184,10 @@ Command add_fit_command(CLI::App& app) {
               "--coverage", arguments->coverage,
               "simulate N images at the result, fit each from scratch, and report how often the intervals hold")
           ->check(CLI::Range(1, 100000));
+  command
+      ->add_option("--samples", arguments->samples,
+                   "draw N times from the posterior: samples.csv, and a corner plot in the report")
+      ->check(CLI::Range(10, 1000000));
   command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
   command->add_flag("--npy", arguments->npy,
                     "also write fitted and residual images for NumPy: fitted.npy, residual.npy");

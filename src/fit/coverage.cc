@@ -115,6 +115,7 @@ Coverage measure_coverage(const FitJob& job, const FitResult& result, int draws)
     std::mt19937_64 random(0x9e3779b97f4a7c15u * static_cast<std::uint64_t>(draw + 1));
     FitJob again = whole;
     again.options.progress = nullptr;
+    again.options.samples = 0;
     again.options.threads = threads;
     std::size_t sight = 0;
     for (Measurement& measurement : again.measurements) {

@@ -11,6 +11,7 @@
 #include "fit/errors/discrepancy.h"
 #include "fit/errors/left_out.h"
 #include "fit/errors/report.h"
+#include "fit/errors/samples.h"
 #include "fit/errors/stated.h"
 #include "fit/strategy.h"
 #include "fit/weights/settle.h"
@@ -28,8 +29,9 @@ Optimum settle(const Task& task, Optimum optimum) {
   return with_settled_misfit(task, std::move(optimum));
 }
 
-/// Rivals, what the model leaves out, errors and words: everything but the values.
-Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool beaten) {
+/// Rivals, what the model leaves out, errors and words: everything but the values. `beyond_weights`: the covariance of
+/// all unknowns that the errors have beside what the weights make.
+Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool beaten, Eigen::MatrixXd& beyond_weights) {
   Rivals rivals = weigh_rivals(task, optimum);
   LeftOut left_out;
   measure_propagation(task, optimum, left_out);
@@ -39,6 +41,9 @@ Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool bea
   foretell_waves(task, optimum, sd, left_out);
   pay_for_discrepancy(task, optimum, covariances);
   pay_for_stated(task, optimum, covariances);
+  beyond_weights = covariances.with_misfit.covariance - covariances.of_noise.covariance;
+  for (const auto& change : {left_out.by_curved_rays, left_out.by_waves})
+    if (change) beyond_weights += *change * change->transpose();
   FitResult result = report(task, optimum, minima, std::move(rivals), left_out, std::move(covariances), beaten);
   return {std::move(result), left_out.change_by_curved_rays, left_out.change_by_waves};
 }
@@ -60,22 +65,25 @@ std::optional<Outcome> given_up(const Task& task, Minima minima) {
   optimum.warnings.push_back(fmt::format(
       "None of the {} places that the search looked at describes what there is to see: the fit ended there{}.",
       minima.scan.points, used < all ? fmt::format(", with {} of {} pixels", used, all) : ""));
-  Outcome outcome = judge(task, optimum = settle(task, std::move(optimum)), minima, true);
+  Eigen::MatrixXd beyond_weights;
+  Outcome outcome = judge(task, optimum = settle(task, std::move(optimum)), minima, true, beyond_weights);
   if (outcome.result.has_answer()) return std::nullopt;
   return outcome;
 }
 
 /// Judged, and once more from where a profile has gone on to and the solver had not.
 Outcome concluded(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
-  Outcome outcome = judge(task, optimum, minima, beaten);
+  Eigen::MatrixXd beyond_weights;
+  Outcome outcome = judge(task, optimum, minima, beaten, beyond_weights);
   constexpr int kTimes = 2;
   for (int i = 0; i < kTimes && optimum.better && !optimum.stopped; ++i) {
     optimum.rivals.push_back(optimum.searched);
     optimum.searched = *std::exchange(optimum.better, std::nullopt);
     solve_again(task, optimum, "from a better place on a profile");
     optimum = with_settled_misfit(task, std::move(optimum));
-    outcome = judge(task, optimum, minima, beaten);
+    outcome = judge(task, optimum, minima, beaten, beyond_weights);
   }
+  if (!beaten) outcome.result.samples = draw_samples(task, optimum, outcome.result, beyond_weights);
   return outcome;
 }
 

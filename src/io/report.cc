@@ -9,6 +9,7 @@
 #include "io/report/diagnostics.h"
 #include "io/report/page.h"
 #include "io/report/pictures.h"
+#include "io/report/samples.h"
 #include "io/report/style.h"
 #include "io/report/tables.h"
 #include "io/results/provenance.h"
@@ -83,6 +84,7 @@ std::string report_html(const Config& config, const FitResult& result) {
   out += input_table(result);
   out += branch_table(result);
   out += coverage_table(result);
+  out += samples_section(result, figure);
   out += correlation_table(result);
   out += diagnostics(result, frames, figure);
   out += identifiability(config, result);

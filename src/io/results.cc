@@ -202,6 +202,19 @@ Json coverage_json(const FitResult& result) {
           {"parameters", of}};
 }
 
+Json samples_json(const FitResult& result) {
+  const auto& s = result.samples;
+  if (!s) return nullptr;
+  Json of = Json::object();
+  for (const Samples::Of& p : s->parameters)
+    of[p.name] = {{"median", number(p.median)}, {"middle_95", {number(p.low), number(p.high)}}};
+  return {{"draws", s->values.rows()},
+          {"effective", number(s->effective)},
+          {"autocorrelation", number(s->autocorrelation)},
+          {"accepted", number(s->accepted)},
+          {"parameters", of}};
+}
+
 std::string unit_suffix(const std::string& unit) { return unit.empty() ? "" : " " + unit; }
 
 std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
@@ -239,6 +252,22 @@ std::string coverage_text(const Coverage& c) {
                             100 * std::sqrt(0.95 * 0.05 / c.answered));
 }
 
+std::string samples_text(const FitResult& result) {
+  const Samples& s = *result.samples;
+  std::string text = fmt::format(
+      "  {} draws from the posterior, worth {:.0f} independent ones (autocorrelation {:.2g} steps, {:.0f} % "
+      "accepted)\n",
+      s.values.rows(), s.effective, s.autocorrelation, 100 * s.accepted);
+  std::size_t width = 0;
+  for (const Samples::Of& p : s.parameters) width = std::max(width, p.name.size());
+  for (const Samples::Of& p : s.parameters) {
+    const double half = 0.25 * (p.high - p.low);
+    text += fmt::format("    {:<{}}  median {}, 95 % of them {} .. {}\n", p.name, width, format_value(p.median, half),
+                        format_value(p.low, half), format_value(p.high, half));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string fit_json(const Config& config, const FitResult& result) {
@@ -268,6 +297,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
   json["coverage"] = coverage_json(result);
+  json["samples"] = samples_json(result);
   json["correlation"] = matrix(result.names, result.correlation);
   json["covariance"] = matrix(result.names, result.covariance);
   json["stated_covariance"] = matrix(result.names, result.stated_covariance);
@@ -358,6 +388,7 @@ std::string summary(const FitResult& result) {
 
   if (!result.verdict.empty()) text += result.verdict + "\n";
   if (result.coverage) text += coverage_text(*result.coverage);
+  if (result.samples) text += samples_text(result);
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
   for (const std::string& sentence : result.taken_as_exact) text += "taken as exact: " + sentence + "\n";
   return printable_lines(text);

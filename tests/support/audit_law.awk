@@ -3,9 +3,9 @@
 # size, and as many deviations more (-v refusals=0: however many). usage: awk -f audit_law.awk audit.csv
 NR > 1 && !/^"none"/ {
   n = split($0, f, ",")  # names hold commas: from the end
-  size = f[n - 8]; problems[size] += f[n - 7]; answers[size] += f[n - 6]; all += f[n - 6]
-  intervals += f[n - 3]; held += f[n - 2]
-  if (size == 1 && f[n - 1] != "") widths[++count] = f[n - 1] + 0
+  size = f[n - 10]; problems[size] += f[n - 9]; answers[size] += f[n - 8]; all += f[n - 8]
+  intervals += f[n - 5]; held += f[n - 4]
+  if (size == 1 && f[n - 3] != "") widths[++count] = f[n - 3] + 0
 }
 END {
   least = 0.95 - 3 * sqrt(0.95 * 0.05 / all)

@@ -152,6 +152,8 @@ TEST(FitJson, EveryKeyIsInItsDocument) {
   r.strips.push_back({});
   r.coverage = Coverage{};
   r.coverage->parameters.push_back({});
+  r.samples = Samples{};
+  r.samples->parameters.push_back({});
   r.frame_scatter = JointPrior::FrameScatter{};
   r.parameters[0].limit = "upper";
   r.parameters[0].prior_sd = 1;

@@ -412,6 +412,9 @@ void LeastSquares::solve_linear() {
     if (priors == 0 || (weight - before).cwiseAbs().maxCoeff() <= kRounding) break;
   }
   for (int j = 0; j < l; ++j) theta_[unknowns_.linear[j]] = linear[j];
+  linear_information_ = gram;
+  if (priors > 0)
+    linear_information_ += prior_root_.rightCols(l).transpose() * weight.asDiagonal() * prior_root_.rightCols(l);
 
   for_frames([&](std::size_t g, int threads_of_frame) {
     const Frame& frame = frames_[g];

@@ -62,6 +62,8 @@ class LeastSquares {
   // At the last evaluated point:
   double objective() const { return residual_.squaredNorm(); }  ///< priors and misfit weights included
   const Theta& theta() const { return theta_; }
+  /// Inverse covariance of the linear unknowns where the searched ones are known, by the weights and priors.
+  const Eigen::MatrixXd& linear_information() const { return linear_information_; }
   const Eigen::VectorXd& intensity() const { return intensity_; }  ///< of the model, every pixel of every frame
   int evaluations() const { return evaluations_; }
   /// Noise-whitened residual sums of one micrograph, its misfit weights not applied.
@@ -180,6 +182,7 @@ class LeastSquares {
   Theta theta_;
   Eigen::VectorXd intensity_;  ///< raw
   Eigen::VectorXd whitened_value_;
+  Eigen::MatrixXd linear_information_;
   Eigen::VectorXd residual_;
   Eigen::MatrixXd searched_columns_;  ///< d whitened model / d searched, linear unknowns held
   Eigen::MatrixXd projection_;        ///< linear x searched: how the linear unknowns follow the searched ones

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "io/file.h"
+#include "io/files/csv.h"
 
 namespace birefit {
 namespace {
@@ -24,13 +25,24 @@ std::string table_csv(const SignalTable& table, const FitResult& result) {
   return text;
 }
 
+std::string samples_csv(const FitResult& result) {
+  std::string text;
+  for (const ParameterEstimate& p : result.parameters) text += (text.empty() ? "" : ",") + csv_field(p.name);
+  text += "\n";
+  const Eigen::MatrixXd& values = result.samples->values;
+  for (Eigen::Index i = 0; i < values.rows(); ++i)
+    for (Eigen::Index j = 0; j < values.cols(); ++j)
+      text += fmt::format("{:.10g}{}", values(i, j), j + 1 < values.cols() ? "," : "\n");
+  return text;
+}
+
 /// Pictures and tables of an earlier fit that `files` do not replace. Only beside a fit.json: elsewhere files of these
 /// names are somebody else's.
 std::vector<fs::path> left_by_earlier_fit(const fs::path& folder, const std::vector<FileContent>& files) {
   std::vector<fs::path> left;
   std::error_code code;
   if (!fs::exists(folder / "fit.json", code)) return left;
-  static const std::regex kOurs(R"((fitted|residual)(_[0-9]+)?\.(tif|npy|csv))");
+  static const std::regex kOurs(R"((fitted|residual)(_[0-9]+)?\.(tif|npy|csv)|samples\.csv)");
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, code))
     if (std::regex_match(entry.path().filename().string(), kOurs) &&
         std::none_of(files.begin(), files.end(),
@@ -70,6 +82,7 @@ void write_results(const fs::path& folder, const Config& config, const FitResult
     add("fitted", result.micrographs[i].fitted);
     add("residual", result.micrographs[i].residual);
   }
+  if (result.samples) files.push_back({folder / "samples.csv", samples_csv(result)});
   files.push_back({folder / "config.yaml", config.text});
   files.push_back({folder / "log.txt", log_text(config, result)});
   files.push_back({folder / "report.html", report_html(config, result)});

@@ -218,7 +218,10 @@ std::optional<AuditFit> one(const FitJob& job, const FitJob& whole, const Distur
     const ParameterRef ref = whole.parameters.find(p.name);
     if (p.linear || !ref) continue;
     found.parameters.push_back(
-        {p.name, truth[static_cast<std::size_t>(ref.index)], p.value, p.interval95_low, p.interval95_high});
+        {p.name, truth[static_cast<std::size_t>(ref.index)], p.value, p.interval95_low, p.interval95_high, {}});
+    if (!result.samples) continue;
+    for (const Samples::Of& of : result.samples->parameters)
+      if (of.name == p.name) found.parameters.back().drawn = {of.low, of.high};
   }
   return found;
 }
@@ -307,6 +310,7 @@ std::vector<AuditRow> tally(const std::vector<AuditFit>& fits) {
     }
     ++row->problems, row->answers += fit.answered, row->with_misfit += fit.answered && fit.grade != "answer";
     for (const AuditFit::Of& p : fit.parameters) {
+      row->drawn += p.drawn.has_value(), row->drawn_held += p.drawn_holds();
       ++row->intervals, row->held += p.holds(), row->worst = std::max(row->worst, p.off());
       if (const auto usual = clean.find({fit.problem, p.name}); usual != clean.end() && usual->second > 0)
         widths[static_cast<std::size_t>(row - rows.begin())].push_back((p.high - p.low) / usual->second);
