@@ -294,6 +294,11 @@ TEST(ScanInAFit, LeavesRoomForValleysThatFewStartsLeadInto) {
   EXPECT_EQ(solve(family("HelixCell"), 1, 879).undecided, 1);
 }
 
+// Two twists that are as good as each other, less than a step of the grid apart.
+TEST(ScanInAFit, KeepsMinimaThatLieWithinAStep) {
+  for (const int problem : {45, 538}) EXPECT_EQ(solve(family("TwistedCell"), 1, problem).undecided, 1) << problem;
+}
+
 class LongGlobalSearch : public GlobalSearch {};
 TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   const Count count = solve(GetParam(), problems_or(GetParam().many), first_problem());

@@ -107,10 +107,12 @@ std::vector<Axis> fine_axes_of(const Task& task, const std::vector<PicturePhase>
 }
 
 /// Solves from every start, a few steps for all and the rest for those that may still be the best, and adds the minima
-/// found to the result. Returns the lowest objective.
+/// found to the result. What is the `same` as a minimum that is known is left out; of starts that lead to places near
+/// by the best goes on before others do, and the rest after all others: minima may lie as close. Either may be empty.
+/// Returns the lowest objective.
 double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options,
                    std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists, int steps,
-                   double hopeless_above, const SameMinimum& same = {}) {
+                   double hopeless_above, const SameMinimum& same, const SameMinimum& near_by) {
   const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
   SolveOptions polish;
   polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
@@ -132,7 +134,8 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
     // Where most lead into one valley they would leave no room for the others.
     std::vector<std::pair<double, Eigen::VectorXd>> apart, besides;
     for (auto& start : starts)
-      (same && std::any_of(apart.begin(), apart.end(), [&](const auto& a) { return same(a.second, start.second); })
+      (near_by &&
+               std::any_of(apart.begin(), apart.end(), [&](const auto& a) { return near_by(a.second, start.second); })
            ? besides
            : apart)
           .push_back(std::move(start));
@@ -389,7 +392,7 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
     starts = product <= most ? survey.minima_of_grid(cheap ? kBesideMinima : 0)
                              : survey.best_of_box(most, 4 * kMostBatches * static_cast<std::size_t>(candidates));
   const Effort effort = effort_of(problem, result.points, candidates);
-  const SameMinimum same = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const SameMinimum near_by = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
     return !axes.empty() && near(axes, a, b);
   };
   // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet
@@ -403,8 +406,8 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
                 starts.begin() + static_cast<std::ptrdiff_t>(last));
     if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
-    best = std::min(
-        best, polish_into(result, problem, options, std::move(some), effort.finalists, kSteps, hopeless_above, same));
+    best = std::min(best, polish_into(result, problem, options, std::move(some), effort.finalists, kSteps,
+                                      hopeless_above, {}, near_by));
     // Where pictures cost next to nothing, all of them: minima may be as good as each other.
     if ((best < rows + kDoubtful * std::sqrt(2 * rows) && !cheap) || best > hopeless_above) break;
   }
@@ -442,7 +445,7 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
                     "check the start values and bounds of indices, diameter_um and wavelength_nm");
   const Eigen::VectorXd first = starts.front().second;
   polish_into(result, problem, job.options, std::move(starts), most, steps, std::numeric_limits<double>::infinity(),
-              same);
+              same, {});
   keep_distinct(result, problem, first);
   return result;
 }
