@@ -121,6 +121,20 @@ std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, co
   return problem;
 }
 
+bool all_are_one_number(const Task& task) {
+  return std::all_of(task.sights.begin(), task.sights.end(), [](const Sight& s) { return is_one_number(*s.picture); });
+}
+
+/// With every searched unknown at that end of what it may be, where it has one.
+Theta at_bounds(const Task& task, Theta theta, bool upper) {
+  for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j) {
+    const Parameter& parameter = task.searched(j);
+    if (const double bound = upper ? parameter.upper : parameter.lower; std::isfinite(bound))
+      theta[static_cast<std::size_t>(task.unknowns.searched[j])] = bound;
+  }
+  return theta;
+}
+
 /// Whether the best place describes so little that a fit of all pixels will not either. A signal that the pixels looked
 /// at do not show has no minimum that the search could tell from others.
 bool is_hopeless(const Task& task, LeastSquares& sample, const ScanResult& scan) {
@@ -163,8 +177,27 @@ Minima search(const Task& task, const Start& start, double hopeless_above) {
   }
   minima.rows = static_cast<double>(sample->pixel_rows());
   minima.scan = scan(*sample, task, from, phases, hopeless_above * std::max(1.0, minima.rows));
-  minima.hopeless = is_hopeless(task, *sample, minima.scan);
   minima.evaluations += sample->evaluations();
+  // Plans are made for where the search begins. Pictures that are one number each turn on the third decimal of it: what
+  // is described badly by plans for the start (a field below its threshold needs few steps) is looked for once more by
+  // those for either end of what may be.
+  constexpr double kDoubtful = 5;
+  const auto lowest = [&] { return minima.scan.candidates.front().objective; };
+  for (const bool upper : {true, false}) {
+    if (!all_are_one_number(task) || minima.scan.interrupted ||
+        !(lowest() > minima.rows + kDoubtful * std::sqrt(2 * minima.rows)))
+      break;
+    const Theta end = at_bounds(task, minima.theta, upper);
+    std::unique_ptr<LeastSquares> other = sampled(task, minima.frames, end);
+    ScanResult scanned = scan(*other, task, from, phases, hopeless_above * std::max(1.0, minima.rows));
+    minima.evaluations += other->evaluations();
+    if (scanned.interrupted || !(scanned.candidates.front().objective < lowest())) continue;
+    minima.scan = std::move(scanned);
+    minima.theta = task.with(minima.theta, minima.scan.candidates.front().searched);
+    minima.frames = replanned(task, minima.frames, minima.theta);
+    sample = std::move(other);
+  }
+  minima.hopeless = is_hopeless(task, *sample, minima.scan);
   minima.stopped = minima.scan.interrupted;
   return minima;
 }
