@@ -83,7 +83,13 @@ Outcome concluded(const Task& task, const Minima& minima, Optimum optimum, bool 
     optimum = with_settled_misfit(task, std::move(optimum));
     outcome = judge(task, optimum, minima, beaten, beyond_weights);
   }
-  if (!beaten) outcome.result.samples = draw_samples(task, optimum, outcome.result, beyond_weights);
+  if (task.job.options.samples > 0 && !beaten) {
+    outcome.result.samples = draw_samples(task, optimum, outcome.result, beyond_weights);
+    if (!outcome.result.samples)
+      outcome.result.warnings.push_back(
+          "No draws from the posterior: the fit was interrupted, or what is unknown has neither bounds nor an "
+          "influence.");
+  }
   return outcome;
 }
 
