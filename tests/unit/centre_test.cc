@@ -43,6 +43,25 @@ TEST(CentreOfSymmetry, IsTheMiddleOfTheRings) {
   }
 }
 
+// The region's own middle, (47.5, 47.5), is not that of the sample.
+TEST(CentreOfSymmetry, IsTheSamplesWhereTheRegionLiesWithinIt) {
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise(0, 20);
+  constexpr double kX = 49.1, kY = 45.8;
+  Image image(96, 96);
+  Mask used(96, 96, 0);
+  for (int y = 0; y < 96; ++y)
+    for (int x = 0; x < 96; ++x) {
+      const double u = (x - kX) / 40, v = (y - kY) / 40;
+      image(x, y) = 500 + 400 * std::cos(9 * u * u + 25 * v * v + 6 * u * v) + noise(random);
+      used(x, y) = std::hypot(x - 47.5, y - 47.5) < 36;
+    }
+  const auto centre = centre_of_symmetry(image, used);
+  ASSERT_TRUE(centre);
+  EXPECT_NEAR((*centre)[0], kX, 0.96);
+  EXPECT_NEAR((*centre)[1], kY, 0.96);
+}
+
 TEST(CentreOfSymmetry, HasNoneInAnEvenImage) {
   const Image even(40, 40, 7.0);
   EXPECT_FALSE(centre_of_symmetry(even, Mask(40, 40, 1)));
