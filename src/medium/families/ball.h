@@ -119,7 +119,8 @@ std::vector<double> ball_breaks(const Field& field) {
 
 /// u in [0, 1/2] runs from the entry to the core or, where there is none on the way, to the middle; the rest to the
 /// exit. What lies in the core does not retard. Nodes crowd at a defect in the middle; at a ring of defects, to which a
-/// ray comes close twice, at u = 1/4 and 3/4, as far as it passes.
+/// ray comes close twice, at u = 1/4 and 3/4, as far as it passes; and so at the pole of a bipolar field that the ray
+/// passes nearest to before the middle, and behind it.
 template <class S, class Field>
 class BallColumn final : public Column<S> {
  public:
@@ -167,6 +168,33 @@ class BallColumn final : public Column<S> {
         }
         ring_ = true;
       }
+    } else if constexpr (kHasPoles) {
+      const auto along_axis = [&](const Vec3<S>& v) {
+        return v.x * field.axis.x + v.y * field.axis.y + v.z * field.axis.z;
+      };
+      const S above = along_axis(rho_z(ray_.cos_deflection, ray_.sin_deflection)),
+              lean = along_axis(rho_z(S(0.0) - ray_.sin_deflection, ray_.cos_deflection));
+      const S& pole = field.pole_distance;
+      // Of the poles +-pole u, |+-pole u - impact t|^2 less the part along the ray.
+      const S both = pole * pole * (1.0 - lean * lean) + ray_.impact * ray_.impact,
+              apart = 2.0 * pole * ray_.impact * above;
+      for (int side = 0; side < 2; ++side) {
+        const double sign = side == 0 ? -1 : 1;
+        const S at = sign * pole * lean;
+        const auto squared = [](const S& x) { return S(x * x); };
+        const auto beyond = [&](const S& x) { return x - min_of(max_of(x, S(0.0)), ray_.half); };
+        const S near_square = both - apart + squared(beyond(at)),
+                other_square = both + apart + squared(beyond(S(0.0) - at));
+        // The nearer one, and smoothly from the one to the other where both are far: nodes that jump would show in
+        // differences of pictures.
+        const S lead = 2.0 * (other_square - near_square) * inverse(S(other_square + near_square)),
+                part = min_of(max_of(lead, S(-1.0)), S(1.0)), share = 0.75 * part - 0.25 * part * part * part;
+        RingSide& r = sides_[side];
+        r.at = 2.0 * share * at;
+        r.passes = root(max_of(S(both - 2.0 * share * apart), S(0.0)) + 1e-10);
+        r.outer = asinh(S((ray_.half - r.at) * inverse(r.passes)));
+        r.inner = asinh(S(r.at * inverse(r.passes)));
+      }
     }
   }
   void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
@@ -182,6 +210,7 @@ class BallColumn final : public Column<S> {
   }
 
  private:
+  static constexpr bool kHasPoles = std::is_same_v<Field, BipolarField<S>>;
   Vec3<S> rho_z(const S& rho, const S& z) const { return {rho * ray_.cos_azimuth, rho * ray_.sin_azimuth, z}; }
   template <class T>
   OpticalPoint<T> at(const T& u, double where) const {
@@ -200,6 +229,13 @@ class BallColumn final : public Column<S> {
       return seen_at<T>(first ? T(-away) : away, T((2.0 * r.passes * a * ray_.radius_um) * (grown + shrunk)));
     }
     const T x = first ? 1.0 - 2.0 * u : 2.0 * u - 1.0;
+    if constexpr (kHasPoles) {
+      const RingSide& r = sides_[first ? 0 : 1];
+      const S steps = r.inner + r.outer;
+      const T grown = exp(T(steps * x - r.inner)), shrunk = inverse(grown);
+      const T distance = r.at + (0.5 * r.passes) * (grown - shrunk);
+      return seen_at<T>(first ? T(-distance) : distance, T((r.passes * steps * ray_.radius_um) * (grown + shrunk)));
+    }
     const S& from = first ? before_ : after_;
     const S reach = (first ? S(ray_.half + before_) : S(ray_.half - after_)) * q_, end = q_ + 1.0;
     const T f = inverse(T(end - x));
@@ -221,7 +257,7 @@ class BallColumn final : public Column<S> {
   S eo_, ee_, before_, after_, q_;
   S rho_, z_;  ///< of the ray's point nearest to the middle
   struct RingSide {
-    /// distances (radii): of the closest place from the middle, of the ring from there
+    /// distances (radii): of the closest place from the middle, of the ring or the pole from there
     S at = S(0.0), passes = S(0.0);
     S outer = S(0.0), inner = S(0.0);  ///< asinh of how many of the latter there are to the surface and to the middle
   };
