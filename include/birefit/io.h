@@ -52,6 +52,11 @@ enum class ConfigUse {
 Config load_config(const std::filesystem::path& path, ConfigUse use,
                    const std::optional<std::filesystem::path>& image = std::nullopt,
                    const std::vector<std::string>& set = {});
+/// The same of a config that is no file: `name` is what errors call it, and its folder where files that it names are
+/// looked for.
+Config load_config_text(std::string text, const std::filesystem::path& name, ConfigUse use,
+                        const std::optional<std::filesystem::path>& image = std::nullopt,
+                        const std::vector<std::string>& set = {});
 
 // ---- images ---------------------------------------------------------------------------------------------------------
 

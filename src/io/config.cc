@@ -448,7 +448,11 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
 
 Config load_config(const std::filesystem::path& path, ConfigUse use, const std::optional<std::filesystem::path>& image,
                    const std::vector<std::string>& set) {
-  std::string text = read_text(path);
+  return load_config_text(read_text(path), path, use, image, set);
+}
+
+Config load_config_text(std::string text, const std::filesystem::path& path, ConfigUse use,
+                        const std::optional<std::filesystem::path>& image, const std::vector<std::string>& set) {
   if (use != ConfigUse::fit && holds_series(text, set)) {
     // What the frames have in common shows in the first that can be read.
     const ImageSeries series = read_series(path, std::move(text), set);

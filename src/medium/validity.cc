@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "birefit/error.h"
+#include "medium/references.h"
 
 namespace birefit {
 
@@ -63,6 +64,57 @@ void check_validity(const Scene& scene, const std::vector<ParameterRef>& tempera
                       fmt::format("a temperature of {:g} K is outside [{:g}, {:g}] K, where this material's law holds",
                                   value(t), law->lower_k, law->upper_k));
   }
+}
+
+namespace {
+
+/// The same walk as ReferenceVisitor, with the keys that lead to a number.
+struct KeyedReferences {
+  std::string above;
+  const Theta& theta;
+  Problems& problems;
+
+  void check(const std::string& key, const ParameterRef& ref, const NumberSpec& spec) {
+    if (!ref && !spec.optional && !spec.fallback)
+      problems.add(Where{}, above + key + " is an empty reference: the scene has no such number",
+                   "add a parameter to the table and put its reference there");
+    else if (ref && static_cast<std::size_t>(ref.index) >= theta.size())
+      problems.add(
+          Where{},
+          fmt::format("{}{} refers to parameter {}, and there are {} values", above, key, ref.index, theta.size()),
+          "use references of the table that the values belong to");
+  }
+  void number(const char* key, const ParameterRef& ref, const NumberSpec& spec, const char*) { check(key, ref, spec); }
+  template <class Refs>
+  void vector(const char* key, const Refs& refs, const NumberSpec& spec, const char*) {
+    for (const ParameterRef& ref : refs) check(key, ref, spec);
+  }
+  template <class Refs>
+  void list(const char* key, const Refs& refs, const NumberSpec& spec, const char*) {
+    for (const ParameterRef& ref : refs) check(key, ref, spec);
+  }
+  template <class Part>
+  void inside(const char* key, const Part& part) {
+    if constexpr (std::is_same_v<Part, ConstantIndices>)
+      if (!part.ordinary && !part.birefringence) return;
+    if constexpr (requires { Part::describe(part, *this); }) {
+      Part::describe(part, KeyedReferences{above + key + ".", theta, problems});
+    } else if constexpr (requires { part.has_value(); }) {
+      if (part) inside(key, *part);
+    } else if constexpr (requires { part.begin(); }) {
+      for (const auto& one : part) inside(key, one);
+    } else if constexpr (!std::is_same_v<Part, std::monostate>) {
+      std::visit([&](const auto& one) { inside(key, one); }, part);
+    }
+  }
+};
+
+}  // namespace
+
+void check_references(const Scene& scene, const Theta& theta) {
+  Problems problems;
+  Scene::describe(scene, KeyedReferences{"", theta, problems});
+  problems.throw_if_any();
 }
 
 }  // namespace birefit

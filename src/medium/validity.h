@@ -24,4 +24,9 @@ std::vector<ParameterRef> clearing_points(const LawIndices& law);
 /// `temperatures` (samples/kind.h) refers to, temperature.
 void check_validity(const Scene& scene, const std::vector<ParameterRef>& temperatures, const Theta& theta);
 
+/// Throws UserError that names every number of a scene built by hand that has to be there and is an empty reference, or
+/// refers to an entry that a table of theta.size() parameters does not have. A material without any number is none:
+/// crystals, slabs and discs have indices of their own.
+void check_references(const Scene& scene, const Theta& theta);
+
 }  // namespace birefit

@@ -92,6 +92,7 @@ void note_material(const Scene& scene, const Values<double>& value, RenderPlan& 
 }  // namespace
 
 RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, const Observable& observable) {
+  check_references(scene, theta);
   check_method(scene, asked);
   check_validity(scene, temperatures(scene), theta);
   Demand demand = asked;
