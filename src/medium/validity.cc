@@ -75,7 +75,9 @@ struct KeyedReferences {
   Problems& problems;
 
   void check(const std::string& key, const ParameterRef& ref, const NumberSpec& spec) {
-    if (!ref && !spec.optional && !spec.fallback)
+    // Heated samples bring temperatures of their own.
+    const bool may_be_left_out = spec.optional || spec.fallback || key == "temperature_k";
+    if (!ref && !may_be_left_out)
       problems.add(Where{}, above + key + " is an empty reference: the scene has no such number",
                    "add a parameter to the table and put its reference there");
     else if (ref && static_cast<std::size_t>(ref.index) >= theta.size())
