@@ -19,7 +19,7 @@
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "core/threads.h"
-#include "io/report_format.h"
+#include "io/report/format.h"
 
 namespace birefit {
 namespace {

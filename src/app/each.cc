@@ -8,7 +8,7 @@
 
 #include "app/plot.h"
 #include "core/sub_grid.h"
-#include "io/config_discs.h"
+#include "io/config/discs.h"
 
 namespace birefit {
 

@@ -2,7 +2,7 @@
 
 #include <csignal>
 
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace birefit {
 namespace {

@@ -11,7 +11,7 @@
 #include "app/work.h"
 #include "birefit/io.h"
 #include "core/printable.h"
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace birefit {
 namespace {

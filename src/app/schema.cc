@@ -3,7 +3,7 @@
 #include <iostream>
 
 #include "app/commands.h"
-#include "io/config_schema.h"
+#include "io/config/schema.h"
 
 namespace birefit {
 namespace {

@@ -21,7 +21,7 @@
 #include "birefit/series.h"
 #include "core/printable.h"
 #include "core/threads.h"
-#include "io/table.h"
+#include "io/files/table.h"
 
 namespace birefit {
 namespace {

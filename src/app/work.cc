@@ -9,7 +9,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "io/yaml.h"
+#include "io/config/yaml.h"
 
 namespace birefit {
 namespace {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -68,55 +69,33 @@ void check_validity(const Scene& scene, const std::vector<ParameterRef>& tempera
 
 namespace {
 
-/// The same walk as ReferenceVisitor, with the keys that lead to a number.
-struct KeyedReferences {
-  std::string above;
+/// Says of every number of a scene that is needed and missing, or of another table, where it stands.
+struct ReferenceCheck {
   const Theta& theta;
-  Problems& problems;
+  Problems problems;
 
-  void check(const std::string& key, const ParameterRef& ref, const NumberSpec& spec) {
+  void operator()(const ParameterRef& ref, const NumberSpec& spec, const KeyPath& path) {
     // Heated samples bring temperatures of their own.
-    const bool may_be_left_out = spec.optional || spec.fallback || key == "temperature_k";
+    const bool may_be_left_out = spec.optional || spec.fallback || std::string_view(path.key) == "temperature_k";
     if (!ref && !may_be_left_out)
-      problems.add(Where{}, above + key + " is an empty reference: the scene has no such number",
+      problems.add(Where{}, path.text() + " is an empty reference: the scene has no such number",
                    "add a parameter to the table and put its reference there");
     else if (ref && static_cast<std::size_t>(ref.index) >= theta.size())
       problems.add(
           Where{},
-          fmt::format("{}{} refers to parameter {}, and there are {} values", above, key, ref.index, theta.size()),
+          fmt::format("{} refers to parameter {}, and there are {} values", path.text(), ref.index, theta.size()),
           "use references of the table that the values belong to");
   }
-  void number(const char* key, const ParameterRef& ref, const NumberSpec& spec, const char*) { check(key, ref, spec); }
-  template <class Refs>
-  void vector(const char* key, const Refs& refs, const NumberSpec& spec, const char*) {
-    for (const ParameterRef& ref : refs) check(key, ref, spec);
-  }
-  template <class Refs>
-  void list(const char* key, const Refs& refs, const NumberSpec& spec, const char*) {
-    for (const ParameterRef& ref : refs) check(key, ref, spec);
-  }
-  template <class Part>
-  void inside(const char* key, const Part& part) {
-    if constexpr (std::is_same_v<Part, ConstantIndices>)
-      if (!part.ordinary && !part.birefringence) return;
-    if constexpr (requires { Part::describe(part, *this); }) {
-      Part::describe(part, KeyedReferences{above + key + ".", theta, problems});
-    } else if constexpr (requires { part.has_value(); }) {
-      if (part) inside(key, *part);
-    } else if constexpr (requires { part.begin(); }) {
-      for (const auto& one : part) inside(key, one);
-    } else if constexpr (!std::is_same_v<Part, std::monostate>) {
-      std::visit([&](const auto& one) { inside(key, one); }, part);
-    }
-  }
+  /// Samples that have no material leave all of it empty.
+  bool skips(const ConstantIndices& indices) const { return !indices.ordinary && !indices.birefringence; }
 };
 
 }  // namespace
 
 void check_references(const Scene& scene, const Theta& theta) {
-  Problems problems;
-  Scene::describe(scene, KeyedReferences{"", theta, problems});
-  problems.throw_if_any();
+  ReferenceCheck check{theta, {}};
+  for_each_placed(scene, check);
+  check.problems.throw_if_any();
 }
 
 }  // namespace birefit

@@ -12,16 +12,17 @@
 
 namespace birefit {
 
-/// How many samples the pixels of a part of one row take, by plan.samples. Rings of equal samples are painted from the
-/// inside out; a root a ring and row instead of one a pixel.
+/// How many samples the pixels of a part of one row take, by plan.means.samples. Rings of equal samples are painted
+/// from the inside out; a root a ring and row instead of one a pixel.
 class SampleRings {
  public:
-  explicit SampleRings(const RenderPlan& plan)
-      : center_x_(plan.sampling_center_x_px), center_y_(plan.sampling_center_y_px) {
-    rings_.push_back({0, plan.samples.empty() ? std::uint8_t{1} : static_cast<std::uint8_t>(plan.samples[0])});
-    for (std::size_t i = 1; i < plan.samples.size(); ++i)
-      if (plan.samples[i] != plan.samples[i - 1])
-        rings_.push_back({static_cast<double>(i) * plan.sampling_bin_px, static_cast<std::uint8_t>(plan.samples[i])});
+  explicit SampleRings(const RenderPlan& plan) : center_x_(plan.means.center_x_px), center_y_(plan.means.center_y_px) {
+    rings_.push_back(
+        {0, plan.means.samples.empty() ? std::uint8_t{1} : static_cast<std::uint8_t>(plan.means.samples[0])});
+    for (std::size_t i = 1; i < plan.means.samples.size(); ++i)
+      if (plan.means.samples[i] != plan.means.samples[i - 1])
+        rings_.push_back(
+            {static_cast<double>(i) * plan.means.bin_px, static_cast<std::uint8_t>(plan.means.samples[i])});
   }
   void fill(int row, int first_column, std::uint8_t* out, int width) const {
     std::fill(out, out + width, rings_[0].samples);
@@ -79,7 +80,7 @@ class NeededPoints {
 /// What a thread works on: a band of rows with `reach` more on either side. Rows are counted from the band's first,
 /// columns from the picture's rim, which is as wide as that of the squares of a table: their runs begin at a register's
 /// boundary. Point values of the last rows are at row(field * planes + plane, r); one field, the intensity, or with
-/// plan.fringe_means the four of a FringePoint.
+/// plan.means.fringes the four of a FringePoint.
 class Band {
  public:
   static constexpr int kRim = FringeBlocks::kRim;

@@ -12,6 +12,7 @@
 #include "birefit/render.h"
 #include "instrument/exposure.h"
 #include "medium/validity.h"
+#include "samples/choices.h"
 #include "samples/kind.h"
 #include "samples/tables/polar_table.h"
 #include "samples/waves/wave.h"
@@ -134,13 +135,30 @@ RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, con
 }
 
 bool outgrown(const RenderPlan& now, const RenderPlan& before) {
-  if (now.edge_points > before.edge_points || now.defect_points > before.defect_points) return true;
+  if (now.means.edge_points > before.means.edge_points || now.means.defect_points > before.means.defect_points)
+    return true;
   if (!now.wave || !before.wave)
-    return static_cast<bool>(now.wave) != static_cast<bool>(before.wave) || outgrown_disc(now.disc, before.disc);
+    return static_cast<bool>(now.wave) != static_cast<bool>(before.wave) ||
+           outgrown_disc(choices(now).disc, choices(before).disc);
   const double ratio = now.wave->radius_um / before.wave->radius_um;
   // The pupil's grid ends 5 % beyond the aperture that it was made for.
   return ratio > 1.04 || ratio < 0.8 || now.wave->objective_na > 1.04 * before.wave->objective_na;
 }
+
+bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
+  const PixelMeans &means = now.means, &had = before.means;
+  if (now.method != before.method || (choices(now).disc.empty() && now.steps > before.steps) ||
+      now.mesh.size() > before.mesh.size() || has_finer_tables(choices(now), choices(before)) ||
+      (had.fringes && !means.fringes) || outgrown(now, before))
+    return true;
+  const double moved = std::hypot(means.center_x_px - had.center_x_px, means.center_y_px - had.center_y_px);
+  if (means.samples != had.samples && moved > had.bin_px) return true;
+  for (std::size_t i = 0; i < means.samples.size(); ++i)
+    if (means.samples[i] > (i < had.samples.size() ? had.samples[i] : 1)) return true;
+  return false;
+}
+
+bool has_radial_table(const RenderPlan& plan) { return choices(plan).radial_panels > 0; }
 
 Image image_by_march(const Scene& scene, const Theta& theta, int threads) {
   return marched_picture(scene, exposure_of(scene.microscope).directions.front(), theta, threads);

@@ -11,6 +11,7 @@
 #include "core/threads.h"
 #include "render/band.h"
 #include "render/exposed.h"
+#include "samples/choices.h"
 #include "samples/kind.h"
 #include "samples/pixels/edge_pixels.h"
 #include "samples/pixels/sampling.h"
@@ -26,10 +27,10 @@ int rays_side_by_side() { return kLanes; }
 namespace {
 
 int samples_at(const RenderPlan& plan, double column, double row) {
-  if (plan.samples.empty()) return 1;
-  const double dx = column - plan.sampling_center_x_px, dy = row - plan.sampling_center_y_px;
-  const std::size_t bin = static_cast<std::size_t>(std::sqrt(dx * dx + dy * dy) / plan.sampling_bin_px);
-  return plan.samples[std::min(bin, plan.samples.size() - 1)];
+  if (plan.means.samples.empty()) return 1;
+  const double dx = column - plan.means.center_x_px, dy = row - plan.means.center_y_px;
+  const std::size_t bin = static_cast<std::size_t>(std::sqrt(dx * dx + dy * dy) / plan.means.bin_px);
+  return plan.means.samples[std::min(bin, plan.means.samples.size() - 1)];
 }
 
 /// load_lanes(x + shift), shift = 0 to 4 and x at a register's boundary: two loads for all of them, none across a cache
@@ -119,7 +120,7 @@ class BandPainter {
   std::vector<int> bands() const {
     std::vector<int> all(static_cast<std::size_t>((computed_ + Band::kRows - 1) / Band::kRows));
     std::iota(all.begin(), all.end(), 0);
-    const auto off_centre = [&](int b) { return std::abs((b + 0.5) * Band::kRows - plan_.sampling_center_y_px); };
+    const auto off_centre = [&](int b) { return std::abs((b + 0.5) * Band::kRows - plan_.means.center_y_px); };
     std::sort(all.begin(), all.end(), [&](int a, int b) { return off_centre(a) < off_centre(b); });
     return all;
   }
@@ -128,14 +129,14 @@ class BandPainter {
     thread_local Band band;  // fresh memory costs as much as the image itself: it stays with the thread
     thread_local NeededPoints needed;
     const int top = number * Band::kRows, rows = std::min(Band::kRows, computed_ - top);
-    band.resize(w_, plan_.fringe_means ? 4 * kPlanes : kPlanes, reach_);
+    band.resize(w_, plan_.means.fringes ? 4 * kPlanes : kPlanes, reach_);
     find_samples(band, top, rows);
     FringeScratch scratch;
     for (int r = -reach_; r < rows + reach_; ++r) {
       compute(band, needed, scratch, top, r);
       if (r < reach_) continue;
       const int done = r - reach_;
-      if (plan_.fringe_means)
+      if (plan_.means.fringes)
         average_fringes(band, top, done);
       else
         average_points(band, top, done);
@@ -173,10 +174,10 @@ class BandPainter {
     needed.find(
         reach_, [&](int k) { return band.samples(r + k); }, wide());
     std::array<double*, static_cast<std::size_t>(4 * kPlanes)> fields;
-    if (plan_.fringe_means)
+    if (plan_.means.fringes)
       for (int f = 0; f < 4; ++f) band.clear(f * kPlanes, r, !needed.all());
     for (int c0 = 0; c0 < wide(); c0 += kStep) {
-      if (plan_.fringe_means) {
+      if (plan_.means.fringes) {
         for (int p = 0; p < 4 * kPlanes; ++p) fields[static_cast<std::size_t>(p)] = band.row(p, r) + c0;
         if (const int run = model_.fringe_run(c0 - kRim, top + r, wide() - c0, scratch, fields.data()); run > 0) {
           c0 += run - kStep;
@@ -190,7 +191,7 @@ class BandPainter {
         for (int p = 0; p < kPlanes; ++p) out[static_cast<std::size_t>(p)] = band.row(field * kPlanes + p, r) + c0;
         store(v, out, kPlanes, 0, kStep);
       };
-      if (plan_.fringe_means) {
+      if (plan_.means.fringes) {
         FringePoint<S> v;
         model_.fringe(column, row, &v);
         put(v.amplitude, 0), put(v.phase, 1), put(v.mean, 2);
@@ -393,7 +394,7 @@ void render_list(const Scene& scene, const RenderPlan& plan, const BeamMaker& li
       const int most = samples[at[0]];
       const PlainOf<S> column = load_lanes<PlainOf<S>>(columns), row = load_lanes<PlainOf<S>>(rows);
       S v;
-      if (most == 1 && plan.fringe_means) {
+      if (most == 1 && plan.means.fringes) {
         FringePoint<S> p[3][3];
         for (int j = 0; j < 3; ++j)
           for (int i = 0; i < 3; ++i) model->fringe(column + PlainOf<S>(i - 1.0), row + PlainOf<S>(j - 1.0), &p[j][i]);
@@ -408,11 +409,10 @@ void render_list(const Scene& scene, const RenderPlan& plan, const BeamMaker& li
 }
 
 /// Of points one by one, and of a picture: eight where they are read from a table.
-std::size_t derivatives_at_once(const RenderPlan& plan) { return plan.radial_panels > 0 ? 8 : 4; }
+std::size_t derivatives_at_once(const RenderPlan& plan) { return choices(plan).radial_panels > 0 ? 8 : 4; }
 std::size_t derivatives_of_picture(const RenderPlan& plan) {
-  const bool all_from_squares =
-      !plan.fringe_blocks.empty() &&
-      std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) == plan.fringe_blocks.end();
+  const std::vector<std::uint8_t>& blocks = choices(plan).fringe_blocks;
+  const bool all_from_squares = !blocks.empty() && std::find(blocks.begin(), blocks.end(), 0) == blocks.end();
   return all_from_squares ? 8 : derivatives_at_once(plan);
 }
 
@@ -555,23 +555,23 @@ bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::v
   const double all = static_cast<double>(scene.view.width) * scene.view.height,
                count = static_cast<double>(pixels.size());
   if (2 * count > all) return true;
-  const bool blocks = !plan.fringe_blocks.empty(), squares = !plan.disc.empty();
+  const SampleChoices& own = choices(plan);
+  const bool blocks = !own.fringe_blocks.empty(), squares = !own.disc.empty();
   if (pixels.empty() || plan.wave || !(blocks || squares)) return false;
-  // Rays of a pixel by itself, in the mean.
-  double rays = 0, looked_at = 0;
+  double rays = 0, looked_at = 0;  // of a pixel by itself, in the mean
   for (std::size_t i = 0; i < pixels.size(); i += 1 + pixels.size() / 256) {
     const int n = samples_at(plan, pixels[i][0], pixels[i][1]);
-    rays += plan.fringe_means && n == 1 ? 9 : square(std::max(n, 2));
+    rays += plan.means.fringes && n == 1 ? 9 : square(std::max(n, 2));
     ++looked_at;
   }
   rays /= looked_at;
   double tables = 0, left = 0;  // rays of the tables, share of the picture that has none
   if (blocks) {
-    const double smooth = static_cast<double>(std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1));
+    const double smooth = static_cast<double>(std::count(own.fringe_blocks.begin(), own.fringe_blocks.end(), 1));
     tables = smooth * FringeTable<Pack>::kRays;
-    left = 1 - smooth / static_cast<double>(plan.fringe_blocks.size());
+    left = 1 - smooth / static_cast<double>(own.fringe_blocks.size());
   } else {
-    for (const DiscSquare& q : plan.disc) {
+    for (const DiscSquare& q : own.disc) {
       if (q.smooth)
         tables += PolarTable<Pack>::kRays;
       else
@@ -579,7 +579,7 @@ bool picture_is_cheaper(const Scene& scene, const RenderPlan& plan, const std::v
     }
   }
   constexpr double kReading = 0.05;  // of a ray's time, a pixel
-  return count * rays > tables + all * (left * (plan.fringe_means ? 1 : rays) + kReading);
+  return count * rays > tables + all * (left * (plan.means.fringes ? 1 : rays) + kReading);
 }
 
 std::vector<JonesRow> jones(const Scene& scene, const RenderPlan& plan, const Theta& theta) {

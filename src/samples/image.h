@@ -42,7 +42,7 @@ class SampleImage {
   virtual ~SampleImage() = default;
   /// As a fraction of what comes in.
   virtual void light(const PlainOf<S>& column, const PlainOf<S>& row, S* out) const = 0;
-  /// The parts of light() as smooth functions; only with plan.fringe_means.
+  /// The parts of light() as smooth functions; only with plan.means.fringes.
   virtual void fringe(const PlainOf<S>& /*column*/, const PlainOf<S>& /*row*/, FringePoint<S>* /*out*/) const {
     throw std::logic_error("no fringes here");
   }

@@ -22,11 +22,11 @@ void check_closed_form(const Demand& demand, const std::string& what) {
 
 void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double bins,
                       const std::function<int(double)>& points) {
-  plan.sampling_center_x_px = center_x;
-  plan.sampling_center_y_px = center_y;
-  plan.sampling_bin_px = 1;
-  plan.samples.clear();
-  for (int i = 0; i < bins; ++i) plan.samples.push_back(points(i + 0.5));
+  plan.means.center_x_px = center_x;
+  plan.means.center_y_px = center_y;
+  plan.means.bin_px = 1;
+  plan.means.samples.clear();
+  for (int i = 0; i < bins; ++i) plan.means.samples.push_back(points(i + 0.5));
 }
 
 void note_illumination(const Scene& scene, const Values<double>& value, double largest_phase, RenderPlan& plan) {

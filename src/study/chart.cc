@@ -196,8 +196,8 @@ struct PixelTruth {
 };
 PixelTruth pixel_truth(const Scene& scene, const Theta& theta) {
   RenderPlan fine = plan(scene, {.intensity_accuracy = 1e-7, .method = "magnus4"}, theta);
-  fine.samples = {8};
-  fine.fringe_means = false;
+  fine.means.samples = {8};
+  fine.means.fringes = false;
   PixelTruth truth;
   for (int i = 0; i < 200; ++i) {
     const auto at = [&](double turn, int size) { return static_cast<int>((turn - std::floor(turn)) * size); };

@@ -9,6 +9,7 @@
 
 #include "birefit/error.h"
 #include "birefit/render.h"
+#include "samples/choices.h"
 #include "samples/waves/wave.h"
 #include "study/ball_scene.h"
 #include "transport/quadrature.h"
@@ -152,7 +153,7 @@ void measure_wave_traps(bool quick, const std::function<void(const std::string&)
         p.estimate = chosen.numerical_error + chosen.model_error;
         p.samples = chosen.wave
                         ? static_cast<double>(chosen.wave->grid.nx) * chosen.wave->grid.ny * chosen.wave->grid.slabs
-                        : chosen.radial_panels;
+                        : choices(chosen).radial_panels;
         return render(b.scene, chosen, theta, {}, 1).intensity;
       });
     };

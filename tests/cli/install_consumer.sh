@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# An installed birefit is found by another CMake project, which links birefit::model.
+# An installed birefit is found by another CMake project, which links birefit::model and birefit::io, the latter into a
+# shared library of its own.
 set -euo pipefail
 build=$(dirname "$1")
 rm -rf prefix consumer
@@ -10,12 +11,28 @@ cat >consumer/CMakeLists.txt <<'EOF'
 cmake_minimum_required(VERSION 3.25)
 project(consumer CXX)
 find_package(birefit REQUIRED)
+add_library(reader SHARED reader.cc)
+target_compile_features(reader PRIVATE cxx_std_20)
+target_link_libraries(reader PRIVATE birefit::io)
 add_executable(consumer consumer.cc)
-target_link_libraries(consumer PRIVATE birefit::model)
+target_link_libraries(consumer PRIVATE reader birefit::model)
+EOF
+cat >consumer/reader.cc <<'EOF'
+#include <birefit/error.h>
+#include <birefit/io.h>
+bool refuses(const char* text) {
+  try {
+    birefit::load_config_text(text, "consumer", birefit::ConfigUse::render);
+  } catch (const birefit::UserError&) {
+    return true;
+  }
+  return false;
+}
 EOF
 cat >consumer/consumer.cc <<'EOF'
 #include <birefit/error.h>
 #include <birefit/fit.h>
+bool refuses(const char* text);
 int main() {
   birefit::ParameterTable table;
   table.add_constant("answer", 42);
@@ -26,7 +43,7 @@ int main() {
     birefit::fit(job);  // nothing to fit: the mistake is reported, which shows that Ceres was linked
   } catch (const birefit::UserError&) {
   }
-  return table.size() == 1 ? 0 : 1;
+  return table.size() == 1 && refuses("sample: nothing\n") ? 0 : 1;
 }
 EOF
 flags=$(sed -n 's/^CMAKE_CXX_FLAGS:[A-Z]*=//p' "$build/CMakeCache.txt")

@@ -337,7 +337,7 @@ TEST(Volume, PixelMeansHoldTheAccuracy) {
   const RenderPlan p = plan(s.scene, s.demand, s.theta());
   const Image image = render(s.scene, p, s.theta()).intensity;
   RenderPlan fine = p;
-  fine.samples.assign(1, 8);
+  fine.means.samples.assign(1, 8);
   fine.steps = 8 * 23;
   fine.method = "magnus4";
   const Image reference = render(s.scene, fine, s.theta()).intensity;

@@ -11,6 +11,7 @@
 #include "birefit/volume.h"
 #include "medium/families/planar.h"
 #include "medium/families/radial.h"
+#include "samples/choices.h"
 #include "scene/polariscope.h"
 #include "scene_builder.h"
 #include "transport/one_way.h"
@@ -486,8 +487,8 @@ TEST(Gradients, EveryParameterOfEverySceneAgreesWithDifferences) {
     RenderPlan p = plan(c.scene, c.demand, theta, c.observable);
     // Points that go from one part of a table to another jump by a little of the accuracy (PolarTable and RadialTable
     // look at that).
-    p.disc.clear();
-    if (c.demand.ceiling != Ceiling::wave) p.radial_panels = 0;
+    choices(p).disc.clear();
+    if (c.demand.ceiling != Ceiling::wave) choices(p).radial_panels = 0;
     std::vector<int> active;
     for (int i = 0; i < c.t.table.size(); ++i) active.push_back(i);
     const Rendering r = render(c.scene, p, theta, active, 1);

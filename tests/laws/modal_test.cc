@@ -5,6 +5,7 @@
 #include "independent_camera.h"
 #include "medium/families/planar.h"
 #include "profiles.h"
+#include "samples/choices.h"
 #include "samples/layers/cone_view.h"
 #include "samples/tables/fringe_table.h"
 #include "scene_builder.h"
@@ -100,11 +101,12 @@ std::pair<ParameterRef, ParameterRef> put_tilted_plate(TableBuilder& table, Scen
 /// `planned` with squares of 24 pixels, of them interpolated those for which interpolated(column, row) of the square.
 RenderPlan in_squares(const RenderPlan& planned, const Scene& scene, bool (*interpolated)(int, int)) {
   RenderPlan plan = planned;
-  plan.fringe_block_px = 24;
-  plan.fringe_blocks.clear();
-  const FringeBlocks blocks(scene.view.width, scene.view.height, plan.fringe_block_px);
+  choices(plan).fringe_block_px = 24;
+  choices(plan).fringe_blocks.clear();
+  const FringeBlocks blocks(scene.view.width, scene.view.height, choices(plan).fringe_block_px);
   for (int row = 0; row < blocks.rows; ++row)
-    for (int column = 0; column < blocks.columns; ++column) plan.fringe_blocks.push_back(interpolated(column, row));
+    for (int column = 0; column < blocks.columns; ++column)
+      choices(plan).fringe_blocks.push_back(interpolated(column, row));
   return plan;
 }
 bool every(int, int) { return true; }
@@ -158,10 +160,10 @@ TEST(FringeTable, PicturesOfFewRaysAreThoseOfAll) {
     const Theta theta = table.table.values();
     const RenderPlan few = plan(scene, theta);
     EXPECT_EQ(few.method, absorbing_slab ? "modal" : "diagonal");
-    ASSERT_GT(few.fringe_block_px, 0);
+    ASSERT_GT(choices(few).fringe_block_px, 0);
     RenderPlan all = few;
-    all.fringe_block_px = 0;
-    all.fringe_blocks.clear();
+    choices(all).fringe_block_px = 0;
+    choices(all).fringe_blocks.clear();
     const Rendering a = render(scene, few, theta, active), b = render(scene, all, theta, active);
     double worst = 0, brightest = 0;
     for (std::size_t i = 0; i < a.intensity.size(); ++i) {
@@ -267,10 +269,10 @@ TEST(FringeTable, SquaresThatAreNoLongerSmoothAreLeftToRays) {
   const ParameterRef tilt = put_tilted_plate(table, scene).second;
   Theta theta = table.table.values();
   const RenderPlan few = plan(scene, theta);
-  ASSERT_GT(few.fringe_block_px, 0);
+  ASSERT_GT(choices(few).fringe_block_px, 0);
   RenderPlan all = few;
-  all.fringe_block_px = 0;
-  all.fringe_blocks.clear();
+  choices(all).fringe_block_px = 0;
+  choices(all).fringe_blocks.clear();
   for (const double degrees : {60.0, 86.0, 88.0}) {
     theta[static_cast<std::size_t>(tilt.index)] = degrees;
     const Rendering a = render(scene, few, theta), b = render(scene, all, theta);
@@ -297,7 +299,7 @@ TEST(ConeView, CornersHaveTheSamplesTheyNeed) {
   const Theta theta = table.table.values();
   const RenderPlan planned = plan(scene, {.method = "magnus4"}, theta);
   RenderPlan fine = planned;
-  fine.samples = {8};
+  fine.means.samples = {8};
   const Image picture = render(scene, planned, theta).intensity, truth = render(scene, fine, theta).intensity;
   double worst = 0;
   for (std::size_t i = 0; i < picture.size(); ++i)
@@ -318,7 +320,7 @@ TEST(FringeTable, AnyWidthWillDo) {
     put_tilted_plate(table, scene);
     const Theta theta = table.table.values();
     const RenderPlan planned = plan(scene, theta);
-    ASSERT_TRUE(planned.fringe_means);
+    ASSERT_TRUE(planned.means.fringes);
     const Image rays = render(scene, in_squares(planned, scene, none), theta).intensity;
     for (const RenderPlan& p : {in_squares(planned, scene, every), in_squares(planned, scene, every_other)})
       for (const std::vector<int>& by : {std::vector<int>{}, {scene.view.center_x_px.index}}) {
@@ -346,12 +348,12 @@ TEST(FringeTable, FringesOfThinPlatesAreCarriedAlongToo) {
     table.table[std::get<Plate>(scene.sample).half_angle_deg].value = 35;
     const Theta theta = table.table.values();
     const RenderPlan planned = plan(scene, theta);
-    ASSERT_TRUE(planned.fringe_means);
+    ASSERT_TRUE(planned.means.fringes);
     RenderPlan whole = planned, all = planned;
-    whole.fringe_block_px = (size + 2 * FringeBlocks::kRim + 7) / 8 * 8;
-    whole.fringe_blocks = {1};
-    all.fringe_block_px = 0;
-    all.fringe_blocks.clear();
+    choices(whole).fringe_block_px = (size + 2 * FringeBlocks::kRim + 7) / 8 * 8;
+    choices(whole).fringe_blocks = {1};
+    choices(all).fringe_block_px = 0;
+    choices(all).fringe_blocks.clear();
     const std::vector<int> active{scene.view.center_x_px.index, scene.view.center_y_px.index,
                                   std::get<Plate>(scene.sample).half_angle_deg.index};
     const Rendering few = render(scene, whole, theta, active), rays = render(scene, all, theta, active);
@@ -380,9 +382,9 @@ TEST(FringeTable, PicturesDoNotDependOnTheOnesBefore) {
   put_tilted_plate(table, scene);
   Theta theta = table.table.values();
   RenderPlan rays = plan(scene, theta);
-  ASSERT_TRUE(rays.fringe_means);
-  rays.fringe_block_px = 0;
-  rays.fringe_blocks.clear();
+  ASSERT_TRUE(rays.means.fringes);
+  choices(rays).fringe_block_px = 0;
+  choices(rays).fringe_blocks.clear();
   const Image before = render(scene, rays, theta, {}, 1).intensity;
   Scene other = scene;
   other.view.width = 109;
@@ -394,7 +396,7 @@ TEST(FringeTable, PicturesDoNotDependOnTheOnesBefore) {
   // From a table and with derivatives, at a width that leaves no register free beyond the picture, after one whose
   // derivatives are steep.
   const RenderPlan table_of = plan(scene, theta);
-  ASSERT_GT(table_of.fringe_block_px, 0);
+  ASSERT_GT(choices(table_of).fringe_block_px, 0);
   const std::vector<int> by{scene.view.center_x_px.index, scene.microscope.polarizer_deg.index},
       others{scene.surround_index.index, scene.view.center_y_px.index};
   for (const int width : {100, 101}) {

@@ -434,7 +434,7 @@ TEST(PixelMeans, OfWavePicturesAreAsGoodAsThePlanSays) {
         const Theta theta = b.table.values();
         const RenderPlan planned = plan(s, {.ceiling = Ceiling::wave}, theta);
         RenderPlan fine = planned;
-        fine.samples = {8};
+        fine.means.samples = {8};
         const Image picture = render(s, planned, theta, {}, 1).intensity,
                     truth = render(s, fine, theta, {}, 1).intensity;
         double worst = 0;

@@ -11,6 +11,7 @@
 
 #include "birefit/io.h"
 #include "birefit/render.h"
+#include "samples/choices.h"
 #include "samples/kind.h"
 #include "scene_builder.h"
 
@@ -211,7 +212,7 @@ void expect_rays_kept(unsigned long first, unsigned long last) {
     r.demand.intensity_accuracy = asked;
     const RenderPlan planned = plan(r.scene, r.demand, theta);
     RenderPlan exact = planned;
-    for (DiscSquare& square : exact.disc) square.smooth = false, square.steps = 512;
+    for (DiscSquare& square : choices(exact).disc) square.smooth = false, square.steps = 512;
     const Image a = render(r.scene, planned, theta, {}, 2).intensity,
                 b = render(r.scene, exact, theta, {}, 2).intensity;
     double worst = 0;

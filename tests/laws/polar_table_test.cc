@@ -9,6 +9,7 @@
 #include <random>
 
 #include "birefit/render.h"
+#include "samples/choices.h"
 #include "samples/tables/polar_table.h"
 #include "scene_builder.h"
 
@@ -73,7 +74,7 @@ Job job_of(const Case& c) {
   return j;
 }
 RenderPlan with_rays_alone(RenderPlan plan) {
-  for (DiscSquare& square : plan.disc) square.smooth = false;
+  for (DiscSquare& square : choices(plan).disc) square.smooth = false;
   return plan;
 }
 double largest_difference(const Image& a, const Image& b) {
@@ -117,11 +118,12 @@ TEST(PolarTable, PicturesAreThoseOfRays) {
     const Job j = job_of(c);
     const Theta theta = j.b.table.values();
     const RenderPlan p = plan(j.scene, theta);
-    const auto smooth = std::count_if(p.disc.begin(), p.disc.end(), [](const DiscSquare& q) { return q.smooth; });
+    const auto smooth =
+        std::count_if(choices(p).disc.begin(), choices(p).disc.end(), [](const DiscSquare& q) { return q.smooth; });
     ASSERT_GT(smooth, 8) << c.name;
     // Every part is there once: 16 of a level make one of two levels below. A core is a disc of its own.
     double area[2] = {0, 0};
-    for (const DiscSquare& q : p.disc) area[q.of_core] += 1.0 / disc::panels(q.level) / disc::sectors(q.level);
+    for (const DiscSquare& q : choices(p).disc) area[q.of_core] += 1.0 / disc::panels(q.level) / disc::sectors(q.level);
     EXPECT_NEAR(area[0], 1, 1e-12) << c.name;
     EXPECT_NEAR(area[1], c.name[0] == 'e' ? 1 : 0, 1e-12) << c.name;
     const Image table = render(j.scene, p, theta, {}, 2).intensity,
@@ -130,8 +132,8 @@ TEST(PolarTable, PicturesAreThoseOfRays) {
     const double error = largest_difference(table, rays);
     EXPECT_LT(error, 3e-2 * Demand{}.intensity_accuracy) << c.name;
     EXPECT_GT(error, 0) << c.name;
-    std::printf("  %-30s %3ld of %3zu parts smooth, off by %.1e\n", c.name, static_cast<long>(smooth), p.disc.size(),
-                error);
+    std::printf("  %-30s %3ld of %3zu parts smooth, off by %.1e\n", c.name, static_cast<long>(smooth),
+                choices(p).disc.size(), error);
   }
 }
 
@@ -145,7 +147,7 @@ TEST(PolarTable, TheMiddleIsAPlaceLikeAnyOther) {
     Theta theta = j.b.table.values();
     theta[x] = 80, theta[y] = 79;
     RenderPlan p = plan(j.scene, theta);
-    p.samples = {3};  // one of them in the pixel's middle
+    p.means.samples = {3};  // one of them in the pixel's middle
     const RenderPlan rays = with_rays_alone(p);
     const std::vector<int> by{static_cast<int>(x), static_cast<int>(y)};
     const Image table = render(j.scene, p, theta).intensity;
@@ -185,7 +187,7 @@ TEST(PolarTable, ACoreThatIsSeenTwiceHasNoDisc) {
   set("ordinary", 1.6), set("birefringence", 0.1), set("surround", 1.33);
   set("pixel_size_um", 0.126);
   const auto of_core = [](const RenderPlan& p) {
-    return std::count_if(p.disc.begin(), p.disc.end(), [](const DiscSquare& q) { return q.of_core; });
+    return std::count_if(choices(p).disc.begin(), choices(p).disc.end(), [](const DiscSquare& q) { return q.of_core; });
   };
   const RenderPlan there = plan(j.scene, theta);
   EXPECT_EQ(of_core(there), 0);

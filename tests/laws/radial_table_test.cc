@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "birefit/render.h"
+#include "samples/choices.h"
 #include "scene_builder.h"
 
 namespace birefit {
@@ -73,9 +74,9 @@ TEST(RadialTable, IsThePictureOfOneRayAPoint) {
     if (c.ring > 0) by.push_back(std::get<AxialDirector>(droplet.director).ring_radius.index);
     const Theta theta = b.table.values();
     const RenderPlan table = plan(s, theta);
-    EXPECT_EQ(table.radial_panels > 0, c.tabulated) << c.name;
+    EXPECT_EQ(choices(table).radial_panels > 0, c.tabulated) << c.name;
     RenderPlan rays = table;
-    rays.radial_panels = 0;
+    choices(rays).radial_panels = 0;
     const Rendering read = render(s, table, theta, by), direct = render(s, rays, theta, by);
     const auto worst = [](const Image& a, const Image& b) {
       double error = 0;

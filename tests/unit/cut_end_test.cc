@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "io/config_pixels.h"
+#include "io/config/pixels.h"
 
 namespace birefit {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "config_fixture.h"
-#include "io/config_discs.h"
+#include "io/config/discs.h"
 
 namespace birefit {
 namespace {

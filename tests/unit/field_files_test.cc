@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/volume_file.h"
+#include "io/fields/volume_file.h"
 
 namespace birefit {
 namespace {

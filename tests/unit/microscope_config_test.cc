@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "birefit/io.h"
-#include "io/described.h"
+#include "io/config/described.h"
 #include "medium/references.h"
 
 namespace birefit {

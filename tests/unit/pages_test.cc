@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/config_pages.h"
+#include "io/config/pages.h"
 #include "io/images/pages.h"
 
 namespace birefit {

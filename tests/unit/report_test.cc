@@ -17,8 +17,8 @@
 #include <nlohmann/json.hpp>
 
 #include "birefit/io.h"
-#include "io/report_chart.h"
-#include "io/report_format.h"
+#include "io/report/chart.h"
+#include "io/report/format.h"
 #include "pictures.h"
 
 namespace birefit {

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/table.h"
+#include "io/files/table.h"
 
 namespace birefit {
 namespace {

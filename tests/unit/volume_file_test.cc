@@ -12,7 +12,7 @@
 #include <functional>
 #include <limits>
 
-#include "io/volume_file.h"
+#include "io/fields/volume_file.h"
 
 namespace birefit {
 namespace {

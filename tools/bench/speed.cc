@@ -24,6 +24,7 @@
 #include "medium/families/axial_equilibrium.h"
 #include "medium/families/radial.h"
 #include "render/exposed.h"
+#include "samples/choices.h"
 #include "samples/sphere/droplet.h"
 #include "study/frames.h"
 #include "transport/one_way.h"
@@ -123,10 +124,11 @@ double rays_in_picture(const Scene& scene, const Theta& theta, const RenderPlan&
   double rays = 0;
   for (int r = 0; r < scene.view.height; ++r)
     for (int c = 0; c < scene.view.width; ++c) {
-      const double distance = std::hypot(c - plan.sampling_center_x_px, r - plan.sampling_center_y_px);
+      const double distance = std::hypot(c - plan.means.center_x_px, r - plan.means.center_y_px);
       if (distance > radius_px) continue;
       const int n =
-          plan.samples[std::min(plan.samples.size() - 1, static_cast<std::size_t>(distance / plan.sampling_bin_px))];
+          plan.means
+              .samples[std::min(plan.means.samples.size() - 1, static_cast<std::size_t>(distance / plan.means.bin_px))];
       rays += n * n;
     }
   return rays;
@@ -323,7 +325,7 @@ void time_unsymmetric(int rounds) {
     RenderPlan p;
     const double planned = seconds_of([&] { p = plan(s.scene, theta); });
     RenderPlan every = p;
-    for (DiscSquare& square : every.disc) square.smooth = false;
+    for (DiscSquare& square : choices(every).disc) square.smooth = false;
     Rendering image, four, direct, direct_four;
     std::vector<double> table, table_four, rays, rays_four;
     for (int i = 0; i < std::max(3, rounds); ++i) {
@@ -504,7 +506,7 @@ int main(int argc, char** argv) {
     const RenderPlan p = plan(s.scene, theta);
     // The same without the table over the radius: a ray for every point, as a scene without symmetry needs.
     RenderPlan every = p;
-    every.radial_panels = 0;
+    choices(every).radial_panels = 0;
     Rendering out, out_four, out_eight;  // images are made once, as in a fit
     std::vector<double> both, one, four, eight, scalar, rays, rays_one, rays_four, rays_scalar;
     for (int i = 0; i < rounds; ++i) {

@@ -46,7 +46,7 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
 }
 
 bool has_own_rays(const Task& task, const Frame& frame, int g) {
-  return traits_of(task.picture(g).scene).sphere_diameter_um && frame.plan.radial_panels == 0 && !frame.plan.wave;
+  return traits_of(task.picture(g).scene).sphere_diameter_um && !has_radial_table(frame.plan) && !frame.plan.wave;
 }
 
 /// How many pixels of a frame the search looks at: where every pixel is rays of its own, no more than it takes.
@@ -54,7 +54,7 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
   const std::size_t share =
       static_cast<std::size_t>(std::max(50, task.job.options.scan_pixels / std::max(1, task.frames())));
   const Frame& frame = frames[static_cast<std::size_t>(g)];
-  const bool own_rays = traits_of(task.picture(g).scene).sphere_diameter_um && frame.plan.radial_panels == 0;
+  const bool own_rays = traits_of(task.picture(g).scene).sphere_diameter_um && !has_radial_table(frame.plan);
   if (!own_rays) return share;
   // kEnough: units of chi-square by which a constant image is then off; a wrong order is by a good part of that.
   // kFewest: pixels that lie where the image is not flat, however much of it is background.

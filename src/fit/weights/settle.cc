@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include <fmt/format.h>
 
@@ -10,24 +9,6 @@
 
 namespace birefit::estimation {
 namespace {
-
-/// A plan that resolves more than the one the solver worked with, or resolves it elsewhere.
-bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
-  if (now.method != before.method || (now.disc.empty() && now.steps > before.steps) ||
-      now.mesh.size() > before.mesh.size() || now.radial_panels > before.radial_panels ||
-      now.centre_panels > before.centre_panels ||
-      !std::equal(now.part_panels.begin(), now.part_panels.end(), before.part_panels.begin(), before.part_panels.end(),
-                  std::less_equal<>()) ||
-      (before.fringe_means && !now.fringe_means))
-    return true;
-  if (outgrown(now, before)) return true;
-  const double moved = std::hypot(now.sampling_center_x_px - before.sampling_center_x_px,
-                                  now.sampling_center_y_px - before.sampling_center_y_px);
-  if (now.samples != before.samples && moved > before.sampling_bin_px) return true;
-  for (std::size_t i = 0; i < now.samples.size(); ++i)
-    if (now.samples[i] > (i < before.samples.size() ? before.samples[i] : 1)) return true;
-  return false;
-}
 
 /// The noise of the frames whose residual is clearly quieter than their image was. True where one is.
 bool lower_noise(const Task& task, Optimum& optimum) {

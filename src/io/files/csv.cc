@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "core/printable.h"
-#include "io/table.h"
+#include "io/files/table.h"
 
 namespace birefit {
 

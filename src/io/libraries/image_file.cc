@@ -17,7 +17,7 @@
 #include <fmt/format.h>
 
 #include "birefit/io.h"
-#include "io/file.h"
+#include "io/files/file.h"
 #include "io/images/npy_image.h"
 #include "io/images/pages.h"
 #include "io/images/signature.h"

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "birefit/io.h"
-#include "io/report_chart.h"
-#include "io/report_format.h"
+#include "io/report/chart.h"
+#include "io/report/format.h"
 
 namespace birefit::page {
 

@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "io/report/image.h"
 #include "io/report/page.h"
-#include "io/report_image.h"
 
 namespace birefit::page {
 namespace {

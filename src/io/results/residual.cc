@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "io/report_format.h"
+#include "io/report/format.h"
 
 namespace birefit {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "io/file.h"
 #include "io/files/csv.h"
+#include "io/files/file.h"
 
 namespace birefit {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "instrument/exposure.h"
+#include "samples/choices.h"
 
 namespace birefit {
 
@@ -17,7 +18,7 @@ EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const 
       view_(scene, value, light_),
       aplanatic_(scene.microscope.aplanatic),
       symmetry_(round_symmetry(scene, value, light_.line(), false)),
-      panels_(plan.part_panels),
+      panels_(choices(plan).part_panels),
       allowed_tail_(std::max(0.05 * plan.demand.intensity_accuracy, 3 * plan.numerical_error)) {
   passing_ = PassingLight<S>(value(scene.view.pixel_size_um), optics_.radius_um, light_.line().open());
   std::vector<S> ends = fan_p_.ends_um();
@@ -45,7 +46,7 @@ EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const 
     parts_[k].blur_um = blur;
   }
   // Ends that the planner's scene did not have: any part may be the one with the most fringes.
-  if (panels_.size() != parts_.size()) panels_.assign(parts_.size(), plan.radial_panels);
+  if (panels_.size() != parts_.size()) panels_.assign(parts_.size(), choices(plan).radial_panels);
 }
 
 template <class S>

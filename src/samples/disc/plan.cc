@@ -69,13 +69,13 @@ RenderPlan plan_disc(const Planning& planning) {
     const std::size_t i = static_cast<std::size_t>(f);
     return samples_for(std::max(gradient[i], gradient[i + 1]), plan.demand.intensity_accuracy);
   });
-  plan.samples.push_back(1);  // outside
+  plan.means.samples.push_back(1);  // outside
   const double fastest = *std::max_element(gradient.begin(), gradient.end());
   plan.reasons.push_back(
       fmt::format("the retardance reaches {:.3g} rad outside the contacts and changes by up to {:.2g} rad a pixel; "
                   "pixel means from up to {} x {} points",
-                  largest_phase, fastest, *std::max_element(plan.samples.begin(), plan.samples.end()),
-                  *std::max_element(plan.samples.begin(), plan.samples.end())));
+                  largest_phase, fastest, *std::max_element(plan.means.samples.begin(), plan.means.samples.end()),
+                  *std::max_element(plan.means.samples.begin(), plan.means.samples.end())));
   if (fastest > 2 * kPi)
     plan.reasons.push_back(
         fmt::format("fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um "

@@ -10,6 +10,7 @@
 #include "birefit/error.h"
 #include "core/threads.h"
 #include "medium/validity.h"
+#include "samples/choices.h"
 #include "samples/kind.h"
 #include "samples/layers/cone_view.h"
 #include "samples/layers/planar.h"
@@ -68,7 +69,7 @@ bool plan_fringe_means(const Planning& planning, const PlanarOptics<double>& o, 
   const Scene& scene = planning.scene;
   const int w = scene.view.width, h = scene.view.height;
   RenderPlan trial = plan;
-  trial.fringe_means = true;
+  trial.means.fringes = true;
   // Along the axis inside, the wavevector is n_o a.
   OpticalPoint<double> face;
   const double start[1] = {0.0};
@@ -77,22 +78,22 @@ bool plan_fringe_means(const Planning& planning, const PlanarOptics<double>& o, 
   const double sx = sign * n_o * face.axis.x / o.n_host, sy = sign * n_o * face.axis.y / o.n_host,
                s2 = sx * sx + sy * sy;
   constexpr int kAround = 10;  // pixels
-  trial.samples = {1};
+  trial.means.samples = {1};
   if (s2 < 1) {
     const double cosine = std::sqrt(1 - s2);
     const auto [column, row] = ConeView<double>(scene, planning.value).pixel_of({sx / cosine, sy / cosine});
     if (column > -kAround && row > -kAround && column < w + kAround && row < h + kAround) {
-      trial.sampling_center_x_px = column;
-      trial.sampling_center_y_px = row;
-      trial.sampling_bin_px = 1;
-      trial.samples.assign(kAround + 1, 1);
-      std::fill(trial.samples.begin(), trial.samples.begin() + 4, 8);
-      std::fill(trial.samples.begin() + 4, trial.samples.begin() + kAround, 4);
+      trial.means.center_x_px = column;
+      trial.means.center_y_px = row;
+      trial.means.bin_px = 1;
+      trial.means.samples.assign(kAround + 1, 1);
+      std::fill(trial.means.samples.begin(), trial.means.samples.begin() + 4, 8);
+      std::fill(trial.means.samples.begin() + 4, trial.means.samples.begin() + kAround, 4);
     }
   }
   RenderPlan points = trial;
-  points.fringe_means = false;
-  points.samples = {8};
+  points.means.fringes = false;
+  points.means.samples = {8};
   std::vector<std::array<int, 2>> pilots;
   for (int i = 0; i < 64; ++i) {
     const auto at = [&](double turn, int size) {
@@ -171,15 +172,16 @@ void plan_fringe_blocks(const Planning& planning, RenderPlan& plan) {
                      std::min(size, h + kRims - b / blocks.columns * size);
     if (least + left_over < fewest) {
       fewest = least + left_over;
-      plan.fringe_block_px = size;
-      plan.fringe_blocks = smooth;
+      choices(plan).fringe_block_px = size;
+      choices(plan).fringe_blocks = smooth;
     }
   }
-  if (plan.fringe_block_px == 0) return;
+  if (choices(plan).fringe_block_px == 0) return;
   plan.numerical_error += target;
-  plan.reasons.push_back(fmt::format("{} of {} squares of {} pixels have their fringes interpolated from {} rays each",
-                                     std::count(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 1),
-                                     plan.fringe_blocks.size(), plan.fringe_block_px, FringeTable<Pack>::kRays));
+  plan.reasons.push_back(
+      fmt::format("{} of {} squares of {} pixels have their fringes interpolated from {} rays each",
+                  std::count(choices(plan).fringe_blocks.begin(), choices(plan).fringe_blocks.end(), 1),
+                  choices(plan).fringe_blocks.size(), choices(plan).fringe_block_px, FringeTable<Pack>::kRays));
 }
 
 /// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
@@ -416,7 +418,7 @@ void plan_cone_pixels(const Planning& planning, const PlanarOptics<double>& o, R
       const std::size_t i = static_cast<std::size_t>(f);
       return samples_for(std::max(gradient[i], gradient[i + 1]), plan.demand.intensity_accuracy);
     });
-    const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+    const int most = *std::max_element(plan.means.samples.begin(), plan.means.samples.end());
     plan.reasons.push_back(fmt::format("pixel means from up to {} x {} rays a pixel", most, most));
   }
 }

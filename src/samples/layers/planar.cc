@@ -5,6 +5,7 @@
 
 #include "instrument/exposure.h"
 #include "medium/references.h"
+#include "samples/choices.h"
 #include "samples/image.h"
 #include "samples/layers/column.h"
 #include "samples/layers/cone_view.h"
@@ -122,10 +123,11 @@ class PlanarImage final : public SampleImage<S> {
         mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps, optics_.column->breaks) : plan.mesh),
         light_(maker.in(value).line),
         coupling_(plan.method == "modal"),
-        has_fringes_(plan.fringe_means),
-        blocks_(scene.view.width, scene.view.height, std::max(plan.fringe_block_px, 1)),
-        tabulated_blocks_(plan.fringe_blocks),
-        left_to_rays_(std::find(plan.fringe_blocks.begin(), plan.fringe_blocks.end(), 0) != plan.fringe_blocks.end()) {
+        has_fringes_(plan.means.fringes),
+        blocks_(scene.view.width, scene.view.height, std::max(choices(plan).fringe_block_px, 1)),
+        tabulated_blocks_(choices(plan).fringe_blocks),
+        left_to_rays_(std::find(choices(plan).fringe_blocks.begin(), choices(plan).fringe_blocks.end(), 0) !=
+                      choices(plan).fringe_blocks.end()) {
     if (cone_half_angle(scene)) cone_.emplace(scene, value);
     if (!cone_) {
       const Direction d = maker.in(value).direction;

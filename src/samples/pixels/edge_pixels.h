@@ -319,7 +319,7 @@ bool is_defect_pixel(const SampleImage<S>& model, double column, double row) {
 template <class S>
 S mean_over_cut_pixel(const SampleImage<S>& model, const RenderPlan& plan, double column, double row) {
   return mean_over_edge_pixel(model, column, row,
-                              is_defect_pixel(model, column, row) ? plan.defect_points : plan.edge_points);
+                              is_defect_pixel(model, column, row) ? plan.means.defect_points : plan.means.edge_points);
 }
 
 /// Finds the edge pixels of rows of a picture.

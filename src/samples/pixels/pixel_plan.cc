@@ -46,15 +46,15 @@ void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPl
   // Pixel grids may lie anywhere about the sample: pilots are no pixels of this one.
   const auto place = [&](double radius, double turn) {
     const double azimuth = 2 * std::numbers::pi * turn;
-    return std::array<double, 2>{plan.sampling_center_x_px + radius * std::cos(azimuth),
-                                 plan.sampling_center_y_px + radius * std::sin(azimuth)};
+    return std::array<double, 2>{plan.means.center_x_px + radius * std::cos(azimuth),
+                                 plan.means.center_y_px + radius * std::sin(azimuth)};
   };
   constexpr int kPairs = 12, kMostRings = 1024;
   constexpr double kBeyond = 0.3;
-  const int bins = static_cast<int>(plan.samples.size()), together = 1 + bins / kMostRings;
+  const int bins = static_cast<int>(plan.means.samples.size()), together = 1 + bins / kMostRings;
   for (int first = 0; first < bins; first += together) {
     const int last = std::min(first + together, bins);
-    int& n = *std::max_element(plan.samples.begin() + first, plan.samples.begin() + last);
+    int& n = *std::max_element(plan.means.samples.begin() + first, plan.means.samples.begin() + last);
     std::vector<std::array<double, 2>> pixels;
     const auto try_at = [&](double radius, double turn) {
       const auto pixel = place(radius, turn);
@@ -70,14 +70,14 @@ void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPl
       // nothing: the more points, the nearer to it are the hardest pixels.
       const double bin = first - kBeyond + (last - first + 2 * kBeyond) * (k + 0.5) / kPairs,
                    anywhere = even_x(first * kPairs + k);
-      try_at_pair(plan.sampling_bin_px * std::max(0.0, bin),
+      try_at_pair(plan.means.bin_px * std::max(0.0, bin),
                   k % 2 == 0 ? anywhere : 0.25 * (k / 2 % 2) + 0.125 * even_y(k));
     }
     // Light changes fastest beside the pixels that are cut.
     for (int e = 0; e < model.edges(); ++e)
       if (const auto circle = model.circle(e))
         for (const double border : {circle->radius - kEdgeWithin - 1e-6, circle->radius + kEdgeBeyond + 1e-6})
-          if (border >= plan.sampling_bin_px * first && border < plan.sampling_bin_px * last)
+          if (border >= plan.means.bin_px * first && border < plan.means.bin_px * last)
             for (const double turn : {0.01, 0.03, 0.0625, 0.17, 0.24, 0.44}) try_at_pair(border, turn);
     if (pixels.empty()) continue;
     double left = 0;
@@ -86,7 +86,7 @@ void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPl
           return lane(mean_over_one_pixel(model, column, row, points), 0);
         });
     worst = std::max(worst, left);
-    if (needed > n) std::fill(plan.samples.begin() + first, plan.samples.begin() + last, needed);
+    if (needed > n) std::fill(plan.means.samples.begin() + first, plan.means.samples.begin() + last, needed);
   }
   const auto cut = [&](double column, double row, int points) {
     return lane(mean_over_edge_pixel(model, column, row, points), 0);
@@ -102,7 +102,7 @@ void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPl
     const auto circle = model.circle(e);
     if (!circle) {
       for (int k = 0, found = 0; k < kTries && found < 2 * kAtEdges; ++k) {
-        const auto pixel = place(bins * plan.sampling_bin_px * std::sqrt(even_y(k)), even_x(k));
+        const auto pixel = place(bins * plan.means.bin_px * std::sqrt(even_y(k)), even_x(k));
         const double beyond = lane(model.beyond_edge(e, Pack(pixel[0]), Pack(pixel[1])), 0);
         if (!(beyond < kEdgeWithin && beyond > -kEdgeBeyond)) continue;
         pixels.push_back(pixel), ++found;
@@ -123,7 +123,7 @@ void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPl
   if (!pixels.empty()) {
     double left = 0;
     constexpr int kFewest = 3;
-    plan.edge_points = fewest_points(pixels, kFewest, kMostPoints / 2, target, left, cut);
+    plan.means.edge_points = fewest_points(pixels, kFewest, kMostPoints / 2, target, left, cut);
     worst = std::max(worst, left);
   }
   std::vector<std::array<double, 2>> about;
@@ -137,14 +137,14 @@ void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPl
     double left = 0;
     // With more than so many lines what is left is the table's own error about the defect.
     constexpr int kMostAbout = 16;
-    plan.defect_points =
-        fewest_points(about, plan.edge_points, std::max(kMostAbout, plan.edge_points), target, left, cut);
+    plan.means.defect_points =
+        fewest_points(about, plan.means.edge_points, std::max(kMostAbout, plan.means.edge_points), target, left, cut);
     worst = std::max(worst, left);
   }
-  plan.reasons.push_back(
-      fmt::format("pixels are means over their area: up to {0} x {0} points where fringes or a defect are finer than a "
-                  "pixel, {1} lines across rims and edges, measured: they are good to {2:.1e}",
-                  *std::max_element(plan.samples.begin(), plan.samples.end()), plan.edge_points, worst));
+  plan.reasons.push_back(fmt::format(
+      "pixels are means over their area: up to {0} x {0} points where fringes or a defect are finer than a "
+      "pixel, {1} lines across rims and edges, measured: they are good to {2:.1e}",
+      *std::max_element(plan.means.samples.begin(), plan.means.samples.end()), plan.means.edge_points, worst));
   plan.numerical_error = std::max(plan.numerical_error, worst);
 }
 

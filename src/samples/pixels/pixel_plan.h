@@ -5,9 +5,9 @@
 
 namespace birefit {
 
-/// Raises plan.samples, and sets plan.edge_points and plan.defect_points, until more points would change no pilot pixel
-/// by more than a quarter of the accuracy: in any ring of pixels of a round sample, along its edges and about its
-/// defects. `model`: after tabulate().
+/// Raises plan.means.samples, and sets plan.means.edge_points and plan.means.defect_points, until more points would
+/// change no pilot pixel by more than a quarter of the accuracy: in any ring of pixels of a round sample, along its
+/// edges and about its defects. `model`: after tabulate().
 void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPlan& plan);
 
 }  // namespace birefit

@@ -1,6 +1,7 @@
 #pragma once
 // A sphere whose picture is not the same from all sides of the viewing axis: its own ray for every point of the image.
 
+#include "samples/choices.h"
 #include "samples/sphere/ball_optics.h"
 #include "samples/tables/polar_table.h"
 #include "transport/method.h"
@@ -18,7 +19,7 @@ void plan_disc_squares(const Scene&, const Values<double>&, const BeamMaker&, do
 /// Mesh steps of a plan's rays by place.
 class StepsByPlace {
  public:
-  explicit StepsByPlace(const RenderPlan& plan) : plan_(plan), map_(plan.disc) {}
+  explicit StepsByPlace(const RenderPlan& plan) : plan_(plan), map_(choices(plan).disc) {}
   /// Of the ray that is seen at (x, y), `fraction` of the way to the edge.
   int at(double fraction, double x, double y) const;
 

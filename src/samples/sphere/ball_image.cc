@@ -1,4 +1,5 @@
 #include "samples/sphere/ball_image.h"
+#include "samples/choices.h"
 
 #include <algorithm>
 
@@ -14,11 +15,12 @@ template <class S>
 std::unique_ptr<SampleImage<S>> make_ball_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
                                                 const BeamMaker& light) {
   // A fit may have moved the core since.
-  const bool core_apart =
-      std::any_of(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.of_core; }) && [&] {
-        const BallOptics<double> o = ball_optics(scene, value.template as<double>());
-        return core_has_disc(o, rim_table(o.sphere));
-      }();
+  const bool core_apart = std::any_of(choices(plan).disc.begin(), choices(plan).disc.end(),
+                                      [](const DiscSquare& q) { return q.of_core; }) &&
+                          [&] {
+                            const BallOptics<double> o = ball_optics(scene, value.template as<double>());
+                            return core_has_disc(o, rim_table(o.sphere));
+                          }();
   return std::make_unique<BallImage<S>>(scene, plan, value, light, core_apart);
 }
 #define BIREFIT_INSTANTIATE(S)                                                                                   \

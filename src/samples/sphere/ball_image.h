@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "samples/choices.h"
 #include "samples/pixels/sampling.h"
 #include "samples/sphere/ball_rays.h"
 #include "samples/tables/polar_table.h"
@@ -32,10 +33,10 @@ class BallImage final : public SampleImage<S> {
         by_inverse_edge_(inverse_edge_),
         inverse_radius_(inverse(optics_.sphere.radius_um)),
         core_apart_(core_apart),
-        map_(plan.disc) {
+        map_(choices(plan).disc) {
     if (shell_in(optics_)) {
       plain_ = ball_optics(scene, value.template as<P>(), continuity_of(plan.demand));
-      core_map_ = DiscMap(plan.disc, true);
+      core_map_ = DiscMap(choices(plan).disc, true);
       const auto table = [&]<class T>(const BallOptics<T>& o, const T& edge_um, int panels) {
         return RadialTable<T>(panels, 3, 1, [&](const P& v, T* out) {
           const DropletRay<T> ray = trace(o.sphere, rim_, T(edge_um * (P(1.0) - v * v)));
@@ -52,10 +53,10 @@ class BallImage final : public SampleImage<S> {
     }
     find_poles();
     std::vector<int> steps;
-    for (const DiscSquare& q : plan.disc) steps.push_back(q.steps);
+    for (const DiscSquare& q : choices(plan).disc) steps.push_back(q.steps);
     std::sort(steps.begin(), steps.end());
     steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
-    for (const DiscSquare& q : plan.disc)
+    for (const DiscSquare& q : choices(plan).disc)
       mesh_of_.push_back(
           static_cast<std::size_t>(std::lower_bound(steps.begin(), steps.end(), q.steps) - steps.begin()));
     for (const int n : steps) meshes_.push_back(ball_mesh(optics_, n));
@@ -129,13 +130,13 @@ class BallImage final : public SampleImage<S> {
   }
   void tabulate(SampleImage<S>::Wanted wanted, int threads) override {
     if (wanted != SampleImage<S>::Wanted::picture) return;
-    std::vector<DiscSquare> squares = plan_.disc;
+    std::vector<DiscSquare> squares = choices(plan_).disc;
     if (!core_apart_)  // it was when the picture was planned
       for (DiscSquare& q : squares) q.smooth = q.smooth && !q.of_core;
     table_ = PolarTable<S>(squares, kGivenUp * plan_.demand.intensity_accuracy, threads,
                            [this](int square, const P& v, const P& c, const P& s) {
                              const std::size_t i = static_cast<std::size_t>(square);
-                             return light_at(plan_.disc[i], v, c, s, meshes_[mesh_of_[i]]);
+                             return light_at(choices(plan_).disc[i], v, c, s, meshes_[mesh_of_[i]]);
                            });
   }
 
@@ -223,7 +224,7 @@ class BallImage final : public SampleImage<S> {
       return rays_->at_place(m.rho_um * inverse_radius_, seen.x * seen.inverse_rho, seen.y * seen.inverse_rho, m.angle,
                              mesh);
     };
-    if (plan_.disc.empty()) return by_ray(meshes_[0]);
+    if (choices(plan_).disc.empty()) return by_ray(meshes_[0]);
     P v_around, turn_around;
     place_on_disc<P>(place.x, place.y, rho_um * plain(inverse_edge_), v_around, turn_around);
     P v = v_around, turn = turn_around, square = map_.find(v, turn);

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "samples/choices.h"
 #include "samples/sphere/ball_image.h"
 #include "transport/intensity_distance.h"
 
@@ -142,7 +143,7 @@ class PointsOfSquares {
       : plan_(plan),
         optics_(ball_optics(scene, value)),
         rim_(rim),
-        within_(points_within(plan.samples, plan.sampling_bin_px)) {
+        within_(points_within(plan.means.samples, plan.means.bin_px)) {
     radius_px_ = optics_.sphere.radius_um / value(scene.view.pixel_size_um);
     edge_px_ = radius_px_ * rim.rho_max();
     share_ = std::min(
@@ -160,9 +161,9 @@ class PointsOfSquares {
       const auto at = [&](double across, double around) { return seen(q, across, around); };
       const std::array<double, 2> a = at(0, 0.5), b = at(1, 0.5), c = at(0.5, 0), d = at(0.5, 1), middle = at(0.5, 0.5);
       const double area = std::abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0]));
-      const std::size_t bin = std::min(
-          plan_.samples.size() - 1, static_cast<std::size_t>(std::hypot(middle[0], middle[1]) / plan_.sampling_bin_px));
-      points = share_ * area * square(static_cast<double>(plan_.samples[bin]));
+      const std::size_t bin = std::min(plan_.means.samples.size() - 1,
+                                       static_cast<std::size_t>(std::hypot(middle[0], middle[1]) / plan_.means.bin_px));
+      points = share_ * area * square(static_cast<double>(plan_.means.samples[bin]));
     } else {
       points = (inside(disc::v_in(q, 0)) - inside(disc::v_in(q, 1))) / disc::sectors(q.level);
       if (core_apart_) points *= beside = share_beside(q);
@@ -197,7 +198,7 @@ class PointsOfSquares {
   }
   double inside(double v) const {
     const double bin =
-        std::clamp(edge_px_ * (1 - v * v) / plan_.sampling_bin_px, 0.0, static_cast<double>(within_.size() - 1));
+        std::clamp(edge_px_ * (1 - v * v) / plan_.means.bin_px, 0.0, static_cast<double>(within_.size() - 1));
     const std::size_t i = std::min(static_cast<std::size_t>(bin), within_.size() - 2);
     return share_ * (within_[i] + (bin - static_cast<double>(i)) * (within_[i + 1] - within_[i]));
   }
@@ -269,7 +270,7 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, const Be
                             .sector = 2 * q.sector + down});
         continue;
       }
-      plan.disc.push_back(q);
+      choices(plan).disc.push_back(q);
       error = std::max(error, changes[i]);
       if (q.smooth) smooth_error = std::max(smooth_error, errors[i]);
       const double here = q.smooth ? kRays : q.points;
@@ -279,23 +280,25 @@ void plan_disc_squares(const Scene& scene, const Values<double>& value, const Be
     open = std::move(next);
   }
   plan.numerical_error = std::max(plan.numerical_error, error) + smooth_error;
-  const auto [fewest, most] = std::minmax_element(
-      plan.disc.begin(), plan.disc.end(), [](const DiscSquare& a, const DiscSquare& b) { return a.steps < b.steps; });
-  const auto smooth = std::count_if(plan.disc.begin(), plan.disc.end(), [](const DiscSquare& q) { return q.smooth; });
+  const auto [fewest, most] =
+      std::minmax_element(choices(plan).disc.begin(), choices(plan).disc.end(),
+                          [](const DiscSquare& a, const DiscSquare& b) { return a.steps < b.steps; });
+  const auto smooth =
+      std::count_if(choices(plan).disc.begin(), choices(plan).disc.end(), [](const DiscSquare& q) { return q.smooth; });
   plan.reasons.push_back(fmt::format("steps by place on the disc, as its rays need: {} to {}, {:.0f} a ray in the mean",
                                      fewest->steps, most->steps, work / std::max(rays, 1.0)));
   plan.reasons.push_back(fmt::format(
       "the droplet does not look the same from all sides of the viewing axis: {} of {} parts of the disc are smooth "
       "enough to be interpolated from {} rays each{}, elsewhere one ray a point; {:.0f} rays instead of {:.0f}",
-      smooth, plan.disc.size(), kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays,
+      smooth, choices(plan).disc.size(), kRays, smooth > 0 ? fmt::format(" (to {:.1e})", smooth_error) : "", rays,
       points_of.all()));
 }
 
 int StepsByPlace::at(double fraction, double x, double y) const {
-  if (plan_.disc.empty()) return plan_.steps;
+  if (choices(plan_).disc.empty()) return plan_.steps;
   double inverse_major;
   const double turn = disc::turn_of(x, y, inverse_major);
-  return plan_.disc[static_cast<std::size_t>(map_.find(std::sqrt(std::max(0.0, 1 - fraction)), turn))].steps;
+  return choices(plan_).disc[static_cast<std::size_t>(map_.find(std::sqrt(std::max(0.0, 1 - fraction)), turn))].steps;
 }
 
 }  // namespace birefit

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "instrument/exposure.h"
+#include "samples/choices.h"
 #include "samples/image.h"
 #include "samples/sphere/droplet.h"
 #include "transport/method.h"
@@ -61,8 +62,8 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
       edge_um_(optics_.radius_um * rim_edge(rim_, optics_)),
       inverse_edge_(inverse(edge_um_)),
       core_um_(0.0),
-      centre_panels_(plan.centre_panels),
-      rest_panels_(plan.radial_panels) {
+      centre_panels_(choices(plan).centre_panels),
+      rest_panels_(choices(plan).radial_panels) {
   symmetry_ = round_symmetry(scene, value, light_.line(), optics_.coupled());
   shell_ = optics_.director == DropletOptics<S>::Director::shell;
   if (shell_) {

@@ -5,6 +5,7 @@
 #include "medium/families/axial.h"
 #include "medium/families/radial.h"
 #include "rays/sphere_ray.h"
+#include "samples/choices.h"
 #include "samples/image.h"
 #include "samples/tables/radial_table.h"
 #include "samples/tables/round_view.h"
@@ -80,7 +81,7 @@ class DropletImage final : public SampleImage<S> {
   void set_panels(int centre, int rest) { centre_panels_ = centre, rest_panels_ = can_tabulate() ? rest : 0; }
   /// f_k at v of the part; out has number_of_terms() places.
   void terms(Part part, const S& v, S* out) const;
-  /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with plan.radial_panels > 0.
+  /// sum_k basis[k] f_k(v) as the image reads it; after tabulate(), with choices(plan).radial_panels > 0.
   S tabulated_sum(Part part, const P& v, const P* basis, const P* turned = nullptr,
                   typename RadialTable<S>::Slopes* slopes = nullptr) const {
     const RadialTable<S>& table = part == Part::centre ? centre_ : rest_;

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "samples/choices.h"
 #include "samples/curved/eikonal_image.h"
 #include "samples/kind.h"
 #include "samples/sphere/ball.h"
@@ -14,7 +15,7 @@ namespace birefit {
 template <class S>
 std::unique_ptr<SampleImage<S>> make_sphere_image(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
                                                   const BeamMaker& light) {
-  if (plan.series_reach_um > 0) return make_series_image(scene, plan, value, light);
+  if (choices(plan).series_reach_um > 0) return make_series_image(scene, plan, value, light);
   if (looks_round(std::get<Droplet>(scene.sample)))
     return plan.demand.rays == Rays::eikonal ? make_eikonal_image(scene, plan, value, light)
                                              : make_droplet_image(scene, plan, value, light);

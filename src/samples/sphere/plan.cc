@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "birefit/error.h"
+#include "samples/choices.h"
 #include "samples/curved/eikonal_image.h"
 #include "samples/pixels/pixel_plan.h"
 #include "samples/pixels/sampling.h"
@@ -39,7 +40,7 @@ double droplet_phase(const DropletOptics<double>& o, double psi) {
   });
 }
 
-/// One ray a radius instead of one a point, when that is fewer rays. plan.samples says how many those are.
+/// One ray a radius instead of one a point, when that is fewer rays. plan.means.samples says how many those are.
 void plan_radial_table(const Planning& planning, RenderPlan& plan) {
   using Image = DropletImage<Pack>;
   const Scene& scene = planning.scene;
@@ -48,8 +49,8 @@ void plan_radial_table(const Planning& planning, RenderPlan& plan) {
       std::holds_alternative<AxialDirector>(std::get<Droplet>(scene.sample).director) ? 10 * kTableShare : kTableShare;
   const double target = std::max(share * plan.demand.intensity_accuracy, 2e-11);
   // Rays were every point to have its own; of a droplet larger than the picture, its share.
-  const double disc_px = std::numbers::pi * square(static_cast<double>(plan.samples.size()) * plan.sampling_bin_px);
-  const double points = points_within(plan.samples, plan.sampling_bin_px).back() *
+  const double disc_px = std::numbers::pi * square(static_cast<double>(plan.means.samples.size()) * plan.means.bin_px);
+  const double points = points_within(plan.means.samples, plan.means.bin_px).back() *
                         std::min(1.0, scene.view.width * static_cast<double>(scene.view.height) / disc_px);
   const Values<Pack> lanes = planning.value.as<Pack>();
   const bool shell = std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director);
@@ -90,25 +91,25 @@ void plan_radial_table(const Planning& planning, RenderPlan& plan) {
     }
     return error;
   };
-  plan.radial_panels = 2;
-  plan.centre_panels = 2;
-  while ((plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints < points / 4) {
-    image.set_panels(plan.centre_panels, plan.radial_panels);
+  choices(plan).radial_panels = 2;
+  choices(plan).centre_panels = 2;
+  while ((choices(plan).radial_panels + choices(plan).centre_panels) * RadialTable<Pack>::kPoints < points / 4) {
+    image.set_panels(choices(plan).centre_panels, choices(plan).radial_panels);
     image.tabulate(Image::Wanted::picture, 1);
-    const double rest = error_of(Image::Part::rest, plan.radial_panels);
-    const double centre = error_of(Image::Part::centre, plan.centre_panels);
+    const double rest = error_of(Image::Part::rest, choices(plan).radial_panels);
+    const double centre = error_of(Image::Part::centre, choices(plan).centre_panels);
     if (rest <= target && centre <= target) {
       plan.reasons.push_back(fmt::format(
           "the droplet looks the same from all sides of the viewing axis: {} rays, one a radius, serve all pixels "
           "(interpolated to {}{})",
-          (plan.radial_panels + plan.centre_panels) * RadialTable<Pack>::kPoints, sci(std::max(rest, centre)),
-          shell ? "; the core's edge is an end of two tables" : ""));
+          (choices(plan).radial_panels + choices(plan).centre_panels) * RadialTable<Pack>::kPoints,
+          sci(std::max(rest, centre)), shell ? "; the core's edge is an end of two tables" : ""));
       return;
     }
-    if (rest > target) plan.radial_panels += std::max(1, plan.radial_panels / 4);
-    if (centre > target) plan.centre_panels += std::max(1, plan.centre_panels / 4);
+    if (rest > target) choices(plan).radial_panels += std::max(1, choices(plan).radial_panels / 4);
+    if (centre > target) choices(plan).centre_panels += std::max(1, choices(plan).centre_panels / 4);
   }
-  plan.radial_panels = 0;
+  choices(plan).radial_panels = 0;
   plan.reasons.push_back("the picture has too few pixels for a table over the radius: one ray a point");
 }
 
@@ -230,7 +231,7 @@ RenderPlan plan_ball(const Planning& planning) {
                       plan);
   else
     plan.reasons.push_back("the droplet does not look the same from all sides of the viewing axis: one ray a point");
-  plan.samples.push_back(1);  // outside
+  plan.means.samples.push_back(1);  // outside
   measure_points_of(planning, plan);
   note_rays(scene, value, o.sphere, plan);
   note_illumination(scene, value, largest_phase, plan);
@@ -272,7 +273,7 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
     return samples_for(std::max({across(first), across(first + 1), across(first + 2)}), plan.demand.intensity_accuracy);
   });
   // Outside the droplet one sample is enough.
-  plan.samples.push_back(1);
+  plan.means.samples.push_back(1);
   note_rays(scene, value, o, plan);
   note_illumination(scene, value, largest_phase, plan);
 }
@@ -301,12 +302,13 @@ RenderPlan plan_curved(const Planning& planning) {
     int panels = 1;
     double error = image.tail(part, panels);
     while (error > target && panels < kMost) error = image.tail(part, panels += (panels + 1) / 2);
-    plan.part_panels.push_back(panels);
+    choices(plan).part_panels.push_back(panels);
     left = std::max({left, error, image.table_error(part, panels)});
     radii += panels * RadialTable<Pack>::kPoints;
   }
-  plan.radial_panels =
-      plan.part_panels.empty() ? 1 : *std::max_element(plan.part_panels.begin(), plan.part_panels.end());
+  choices(plan).radial_panels = choices(plan).part_panels.empty() ? 1
+                                                                  : *std::max_element(choices(plan).part_panels.begin(),
+                                                                                      choices(plan).part_panels.end());
   plan.numerical_error = 2 * left + image.phase_error_rad();
   const std::vector<double> ends = image.ends_um();
   plan.reasons.push_back(
@@ -316,7 +318,7 @@ RenderPlan plan_curved(const Planning& planning) {
   sample_round(scene, value, o, ends.empty() ? o.radius_um : ends.back(), ends, plan);
   plan.reasons.push_back(fmt::format(
       "pixels are means over their area: up to {0} x {0} points where light jumps or fringes are finer than a pixel",
-      *std::max_element(plan.samples.begin(), plan.samples.end())));
+      *std::max_element(plan.means.samples.begin(), plan.means.samples.end())));
   return plan;
 }
 

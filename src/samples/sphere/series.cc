@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "instrument/exposure.h"
+#include "samples/choices.h"
 #include "samples/pixels/pixel_mean.h"
 #include "samples/sphere/droplet.h"
 #include "samples/tables/radial_table.h"
@@ -39,8 +40,8 @@ class SeriesImage final : public SampleImage<S> {
   using Single = typename SingleOf<S>::Type;
   SeriesImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light)
       : optics_(droplet_optics(scene, value)),
-        reach_um_(plan.series_reach_um),
-        panels_(plan.radial_panels),
+        reach_um_(choices(plan).series_reach_um),
+        panels_(choices(plan).radial_panels),
         na_(value(scene.microscope.objective_na)),
         pupil_(scene.microscope.aplanatic ? Pupil::aplanatic : Pupil::focal_plane),
         focus_um_(value.get(scene.microscope.focus_um, 0.0)),
@@ -170,28 +171,28 @@ RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<do
         "check diameter_um, or use ceiling: one_way");
   // To the farthest corner, and a tenth more: the centre may be fitted.
   const double cx = value(scene.view.center_x_px), cy = value(scene.view.center_y_px);
-  plan.series_reach_um = 1.1 * px *
-                         (2 + std::hypot(std::max(std::abs(cx), std::abs(scene.view.width - 1 - cx)),
-                                         std::max(std::abs(cy), std::abs(scene.view.height - 1 - cy))));
+  choices(plan).series_reach_um = 1.1 * px *
+                                  (2 + std::hypot(std::max(std::abs(cx), std::abs(scene.view.width - 1 - cx)),
+                                                  std::max(std::abs(cy), std::abs(scene.view.height - 1 - cy))));
   plan.reasons.push_back(
       "a sphere with a radial axis has an exact solution of Maxwell's equations, cheaper than any other wave optics: "
       "its series");
   // Intensity has no wavevector beyond twice the aperture's: panels of a few radians of that.
   const double target = std::max(1e-3 * plan.demand.intensity_accuracy, 1e-11),
-               finest = 2 * o.k0 * na * plan.series_reach_um;
+               finest = 2 * o.k0 * na * choices(plan).series_reach_um;
   double error = 0;
-  for (plan.radial_panels = std::max(2, static_cast<int>(finest / 8));;
-       plan.radial_panels += std::max(1, plan.radial_panels / 4)) {
+  for (choices(plan).radial_panels = std::max(2, static_cast<int>(finest / 8));;
+       choices(plan).radial_panels += std::max(1, choices(plan).radial_panels / 4)) {
     SeriesImage<double> image(scene, plan, value, light);
     image.tabulate(SampleImage<double>::Wanted::picture, 1);
     error = image.table_error();
-    if (error <= target || plan.radial_panels > finest) break;
+    if (error <= target || choices(plan).radial_panels > finest) break;
   }
   plan.reasons.push_back(fmt::format("its field at {} radii serves all pixels (interpolated to {:.1e})",
-                                     plan.radial_panels * RadialTable<double>::kPoints, error));
+                                     choices(plan).radial_panels * RadialTable<double>::kPoints, error));
   // Pixels on a spiral over the sphere and what the focus spreads around it; few stand for many, hence thrice the
   // worst.
-  const double over = std::min(plan.series_reach_um / 1.1,
+  const double over = std::min(choices(plan).series_reach_um / 1.1,
                                o.radius_um + 1 + std::abs(value.get(scene.microscope.focus_um, 0.0)) * na / o.n_host) /
                       px;
   const Values<Pack> lanes = value.as<Pack>();
@@ -199,8 +200,8 @@ RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<do
   image.tabulate(SampleImage<Pack>::Wanted::picture, 1);
   constexpr int kPixels = 96;
   double left = 0;
-  plan.samples = {1};
-  for (int& n = plan.samples[0];; n += n < 4 ? 1 : 2) {
+  plan.means.samples = {1};
+  for (int& n = plan.means.samples[0];; n += n < 4 ? 1 : 2) {
     left = 0;
     for (int i = 0; i < kPixels; ++i) {
       const double radius = over * (i + 0.5) / kPixels, azimuth = 2.399963 * i,
@@ -214,14 +215,15 @@ RenderPlan plan_series(const Scene& scene, const Demand& demand, const Values<do
     if (left <= 0.5 * plan.demand.intensity_accuracy || n >= 8) break;
   }
   plan.numerical_error = 2 * error + left;
-  plan.reasons.push_back(
-      fmt::format("pixel means from {0} x {0} points, measured: they are good to {1:.1e}", plan.samples[0], left));
+  plan.reasons.push_back(fmt::format("pixel means from {0} x {0} points, measured: they are good to {1:.1e}",
+                                     plan.means.samples[0], left));
   if (plan.numerical_error > plan.demand.intensity_accuracy)
     plan.warnings.push_back(fmt::format(
         "Pixels as large as these ({:.3g} um) average over so many fringes that their means are good to {:.1e} only.",
         px, plan.numerical_error));
-  const double radii = plan.radial_panels * RadialTable<double>::kPoints,
-               points = static_cast<double>(scene.view.width) * scene.view.height * plan.samples[0] * plan.samples[0];
+  const double radii = choices(plan).radial_panels * RadialTable<double>::kPoints,
+               points = static_cast<double>(scene.view.width) * scene.view.height * plan.means.samples[0] *
+                        plan.means.samples[0];
   // more radii take more orders; measured with eight lanes
   plan.cost_seconds = radii * (1e-6 + 2e-9 * radii) + 2.5e-9 * points;
   return plan;

@@ -10,6 +10,7 @@
 
 #include "core/chebyshev.h"
 #include "core/threads.h"
+#include "samples/choices.h"
 #include "samples/image.h"
 
 namespace birefit {

@@ -19,8 +19,8 @@ constexpr double kPi = std::numbers::pi;
 constexpr int kMost = 8;        ///< points per pixel side
 constexpr int kReference = 10;  ///< what they are measured against
 
-/// plan.samples by distance from the box's middle: in each of a few rings the fewest points whose means hold `target`
-/// on a few pixels. Returns the largest error left.
+/// plan.means.samples by distance from the box's middle: in each of a few rings the fewest points whose means hold
+/// `target` on a few pixels. Returns the largest error left.
 double plan_pixel_means(const Planning& planning, const VolumeOptics<double>& o, double target, RenderPlan& plan) {
   const Scene& scene = planning.scene;
   const VolumeGrid& grid = *o.grid;
@@ -64,19 +64,19 @@ double plan_pixel_means(const Planning& planning, const VolumeOptics<double>& o,
       left = std::max(left, error);
       needed[static_cast<std::size_t>(ring)] = std::max(needed[static_cast<std::size_t>(ring)], n);
     }
-  plan.sampling_center_x_px = o.center_x_px;
-  plan.sampling_center_y_px = o.center_y_px;
-  plan.sampling_bin_px = 1;
-  plan.samples.clear();
+  plan.means.center_x_px = o.center_x_px;
+  plan.means.center_y_px = o.center_y_px;
+  plan.means.bin_px = 1;
+  plan.means.samples.clear();
   for (int bin = 0; bin < static_cast<int>(std::ceil(most)) + 1; ++bin) {
     // With its neighbours: few pixels stand for a ring.
     const int ring = std::min(rings - 1, static_cast<int>((bin + 0.5) / most * rings));
     int n = bin + 2 > near_edge ? 2 : 1;  // the correction of single points looks a pixel further, beside the box
     for (int i = std::max(0, ring - 1); i <= std::min(rings - 1, ring + 1); ++i)
       n = std::max(n, needed[static_cast<std::size_t>(i)]);
-    plan.samples.push_back(n);
+    plan.means.samples.push_back(n);
   }
-  if (most >= box) plan.samples.push_back(1);  // beside the box
+  if (most >= box) plan.means.samples.push_back(1);  // beside the box
   return left;
 }
 
@@ -166,7 +166,7 @@ RenderPlan plan_volume(const Planning& planning) {
     plan.warnings.push_back(fmt::format("The {} method errs by {:.1e} here.", plan.method, effort.error));
   const double left = plan_pixel_means(planning, o, 0.5 * plan.demand.intensity_accuracy, plan);
   plan.numerical_error = effort.error + left;
-  const int most = *std::max_element(plan.samples.begin(), plan.samples.end());
+  const int most = *std::max_element(plan.means.samples.begin(), plan.means.samples.end());
   plan.reasons.push_back(
       fmt::format("pixel means from up to {0} x {0} points, measured: they are good to {1:.1e}", most, left));
   // Across the rays the extraordinary index changes by gradient / (k0 depth): such a ray turns by gradient / (k0 n) on
