@@ -30,27 +30,38 @@ Side<S> polarizer(ParameterRef azimuth_deg, ParameterRef extinction_ratio, const
   return side;
 }
 
+// Of every kind of part its phase, of what it makes of fringes, and its matrix, without common phase: a kind that lacks
+// one does not compile.
+
 template <class S>
 S phase_of(const Retarder& retarder, const S& wavelength_nm, const Values<S>& value) {
   return retarder.phase_deg ? value.radians(retarder.phase_deg)
                             : 2 * std::numbers::pi * value(retarder.retardance_nm) / wavelength_nm;
 }
-
-/// The part's matrix, without common phase.
 template <class S>
-Su2<S> matrix_of(const PolarizingPart& part, const S& wavelength_nm, const Values<S>& value) {
-  if (const auto* rotator = std::get_if<Rotator>(&part)) {
-    S s, c;
-    sin_cos(value.radians(rotator->angle_deg), s, c);
-    return {c, S(0.0), -s, S(0.0)};
-  }
-  const Retarder& retarder = std::get<Retarder>(part);
+Su2<S> matrix_of(const Retarder& retarder, const S& wavelength_nm, const Values<S>& value) {
   const S phase = phase_of(retarder, wavelength_nm, value);
   const S twice = 2.0 * (value.radians(retarder.azimuth_deg) + retarder.turned_deg * (std::numbers::pi / 180));
   S s, c, along, across;
   sin_cos(S(0.5 * phase), s, c);
   sin_cos(twice, across, along);
   return {c, s * across, S(0.0), s * along};
+}
+
+template <class S>
+S phase_of(const Rotator& rotator, const S& /*wavelength_nm*/, const Values<S>& value) {
+  return 2 * value.radians(rotator.angle_deg);
+}
+template <class S>
+Su2<S> matrix_of(const Rotator& rotator, const S& /*wavelength_nm*/, const Values<S>& value) {
+  S s, c;
+  sin_cos(value.radians(rotator.angle_deg), s, c);
+  return {c, S(0.0), -s, S(0.0)};
+}
+
+template <class S>
+Su2<S> matrix_of_part(const PolarizingPart& part, const S& wavelength_nm, const Values<S>& value) {
+  return std::visit([&](const auto& one) { return matrix_of(one, wavelength_nm, value); }, part);
 }
 
 template <class S>
@@ -84,10 +95,10 @@ Line<S>::Line(const Microscope& microscope, const Values<S>& value)
             std::none_of(microscope.before.begin(), microscope.before.end(), is_retarder) &&
             std::none_of(microscope.behind.begin(), microscope.behind.end(), is_retarder);
   const S wavelength_nm = value(microscope.wavelength_nm);
-  for (const PolarizingPart& part : microscope.before) pass(matrix_of(part, wavelength_nm, value), in_);
+  for (const PolarizingPart& part : microscope.before) pass(matrix_of_part(part, wavelength_nm, value), in_);
   // What the parts behind make of a field is let through as what their adjoints make of the analyser's is.
   for (auto part = microscope.behind.rbegin(); part != microscope.behind.rend(); ++part) {
-    const Su2<S> m = matrix_of(*part, wavelength_nm, value);
+    const Su2<S> m = matrix_of_part(*part, wavelength_nm, value);
     pass(Su2<S>{m.w, -m.x, -m.y, -m.z}, out_);
   }
 
@@ -125,10 +136,8 @@ std::vector<double> part_phases(const Microscope& microscope, const Values<doubl
   std::vector<double> phases;
   for (const auto* parts : {&microscope.before, &microscope.behind})
     for (const PolarizingPart& part : *parts)
-      if (const auto* retarder = std::get_if<Retarder>(&part))
-        phases.push_back(phase_of(*retarder, value(microscope.wavelength_nm), value));
-      else
-        phases.push_back(2 * value.radians(std::get<Rotator>(part).angle_deg));
+      phases.push_back(
+          std::visit([&](const auto& one) { return phase_of(one, value(microscope.wavelength_nm), value); }, part));
   return phases;
 }
 

@@ -23,17 +23,53 @@ Vec3<S> uniform_axis(const UniformDirector& director, const Values<S>& value) {
   return axis_from_angles<S>(value.radians(director.tilt_deg), value.radians(director.azimuth_deg));
 }
 
-/// Turned by the sample's rotation in the picture. A family of directors is its law in medium/families/ and a case
-/// here.
+template <class S, class Law>
+std::unique_ptr<Column<S>> column_of_law(Law law, bool planar) {
+  auto column = std::make_unique<LawColumn<S, Law>>(std::move(law));
+  column->planar = planar;
+  return column;
+}
+
+/// The medium of a cell by its director. A family is its law in medium/families/ and a case here; one that has none
+/// does not compile.
+template <class S>
+struct CellMedium {
+  const Values<S>& value;
+  S rotation_rad, thickness, ordinary, extraordinary;  ///< of the picture; um; permittivities
+
+  std::unique_ptr<Column<S>> operator()(const UniformDirector& uniform) const {
+    const Vec3<S> axis = rotated(uniform_axis<S>(uniform, value), rotation_rad);
+    return column_of_law<S>(UniformLaw<S>{axis, ordinary, extraordinary, thickness}, true);
+  }
+  std::unique_ptr<Column<S>> operator()(const TwistedDirector& twisted) const {
+    return column_of_law<S>(
+        TwistedLaw<S>{value.radians(twisted.azimuth_deg) + rotation_rad, value.radians(twisted.twist_deg),
+                      value.radians(twisted.pretilt_deg), ordinary, extraordinary, thickness},
+        false);
+  }
+  std::unique_ptr<Column<S>> operator()(const FreederickszDirector& field) const {
+    const CellForces<S> forces = cell_forces(field, thickness, value);
+    return column_of_law<S>(
+        FreederickszLaw<S>{make_director_profile(forces, value.memo()), value.radians(field.azimuth_deg) + rotation_rad,
+                           ordinary, extraordinary, thickness},
+        !forces.twisted);
+  }
+  std::unique_ptr<Column<S>> operator()(const HelixDirector& helix) const {
+    const S azimuth = value.radians(helix.azimuth_deg) + rotation_rad, pitch = value(helix.pitch_um);
+    if (helix.modulus)
+      return column_of_law<S>(
+          UnwoundHelixLaw<S>(pitch, azimuth, value(helix.modulus), ordinary, extraordinary, thickness), false);
+    return column_of_law<S>(
+        TwistedLaw<S>{azimuth, (2 * std::numbers::pi) * thickness / pitch, S(0.0), ordinary, extraordinary, thickness},
+        false);
+  }
+};
+
+/// Turned by the sample's rotation in the picture.
 template <class S>
 std::unique_ptr<Column<S>> make_planar_column(const Scene& scene, const Values<S>& value) {
   const Sample& sample = scene.sample;
   const S rotation_rad = value.radians(scene.view.rotation_deg), wavelength = wavelength_um(scene, value);
-  const auto make = [](auto law, bool planar) -> std::unique_ptr<Column<S>> {
-    auto column = std::make_unique<LawColumn<S, decltype(law)>>(std::move(law));
-    column->planar = planar;
-    return column;
-  };
   if (const auto* slab = std::get_if<Slab>(&sample)) {
     auto table = std::make_shared<const ProfileTable>(slab->profile);
     auto column = std::make_unique<LawColumn<S, ProfileLaw<S>>>(ProfileLaw<S>{table});
@@ -44,27 +80,8 @@ std::unique_ptr<Column<S>> make_planar_column(const Scene& scene, const Values<S
   }
   const Indices<S> n = material_indices<S>(scene.material, value, wavelength);
   const S eo = n.ordinary * n.ordinary, ee = n.extraordinary * n.extraordinary;
-  if (const auto* cell = std::get_if<Cell>(&sample)) {
-    const S thickness = value(cell->thickness_um);
-    if (const auto* uniform = std::get_if<UniformDirector>(&cell->director))
-      return make(UniformLaw<S>{rotated(uniform_axis<S>(*uniform, value), rotation_rad), eo, ee, thickness}, true);
-    if (const auto* field = std::get_if<FreederickszDirector>(&cell->director)) {
-      const CellForces<S> forces = cell_forces(*field, thickness, value);
-      return make(FreederickszLaw<S>{make_director_profile(forces, value.memo()),
-                                     value.radians(field->azimuth_deg) + rotation_rad, eo, ee, thickness},
-                  !forces.twisted);
-    }
-    if (const auto* helix = std::get_if<HelixDirector>(&cell->director)) {
-      const S azimuth = value.radians(helix->azimuth_deg) + rotation_rad, pitch = value(helix->pitch_um);
-      if (helix->modulus)
-        return make(UnwoundHelixLaw<S>(pitch, azimuth, value(helix->modulus), eo, ee, thickness), false);
-      return make(TwistedLaw<S>{azimuth, (2 * std::numbers::pi) * thickness / pitch, S(0.0), eo, ee, thickness}, false);
-    }
-    const auto& twisted = std::get<TwistedDirector>(cell->director);
-    return make(TwistedLaw<S>{value.radians(twisted.azimuth_deg) + rotation_rad, value.radians(twisted.twist_deg),
-                              value.radians(twisted.pretilt_deg), eo, ee, thickness},
-                false);
-  }
+  if (const auto* cell = std::get_if<Cell>(&sample))
+    return std::visit(CellMedium<S>{value, rotation_rad, value(cell->thickness_um), eo, ee}, cell->director);
   const Plate& plate = std::get<Plate>(sample);
   const S thickness = value(plate.thickness_um);
   const Vec3<S> axis = rotated(uniform_axis<S>(plate.director, value), rotation_rad);
@@ -80,9 +97,10 @@ std::unique_ptr<Column<S>> make_planar_column(const Scene& scene, const Values<S
                                                         inverse(thickness * thickness) * 1e6;
   }
   if (const auto* law = std::get_if<LawIndices>(&scene.material); heat && law)
-    return make(HeatedNematicLaw<S>{axis, profile, thickness, nematic_law<S>(*law, value, wavelength)}, true);
-  if (heat) return make(HeatedLaw<S>{axis, profile, thickness}, true);
-  return make(UniformLaw<S>{axis, eo, ee, thickness}, true);
+    return column_of_law<S>(HeatedNematicLaw<S>{axis, profile, thickness, nematic_law<S>(*law, value, wavelength)},
+                            true);
+  if (heat) return column_of_law<S>(HeatedLaw<S>{axis, profile, thickness}, true);
+  return column_of_law<S>(UniformLaw<S>{axis, eo, ee, thickness}, true);
 }
 
 }  // namespace birefit
