@@ -8,6 +8,7 @@
 // kKey: its kind in the config.
 
 #include <array>
+#include <variant>
 
 #include "birefit/number_spec.h"
 #include "birefit/parameters.h"
@@ -186,5 +187,9 @@ struct ShellDirector {
                  "not given: the surround's. Of straight rays it only judges what refraction at the core would change");
   }
 };
+
+/// The families that a droplet and a cell may have.
+using DropletDirector = std::variant<RadialDirector, AxialDirector, BipolarDirector, ShellDirector>;
+using CellDirector = std::variant<UniformDirector, TwistedDirector, FreederickszDirector, HelixDirector>;
 
 }  // namespace birefit

@@ -13,7 +13,7 @@ namespace birefit {
 /// Spherical droplet or shell in an isotropic host; refraction at the sphere, focus on the mid plane.
 struct Droplet {
   ParameterRef diameter_um;
-  std::variant<RadialDirector, AxialDirector, BipolarDirector, ShellDirector> director;
+  DropletDirector director;
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
@@ -25,7 +25,7 @@ struct Droplet {
 /// Plane-parallel cell, seen along its normal.
 struct Cell {
   ParameterRef thickness_um;
-  std::variant<UniformDirector, TwistedDirector, FreederickszDirector, HelixDirector> director;
+  CellDirector director;
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
