@@ -327,6 +327,17 @@ TEST(ScanInAFit, FindsValleysAcrossTheGrid) {
   for (const int problem : {90, 485}) EXPECT_EQ(solve(family("TwistedCell"), 1, problem).undecided, 1) << problem;
 }
 
+// What counts a truth as named must be able to say no: between two minima that are as good as each other lies a ridge.
+TEST(OneValley, IsNotWhereTwoMinimaLieApart) {
+  for (const int problem : {90, 485}) {
+    RandomProblem p = draw(family("TwistedCell"), problem);
+    const Posed posed = pose(p, "TwistedCell", Ceiling::one_way);
+    const FitResult found = fit(posed.job);
+    ASSERT_FALSE(found.rivals.empty()) << problem;
+    EXPECT_FALSE(in_one_valley(p, posed, found, found.theta, found.rivals.front().theta)) << problem;
+  }
+}
+
 // Two valleys as good as each other: by plans a third of the noise of a frame's mean off, one of them was no minimum.
 TEST(ScanInAFit, IsMadeByPlansFinerThanTheMeanOfAFrame) {
   const Count count = solve(family("TwistedCell"), 1, 476);
