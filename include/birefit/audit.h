@@ -23,12 +23,15 @@ struct AuditFit {
   /// The departure is of a stated number, by more than two of its standard deviations, and the pictures told nothing of
   /// it (a plain answer, the number not fitted): what leaves no trace cannot be found.
   bool apart = false;
+  /// One searched parameter, in its unit: what the picture was made with, the estimate, its 95 % interval.
   struct Of {
     std::string name;
     double truth = 0, value = 0, low = 0, high = 0;
+    /// The interval has the truth.
     bool holds() const { return low <= truth && truth <= high; }
     /// Between which 95 % of the draws from the posterior lie, where the job asks for draws (FitOptions::samples).
     std::optional<std::array<double, 2>> drawn;
+    /// There are draws, and their interval has the truth.
     bool drawn_holds() const { return drawn && (*drawn)[0] <= truth && truth <= (*drawn)[1]; }
     /// Half-widths of the interval by which the value is off.
     double off() const;
@@ -36,6 +39,7 @@ struct AuditFit {
   std::vector<Of> parameters;  ///< searched ones, where answered
 };
 
+/// How many pictures, and which.
 struct AuditOptions {
   int problems = 1;  ///< of every departure and size; three times as many of "none"
   std::uint64_t seed = 1;
@@ -50,22 +54,25 @@ struct AuditOptions {
 /// job is interrupted. Throws UserError where a departure that is asked for does not apply, and of jobs with a joint
 /// prior or tables of other than intensities.
 std::vector<AuditFit> audit(const FitJob& job, const AuditOptions& options);
-/// The departures that apply to a job, in their order, and their three sizes in words.
+/// A departure in words: its name in AuditOptions::departures, what it is, its three sizes.
 struct DepartureWords {
   std::string name, what;
   std::array<std::string, 3> amounts;
 };
+/// The departures that apply to a job, in the order in which audit() takes them.
 std::vector<DepartureWords> departures_of(const FitJob& job);
 
 /// Of one departure and size, without those apart.
 struct AuditRow {
   std::string departure, amount;
+  /// Pictures (problems), of which so many have an answer, so many of these with misfit; and those apart.
   int size = 0, problems = 0, answers = 0, with_misfit = 0, apart = 0;
-  int intervals = 0, held = 0;
+  int intervals = 0, held = 0;    ///< of the answers: one for every searched parameter, and those that hold
   int drawn = 0, drawn_held = 0;  ///< of those with draws, by the draws' own
   double width = 0;  ///< median half-width over that of the same sample as stated; not a number without those
   double worst = 0;  ///< half-widths by which an estimate of an answer is off
 };
+/// A row for every departure and size among the fits, in their order.
 std::vector<AuditRow> tally(const std::vector<AuditFit>& fits);
 
 }  // namespace birefit

@@ -22,6 +22,7 @@ enum class Ceiling {
 /// optics; has_curved_rays in render.h). What follows from the choice: docs/methods.md.
 enum class Rays { straight, eikonal };
 
+/// By which physics, how exactly and by which method a scene is computed; the defaults are those of a config.
 struct Demand {
   Ceiling ceiling = Ceiling::one_way;
   Rays rays = Rays::straight;        ///< without meaning under Ceiling::wave

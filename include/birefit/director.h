@@ -53,6 +53,7 @@ struct TwistedDirector {
 /// else.
 struct FreederickszDirector {
   static constexpr const char* kKey = "freedericksz";
+  /// What both faces do to the director there.
   enum class Anchoring {
     planar,       ///< tilt = pretilt at both faces
     homeotropic,  ///< tilt = 90 degrees - pretilt at both faces; eps_par <= eps_perp

@@ -30,9 +30,13 @@ std::string to_string(const Problem& problem);
 /// One or more mistakes of the user's; what() is all of them, one line each.
 class UserError : public std::exception {
  public:
+  /// Of at least one problem.
   explicit UserError(std::vector<Problem> problems);
+  /// Of the one problem that these make.
   UserError(Where where, std::string what, std::string hint = {});
+  /// What it was made of, in that order.
   const std::vector<Problem>& problems() const { return problems_; }
+  /// All problems as to_string() has them, one line each.
   const char* what() const noexcept override { return text_.c_str(); }
 
  private:
@@ -43,9 +47,13 @@ class UserError : public std::exception {
 /// Collects mistakes until the whole input has been read.
 class Problems {
  public:
+  /// One more, of these parts (Problem).
   void add(Where where, std::string what, std::string hint = {});
+  /// All of an error that was caught.
   void add(const UserError& error);
+  /// Nothing was collected.
   bool empty() const { return problems_.empty(); }
+  /// In the order in which they were added.
   const std::vector<Problem>& all() const { return problems_; }
   /// Throws UserError with everything collected so far, if there is anything.
   void throw_if_any() const;

@@ -16,18 +16,20 @@
 #include "birefit/render.h"
 #include "birefit/scene.h"
 
+/// Polarized micrographs: what they would look like, and what they say about their samples.
 namespace birefit {
 
+/// How hard a fit tries, and what it may decide by itself.
 struct FitOptions {
-  int threads = 0;  ///< 0 = all cores
-  int max_iterations = 100;
-  int scan_pixels = 4000;  ///< at most, of the coarse scan, spread over all micrographs
+  int threads = 0;           ///< 0 = all cores
+  int max_iterations = 100;  ///< of the solver, from each start
+  int scan_pixels = 4000;    ///< at most, of the coarse scan, spread over all micrographs
   /// starts polished after the scan, of four times as many looked at; more where the image is described badly
   int scan_candidates = 12;
   bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
   /// Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
   bool choose_waves = false;
-  double max_seconds = 60;
+  double max_seconds = 60;  ///< see choose_waves
   /// Nobody will read the errors: what is stated and what pictures depart by is taken as exact.
   bool values_only = false;
   int samples = 0;           ///< draws from the posterior, for FitResult::samples
@@ -43,6 +45,7 @@ struct SampleBranch {
   std::vector<int> idle;        ///< parameters that this branch does not have
 };
 
+/// What is fitted to what: all that fit() needs, no files.
 struct FitJob {
   ParameterTable parameters;
   std::vector<Measurement> measurements;
@@ -57,16 +60,17 @@ struct FitJob {
   std::vector<std::string> taken_as_exact;
 };
 
+/// What a fit says of one free parameter; all numbers in its unit.
 struct ParameterEstimate {
   std::string name, unit;
   double value = 0, stderr_ = 0;                   ///< standard error; NaN when not identifiable
   double interval95_low = 0, interval95_high = 0;  ///< Student t with FitResult::interval_degrees_of_freedom
   /// interval95 is where the profile likelihood falls as far: value +- t stderr is not that place here
   bool profiled = false;
-  double start = 0, lower = 0, upper = 0;
+  double start = 0, lower = 0, upper = 0;  ///< where the fit began, and the bounds it had
   std::optional<double> prior_value, prior_sd;
-  bool at_bound = false;
-  bool linear = false;
+  bool at_bound = false;  ///< the estimate is one of the bounds
+  bool linear = false;    ///< see Parameter
   /// "" or, at a physical limit, "upper" / "lower": the one-sided 95 % limit is in limit_value.
   std::string limit;
   double limit_value = 0;
@@ -175,9 +179,10 @@ struct ScanTrace {
   std::vector<double> value, chi_square;
 };
 
+/// A step of the solver (for the report).
 struct Iteration {
   int number = 0;
-  double chi_square = 0, step = 0;
+  double chi_square = 0, step = 0;  ///< step: its norm, as Ceres states it
 };
 
 /// The objective with one parameter held and all others at their best (for the report's chart).
@@ -192,6 +197,7 @@ struct Coverage {
   bool of_residuals = false;  ///< the simulated noise is the fit's residual, drawn in blocks; else the noise model's
   int answered = 0;           ///< fits with an answer; the others said that they have none
   int wrong = 0;              ///< answered, with a searched parameter more than 5 standard errors off: what must not be
+  /// How the intervals of one searched parameter did.
   struct Of {
     std::string name;
     /// fractions of the answered fits whose interval holds the value simulated with
@@ -208,6 +214,7 @@ struct Samples {
   double autocorrelation = 1;  ///< integrated, of the slowest parameter, in steps of every walker
   double effective = 0;        ///< so many independent draws tell as much of that parameter
   double accepted = 1;         ///< share of the proposals
+  /// The draws of one parameter, in its unit.
   struct Of {
     std::string name;
     double median = 0, low = 0, high = 0;  ///< 2.5 and 97.5 % of the draws lie below
@@ -215,12 +222,13 @@ struct Samples {
   std::vector<Of> parameters;
 };
 
+/// What a fit found, how well it knows it, and whether it is an answer at all. A fit without an answer is no error.
 struct FitResult {
-  bool converged = false;
-  bool interrupted = false;
-  bool ambiguous = false;
-  bool identifiable = true;
-  bool pinned = false;  ///< at a bound that is no physical limit
+  bool converged = false;    ///< the solver ended at a minimum
+  bool interrupted = false;  ///< ended early by FitOptions::interrupted, with the best state so far
+  bool ambiguous = false;    ///< by a rival that counts, or a branch with odds above kAmbiguousOdds
+  bool identifiable = true;  ///< the images determine every searched parameter, alone and in combination
+  bool pinned = false;       ///< at a bound that is no physical limit
   /// false: the model leaves more than half of what the images show beyond their noise; or, of one picture of a droplet
   /// or shell, misses so much that its values are worth little (docs/methods.md, "Nearly the model")
   bool described = true;
@@ -236,9 +244,9 @@ struct FitResult {
   Eigen::MatrixXd stated_covariance;  ///< the part of it by what is stated: in common to all fits that state the same
   /// "white noise" | "scaled by reduced chi-square" | "clustered by image" | ..., in words
   std::string covariance_kind;
-  double interval_degrees_of_freedom = 0;  ///< of the t quantile behind interval95
-  double chi_square = 0, reduced_chi_square = 0;
-  int degrees_of_freedom = 0;
+  double interval_degrees_of_freedom = 0;         ///< of the t quantile behind interval95
+  double chi_square = 0, reduced_chi_square = 0;  ///< of values and priors; reduced: over degrees_of_freedom
+  int degrees_of_freedom = 0;                     ///< values that were used and priors, less the free parameters
   std::optional<JointPrior::FrameScatter> frame_scatter;  ///< several images in one fit
   /// ln of the share of the bounds that the answer takes up: its highest likelihood times this share is the branch's
   /// evidence
@@ -261,8 +269,8 @@ struct FitResult {
   std::optional<Coverage> coverage;    ///< filled by whoever asked for measure_coverage()
   std::optional<Samples> samples;      ///< where draws were asked for and the parameters have a posterior
   std::vector<Iteration> iterations;
-  int evaluations = 0;
-  double seconds = 0;
+  int evaluations = 0;                ///< of the model, all images together
+  double seconds = 0;                 ///< of wall time
   std::vector<std::string> warnings;  ///< sentences; empty when there is nothing to warn of
   /// sentences: what the model takes for granted wherever such a sample is fitted so
   std::vector<std::string> taken_as_exact;

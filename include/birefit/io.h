@@ -39,6 +39,7 @@ struct Config {
   std::string fingerprint;
 };
 
+/// What a config is read for, which decides what it has to have.
 enum class ConfigUse {
   fit,     ///< images are required and loaded, `fit: auto` starts come from them
   render,  ///< images are not loaded; the view comes from image_size_px or from the image's header
@@ -60,6 +61,7 @@ Config load_config_text(std::string text, const std::filesystem::path& name, Con
 
 // ---- images ---------------------------------------------------------------------------------------------------------
 
+/// Which samples of which file load_image() reads.
 struct ImageRequest {
   std::filesystem::path path;
   std::optional<int> page;  ///< of a multi-page file; required when there are several
@@ -71,6 +73,7 @@ struct ImageRequest {
   std::optional<PixelRect> region = {};
 };
 
+/// What load_image() read, and what the file says of it.
 struct LoadedImage {
   Image values;                ///< as stored: counts for integers, values for floats; linear light not yet applied
   int width = 0, height = 0;   ///< of the file's image
@@ -102,6 +105,7 @@ std::vector<unsigned char> encode_png(const std::vector<unsigned char>& samples,
 /// name. Throws UserError (unwritable, disk full).
 void write_file(const std::filesystem::path& path, const std::string& content);
 
+/// Numbers under names: every row has one for each column.
 struct Table {
   std::vector<std::string> columns;
   std::vector<std::vector<double>> rows;
@@ -111,6 +115,7 @@ Table load_table(const std::filesystem::path& path, Where where);
 
 // ---- start values from the image ------------------------------------------------------------------------------------
 
+/// Where a round object is: places as docs/conventions.md counts them, pixel centres integers.
 struct DiscGuess {
   double center_x_px = 0, center_y_px = 0, radius_px = 0;
   double contrast = 0;  ///< signal of the disc over the background's noise; below about 3 there is no disc to see
@@ -125,7 +130,9 @@ DiscGuess find_disc(const Image& values, const Mask& mask);
 /// away.
 void write_results(const std::filesystem::path& folder, const Config& config, const FitResult& result,
                    const std::vector<std::string>& picture_formats = {".tif"});
+/// The content of fit.json (docs/fit_json.md).
 std::string fit_json(const Config& config, const FitResult& result);
+/// The content of report.html: one page that asks for nothing from elsewhere.
 std::string report_html(const Config& config, const FitResult& result);
 /// The short human summary for stdout.
 std::string summary(const FitResult& result);

@@ -43,6 +43,7 @@ struct E44Steinberg2020 {
 /// The index of one ray against wavelength: a formula of refractiveindex.info by its number there, or a table.
 /// Wavelengths in um, vacuum; holds from lower_um to upper_um only (docs/methods.md, "Materials").
 struct Dispersion {
+  /// Formulas 1 to 9 by their number at refractiveindex.info, and a table, linear in between.
   enum class Form {
     sellmeier = 1,
     sellmeier_2,
@@ -59,6 +60,7 @@ struct Dispersion {
   std::vector<double> coefficients;          ///< C1, C2, ..; exponents among them
   std::vector<ParameterRef> refs;            ///< empty, or as many: those given stand in for their coefficient
   std::vector<double> wavelength_um, index;  ///< of a table: growing, at least two
+  /// Where it holds, vacuum wavelengths in um.
   double lower_um = 0, upper_um = 0;
 
   template <class Self, class Visit>
@@ -81,6 +83,7 @@ struct DispersiveIndices {
 /// n_e = A - B T + 2/3 dn0 (1 - T/Tc)^b, n_o = A - B T - 1/3 dn0 (1 - T/Tc)^b (Li, Gauza, Wu 2004). Several sets: their
 /// numbers are interpolated in 1/wavelength^2 between the wavelengths they were fitted at.
 struct FourParameterIndices {
+  /// The numbers of the law at one wavelength.
   struct Set {
     double wavelength_um = 0;       ///< 0: a single set, for the scene's wavelength
     ParameterRef mean_index;        ///< A
@@ -142,6 +145,7 @@ struct LawIndices {
   }
 };
 
+/// What the anisotropic part of a sample is made of.
 using Material = std::variant<ConstantIndices, E44Steinberg2020, LawIndices>;
 
 }  // namespace birefit

@@ -38,6 +38,7 @@ struct UnevenLight {
 /// What lenses, cameras and resampling do to a picture beside gain and offset: `coefficient`, in units of the values
 /// per unit of the effect, times how the model's light changes by it.
 struct PictureEffect {
+  /// What it is, with the unit of the effect.
   enum class Kind {
     blur,              ///< by its variance (px^2); < 0: sharpened
     gamma,             ///< light to the power of 1 + gamma, of the brightest
@@ -78,6 +79,7 @@ struct Readings {
   std::optional<NoiseModel> noise;  ///< in units of the values; needed where rows are measurements of their own
 };
 
+/// What one gain and offset belong to.
 using Measurement = std::variant<Picture, Readings>;
 
 /// Calls what(scene) for every scene of measurements.

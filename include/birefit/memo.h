@@ -16,6 +16,7 @@ namespace birefit {
 template <class Key, class Value>
 class Recent {
  public:
+  /// Keeps at most `most` values; beyond that the one goes that was kept first.
   explicit Recent(std::size_t most) : most_(most) {}
   /// Null where it is not, or no longer, known.
   std::shared_ptr<const Value> find(const Key& key) const {
@@ -51,6 +52,7 @@ class Memo {
   Memo(const Memo&) = delete;
   Memo& operator=(const Memo&) = delete;
 
+  /// The one store of this type, made by its default constructor when it is first asked for; lives as long as the Memo.
   template <class Store>
   Store& of() {
     const std::lock_guard lock(guard_);

@@ -18,6 +18,8 @@ struct Direction {
 /// A lossless plate between a polarizer and the sample: the field along its slow axis is behind the other by the phase.
 struct Retarder {
   static constexpr const char* kKey = "retarder";
+  /// Either of phase (at the light's wavelength) and retardance (the same at all wavelengths), and the azimuth of the
+  /// slow axis from +x.
   ParameterRef phase_deg, retardance_nm, azimuth_deg;
   double turned_deg = 0;  ///< added to the azimuth: of a plate that is mounted at an angle to a polarizer
 
@@ -41,8 +43,10 @@ struct Rotator {
                  "by which it turns the polarization, counter-clockwise");
   }
 };
+/// What light meets between a polarizer and the sample.
 using PolarizingPart = std::variant<Retarder, Rotator>;
 
+/// Light, polarizers and lenses, from the lamp to the camera; azimuths from +x, counter-clockwise in the image.
 struct Microscope {
   ParameterRef wavelength_nm;  ///< vacuum
   ParameterRef polarizer_deg;  ///< not given: none, the light that comes in is unpolarized

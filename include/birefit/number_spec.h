@@ -26,10 +26,12 @@ struct NumberSpec {
   bool optional = false;                                           ///< not given: an empty reference
   Uncertainty known_to;                                            ///< where it is stated without another
 
+  /// The range has the value; a limit that is open is no part of it.
   bool contains(double value) const {
     return (lower_open ? value > lower : value >= lower) && (upper_open ? value < upper : value <= upper);
   }
 
+  /// Has this value where it is not given.
   NumberSpec or_else(double value) const {
     NumberSpec spec = *this;
     spec.fallback = value;
@@ -53,12 +55,13 @@ struct NumberSpec {
     spec.percent = true;
     return spec;
   }
-  /// Nobody knows it better unless he says so.
+  /// Nobody knows it better than to this standard deviation, in its unit, unless he says so.
   NumberSpec known_within(double sd) const {
     NumberSpec spec = *this;
     spec.known_to.sd = sd;
     return spec;
   }
+  /// The same as a share of its value.
   NumberSpec known_within_share(double share) const {
     NumberSpec spec = *this;
     spec.known_to.share = share;
@@ -72,22 +75,28 @@ struct NumberSpec {
   }
 };
 
+/// The kinds of numbers that scenes have, to be narrowed by what NumberSpec offers.
 namespace numbers {
 
+/// From lower to upper, both limits allowed.
 inline NumberSpec within(double lower, double upper, const char* unit = "") {
   NumberSpec spec;
   spec.unit = unit, spec.lower = lower, spec.upper = upper;
   return spec;
 }
+/// Above 0, at most `upper`.
 inline NumberSpec positive(double upper, const char* unit = "") {
   NumberSpec spec = within(0, upper, unit);
   spec.lower_open = true;
   return spec;
 }
+/// A length in um, above 0, which is a physical limit.
 inline NumberSpec length_um(double upper) { return positive(upper, "um").physical(); }
-/// A hundred turns: more is a typing error.
+/// In degrees, up to a hundred turns: more is a typing error.
 inline NumberSpec angle() { return within(-36000, 36000, "deg"); }
+/// In degrees, within limits.
 inline NumberSpec angle(double lower, double upper) { return within(lower, upper, "deg"); }
+/// Of refraction: 1 to 4.
 inline NumberSpec index() { return within(1, 4); }
 /// Read off a mount, or off how the sample lies in it: its zero is as good.
 inline NumberSpec dial() { return angle().known_within(1); }

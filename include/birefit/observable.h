@@ -15,6 +15,7 @@ enum class Quantity {
   ring_radius_cm,    ///< of dark rings on a screen, through a plate cut normal to its axis
 };
 
+/// What is measured, and what belongs to it.
 struct Observable {
   Quantity quantity = Quantity::intensity;
   /// Of ring_radius_cm: numbers of the rings, where the retardance is 2 pi (number + Plate::ring_offset); a value each.

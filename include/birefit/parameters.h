@@ -16,7 +16,9 @@ namespace birefit {
 /// How well a number is known that is stated and not fitted: a standard deviation of so much and such a share of the
 /// value; exact where both are 0.
 struct Uncertainty {
+  /// sd in the unit of the value, share of its magnitude; both >= 0.
   double sd = 0, share = 0;
+  /// The standard deviation of a number with this value, in its unit.
   double of(double value) const { return sd + share * (value < 0 ? -value : value); }
 };
 
@@ -44,15 +46,17 @@ struct Parameter {
   Where where;  ///< where the config gives it
 };
 
+/// Values of a whole ParameterTable, in its order and each in its unit.
 using Theta = std::vector<double>;
 
 /// Index into a ParameterTable. Default-constructed = "not given" (the scene part documents what that means).
 struct ParameterRef {
-  int index = -1;
+  int index = -1;  ///< from 0; < 0: not given
   /// The scene has times * parameter + plus: places are stated in the pixels of a file, of which a picture may have a
   /// part, or means of several.
   double times = 1, plus = 0;
 
+  /// It is given.
   explicit operator bool() const { return index >= 0; }
   /// The same parameter, whatever the scene makes of it.
   friend bool operator==(ParameterRef a, ParameterRef b) { return a.index == b.index; }
@@ -64,18 +68,26 @@ struct ParameterRef {
   ParameterRef seen(double by, double more) const { return {index, by * times, by * plus + more}; }
 };
 
+/// The numbers of a job, each known by its index, which stays as others are added, and by its name.
 class ParameterTable {
  public:
+  /// Appends an entry and returns its place; of entries with one name find() has the first.
   ParameterRef add(Parameter parameter);
   /// A number that is fixed and has no config path of its own (defaults).
   ParameterRef add_constant(std::string name, double value, std::string unit = {});
 
+  /// Entries, constants among them.
   int size() const { return static_cast<int>(parameters_.size()); }
+  /// The entry referred to; throws std::out_of_range where the reference is empty or not of this table.
   Parameter& operator[](ParameterRef ref) { return parameters_.at(ref.index); }
+  /// The same, to read.
   const Parameter& operator[](ParameterRef ref) const { return parameters_.at(ref.index); }
+  /// The entry at an index from 0; throws std::out_of_range beyond the table.
   Parameter& operator[](int index) { return parameters_.at(index); }
+  /// The same, to read.
   const Parameter& operator[](int index) const { return parameters_.at(index); }
   ParameterRef find(const std::string& name) const;  ///< empty when absent
+  /// Parameter::value of every entry: what a render starts from.
   Theta values() const;
 
  private:
@@ -86,7 +98,7 @@ class ParameterTable {
 struct JointPrior {
   std::string source;              ///< file it came from, for the report
   std::vector<std::string> names;  ///< parameters of this fit, in the order of mean and covariance
-  Eigen::VectorXd mean;
+  Eigen::VectorXd mean;            ///< in the parameters' own units, as is the covariance
   Eigen::MatrixXd covariance;
   double degrees_of_freedom = std::numeric_limits<double>::infinity();  ///< of the fit that made it: Student t
   /// What one whole frame is off by, as the earlier fit measured it between its frames (FitResult::frame_scatter);

@@ -59,6 +59,7 @@ struct RenderPlan {
   std::shared_ptr<const WavePlan> wave;
 };
 
+/// A picture of a scene's view and how it depends on parameters.
 struct Rendering {
   Image intensity;                 ///< flux behind the analyser over flux behind the polarizer, per pixel
   std::vector<Image> derivatives;  ///< d intensity / d theta[active[j]]
@@ -66,9 +67,9 @@ struct Rendering {
 
 /// One row of the `jones` table: complex transmission in the s, p basis of docs/conventions.md.
 struct JonesRow {
-  double theta_deg = 0, azimuth_deg = 0;  ///< slab scenes
-  int row = 0, column = 0;                ///< others
-  double wavelength_nm = 0;
+  double theta_deg = 0, azimuth_deg = 0;        ///< slab scenes
+  int row = 0, column = 0;                      ///< others
+  double wavelength_nm = 0;                     ///< vacuum
   std::complex<double> ss{}, ps{}, sp{}, pp{};  ///< ps: p in, s out
 };
 }  // namespace birefit

@@ -49,6 +49,7 @@ struct WaveChoice {
   bool series = false;          ///< by the exact series
   std::string words;            ///< a sentence: how long, or why not
 };
+/// The cost of Ceiling::wave for the scene at theta, whatever ceiling and rays `demand` names.
 WaveChoice wave_choice(const Scene& scene, Demand demand, const Theta& theta);
 
 /// Renders scene.view; every pixel is the mean over its area. `active` lists theta indices to differentiate by (angles
@@ -59,11 +60,12 @@ Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta,
 void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
             Rendering& into);
 
-/// The same at chosen pixels only (column, row pairs): value[i], derivative(i, j). Used by the coarse scan.
+/// What render_pixels() returns.
 struct PixelRendering {
-  Eigen::VectorXd intensity;
-  Eigen::MatrixXd derivatives;
+  Eigen::VectorXd intensity;    ///< one a pixel, as Rendering::intensity
+  Eigen::MatrixXd derivatives;  ///< (i, j): d intensity[i] / d theta[active[j]]
 };
+/// The same as render() at chosen pixels only, (column, row) pairs, in their order. Used by the coarse scan.
 PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
                              const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active = {},
                              int threads = 0);

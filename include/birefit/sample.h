@@ -120,13 +120,18 @@ struct Crystal {
 
 /// Arbitrary depth profile (profile.csv of docs/configuration.md).
 struct SlabProfile {
+  /// constant: a row is a layer; else rows are nodes, between them straight lines or a natural cubic spline.
   enum class Interpolation { constant, linear, cubic };
+  /// Depth below the entry face (um; constant: of the layer's lower face; nodes: the first at 0), optic axis, and
+  /// indices n + i k of both rays.
   struct Row {
     double depth_um, ax, ay, az, n_o, n_e, k_o, k_e;
   };
   std::vector<Row> rows;  ///< axis normalised; at least 1 (constant) or 2 (linear), 4 (cubic)
   Interpolation interpolation = Interpolation::constant;
 };
+
+/// Any stratified slab; its profile is known.
 struct Slab {
   SlabProfile profile;
   /// of a converging cone in the outside medium, (0, 80]; none: the microscope's directions
@@ -189,6 +194,7 @@ struct SampledVolume {
   }
 };
 
+/// Kinds of samples.
 using Sample = std::variant<Droplet, Cell, Plate, Crystal, Slab, StressedDisc, SampledVolume>;
 
 }  // namespace birefit

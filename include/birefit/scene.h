@@ -37,18 +37,21 @@ struct FilePixels {
 
 /// How pixels lie on the sample.
 struct View {
-  int width = 0, height = 0;
-  FilePixels file;
+  int width = 0, height = 0;   ///< pixels of the picture
+  FilePixels file;             ///< where these are in the file's image
   ParameterRef pixel_size_um;  ///< on the sample; none for conoscopic plates, cells and crystals, which need none
   ParameterRef center_x_px;    ///< sample centre; pixel centres are integers, (0, 0) the top left pixel's
   ParameterRef center_y_px;
   ParameterRef rotation_deg;         ///< of the sample, counter-clockwise as seen in the image
   std::optional<SideCamera> camera;  ///< of plates and slabs in a cone; none: it looks along the cone's axis
 
-  /// Of the file's whole image, in the view's pixels: its sides, the place of its middle.
+  /// Width of the file's whole image, in the view's pixels.
   double whole_width() const { return file.width > 0 ? static_cast<double>(file.width) / file.bin : width; }
+  /// Height of the same.
   double whole_height() const { return file.height > 0 ? static_cast<double>(file.height) / file.bin : height; }
+  /// Column of the middle of the file's whole image, in the view's pixels; may lie outside of the view.
   double middle_x() const { return 0.5 * (whole_width() - 1) - static_cast<double>(file.x0) / file.bin; }
+  /// Row of the same.
   double middle_y() const { return 0.5 * (whole_height() - 1) - static_cast<double>(file.y0) / file.bin; }
 
   template <class Self, class Visit>
@@ -64,10 +67,11 @@ struct View {
   }
 };
 
+/// Everything that decides what a picture looks like but the values of its parameters.
 struct Scene {
   Sample sample;
   Material material;
-  ParameterRef surround_index;
+  ParameterRef surround_index;                    ///< of the isotropic medium around the sample
   std::optional<Dispersion> surround_dispersion;  ///< instead of surround_index
   Microscope microscope;
   View view;

@@ -15,6 +15,7 @@ namespace birefit {
 
 /// One image, or page of a stack, and what its row of the table sets.
 struct SeriesFrame {
+  /// What stands in the table, and where.
   struct Cell {
     std::string text;
     Where where;
@@ -34,7 +35,9 @@ class FrameError : public UserError {
   using UserError::UserError;
 };
 
+/// A series as it was read and checked.
 struct ImageSeries {
+  /// A column that sets a parameter in every frame.
   struct Column {
     std::string name;  ///< a parameter's path
     Where where;
@@ -45,9 +48,9 @@ struct ImageSeries {
   std::vector<SeriesFrame> frames;   ///< by rows of the table, else by name with numbers counted as such
   std::vector<Column> columns;       ///< of the table, `file` left out
   std::optional<std::size_t> along;  ///< column to draw the estimates against, which then may be no parameter
-  std::vector<std::pair<std::string, Where>> shared;
-  std::vector<std::pair<std::string, Where>> own;  ///< of one fit of all: what each image has for itself
-  std::vector<std::string> notes;                  ///< of what was done to read the table
+  std::vector<std::pair<std::string, Where>> shared;  ///< paths of the parameters that all frames have in common
+  std::vector<std::pair<std::string, Where>> own;     ///< of one fit of all: what each image has for itself
+  std::vector<std::string> notes;                     ///< of what was done to read the table
 };
 
 /// Reads and checks a series completely, every image of it; throws UserError with every mistake found. Frames whose own
@@ -89,6 +92,8 @@ struct SeriesResult {
 
   bool has_answer() const;  ///< every frame has one and they agree on what they share
 };
+/// Combines what the frames' fits say of the shared parameters and informs each of it; `fits`: one a frame, in their
+/// order, nothing for those not fitted yet.
 SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<FitResult>> fits);
 
 /// One row a frame: file, the table's columns, every parameter with its errors, reduced chi-square, verdict, and the

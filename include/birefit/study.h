@@ -25,6 +25,7 @@ struct ChartPoint {
   double gradient_error = 0;
 };
 
+/// A scene of the chart: one ray of it, and how well its reference is known.
 struct ChartScene {
   std::string name, what;
   double reference_agreement = 0;  ///< of two methods of different order, relative, Frobenius
@@ -40,6 +41,7 @@ struct ChartFrame {
   int worst_column = 0, worst_row = 0;                            ///< the worst pixel
 };
 
+/// What measure_chart() measured.
 struct MethodChart {
   std::vector<ChartScene> scenes;
   std::vector<ChartPoint> points;
@@ -56,6 +58,7 @@ struct WavePoint {
   double seconds = 0, error = 0;
   double estimate = 0;  ///< what the planner says of it; not a number where it says nothing
 };
+/// Every model on a list of droplets; `quick` and `say` as of measure_chart().
 std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const std::string&)>& say = {});
 
 /// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.

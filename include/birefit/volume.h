@@ -17,6 +17,7 @@ struct VolumeGrid {
   std::array<double, 3> spacing_um{};
   std::vector<std::array<double, 6>> nodes;  ///< xx, yy, zz, xy, xz, yz; x runs fastest, then y
 
+  /// Index into `nodes`, each of x, y, z from 0; not checked.
   std::size_t at(int x, int y, int z) const {
     return (static_cast<std::size_t>(z) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(y)) *
                static_cast<std::size_t>(nx) +
