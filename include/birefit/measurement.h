@@ -1,6 +1,7 @@
 #pragma once
 // What was measured, in memory: pictures, and tables of readings.
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <variant>
@@ -63,6 +64,9 @@ struct Picture {
   std::vector<UnevenLight> uneven;     ///< linear as well
   std::vector<PictureEffect> effects;  ///< to first order linear as well
   std::optional<NoiseModel> noise;     ///< in counts; else estimated from the image
+  /// Where the codes of the file end and many pixels lie there, in units of the values: what was darker or brighter is
+  /// not known. Pixels whose light a fit finds that near to an end are left out; by default no end is.
+  double cut_below = -std::numeric_limits<double>::infinity(), cut_above = std::numeric_limits<double>::infinity();
   /// Pixel counts by reason, for the report.
   int masked_by_user = 0, outside_roi = 0, saturated = 0, dead = 0, non_finite = 0;
 };

@@ -9,6 +9,7 @@
 
 #include "fit/errors/catalogue.h"
 #include "fit/errors/discrepancy.h"
+#include "fit/errors/foreign.h"
 #include "fit/errors/left_out.h"
 #include "fit/errors/report.h"
 #include "fit/errors/samples.h"
@@ -23,6 +24,7 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 Optimum settle(const Task& task, Optimum optimum) {
+  optimum = with_settled_range(task, std::move(optimum));
   optimum = with_settled_weights(task, std::move(optimum));
   optimum = with_settled_plans(task, std::move(optimum));
   optimum = with_settled_outliers(task, std::move(optimum));
@@ -93,18 +95,53 @@ Outcome concluded(const Task& task, const Minima& minima, Optimum optimum, bool 
   return outcome;
 }
 
-/// Where something is left over, all that pictures are known to depart by is fitted at once.
-Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
-  if (beaten || !asks_catalogue(task, optimum)) return concluded(task, minima, std::move(optimum), beaten);
+/// A fit of fewer pixels, with the job that it is of.
+struct Narrowed {
+  explicit Narrowed(FitJob of) : job(std::move(of)), task(job) {}
+  FitJob job;
+  Task task;
+  Optimum optimum;
+};
+
+/// Without specks, or without all outside of the sphere, whichever leaves less over; nothing where neither takes a
+/// fifth off.
+std::unique_ptr<Narrowed> without_foreign(const Task& task, const Optimum& optimum, const Minima& minima) {
+  const double before = excess_of(optimum);
+  double least = std::numeric_limits<double>::infinity();
+  std::unique_ptr<Narrowed> best;
+  for (FitJob& job : narrower_jobs(task, optimum)) {
+    auto fitted = std::make_unique<Narrowed>(std::move(job));
+    fitted->optimum = settle(fitted->task, best_with_nuisances(fitted->task, task, optimum, minima));
+    if (fitted->optimum.stopped) return nullptr;
+    const double after = excess_of(fitted->optimum);
+    if (!is_worth_leaving_out(before, after) || !(after < least)) continue;
+    least = after;
+    best = std::move(fitted);
+  }
+  return best;
+}
+
+/// All that pictures are known to depart by, fitted at once.
+Outcome with_all_departures(const Task& task, const Minima& minima, Optimum optimum) {
   task.say("something is left over: what pictures depart by is fitted as well");
   const FitJob job = with_catalogue(task, optimum);
   const Task wider(job);
   Theta before = optimum.theta;
   Optimum with_all = settle(wider, best_with_nuisances(wider, task, optimum, minima));
   if (with_all.stopped || !believes_catalogue(missed_of_contrast(task, optimum), missed_of_contrast(wider, with_all)))
-    return concluded(task, minima, std::move(optimum), beaten);
+    return concluded(task, minima, std::move(optimum), false);
   with_all.came_from = std::move(before);
-  return concluded(wider, minima, std::move(with_all), beaten);
+  return concluded(wider, widened(wider, task, with_all.theta, minima), std::move(with_all), false);
+}
+
+/// Where something is left over, what is foreign to the object goes first, and then the rest is asked for its causes.
+/// `minima` are of this task.
+Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
+  if (beaten || !asks_catalogue(task, optimum)) return concluded(task, minima, std::move(optimum), beaten);
+  const std::unique_ptr<Narrowed> less = without_foreign(task, optimum, minima);
+  if (!less) return with_all_departures(task, minima, std::move(optimum));
+  if (!asks_catalogue(less->task, less->optimum)) return concluded(less->task, minima, std::move(less->optimum), false);
+  return with_all_departures(less->task, minima, std::move(less->optimum));
 }
 
 /// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
@@ -120,7 +157,8 @@ Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   const Task wider(job);
   optimum = told.better ? settle(wider, best_with_nuisances(wider, task, optimum, minima))
                         : with_settled_misfit(wider, with_nuisances_from(wider, task, std::move(optimum)));
-  return with_what_is_left(wider, minima, std::move(optimum), beaten);
+  const Minima places = widened(wider, task, optimum.theta, minima);
+  return with_what_is_left(wider, places, std::move(optimum), beaten);
 }
 
 }  // namespace

@@ -214,12 +214,21 @@ Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optim
   return optimum;
 }
 
+Minima widened(const Task& wider, const Task& narrow, const Theta& theta, Minima minima) {
+  for (Candidate& candidate : minima.scan.candidates)
+    candidate.searched = widened(wider, narrow, theta, candidate.searched);
+  return minima;
+}
+
 Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima) {
   Minima places;
   places.frames = optimum.frames;
+  for (int g = 0; g < wider.frames(); ++g)
+    std::erase_if(places.frames[static_cast<std::size_t>(g)].pixels,
+                  [&](const std::array<int, 2>& at) { return !wider.picture(g).mask(at[0], at[1]); });
   places.theta = optimum.theta;
   places.evaluations = optimum.evaluations + optimum.problem->evaluations();
-  Frames few = optimum.frames;
+  Frames few = places.frames;
   for (Frame& frame : few) {
     frame.pixels =
         subsample(frame.pixels,

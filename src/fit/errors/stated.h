@@ -47,10 +47,15 @@ std::vector<int> told_numbers(const Task& task, const Optimum& optimum);
 /// The job with these free, about what is stated, as nuisances.
 FitJob with_nuisances(const FitJob& job, const std::vector<int>& numbers);
 
+/// Places that a search of the narrow task has found, as the wider one has them: what is free there alone is as in
+/// `theta`.
+Minima widened(const Task& wider, const Task& narrow, const Theta& theta, Minima minima);
+
 /// From the optimum without them, for a few steps: errors are what changes.
 Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optimum);
-/// From all the places that a search without them has found, whose best need not be the best with them; the focus from
-/// one and two standard deviations to either side as well.
+/// From all the places that a search without them has found (`minima`, of the narrow task), whose best need not be the
+/// best with them; the focus from one and two standard deviations to either side as well. Pixels that the wider job
+/// masks are left out.
 Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima);
 
 /// With what is stated without being written: the zeros of dials that frames are read off (fit/problem/shared_zeros.h);

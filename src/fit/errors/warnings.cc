@@ -71,6 +71,19 @@ void warn_of_outliers(const Task& task, const Optimum& optimum, int g, FitResult
                              100 * std::min(1.0, theirs / excess)));
 }
 
+/// Pixels that were left out because the codes end where their light is.
+void warn_of_range(const Task& task, const Optimum& optimum, int g, FitResult& result) {
+  const Picture& picture = task.picture(g);
+  if (!std::isfinite(picture.cut_below) && !std::isfinite(picture.cut_above)) return;
+  const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+  const std::size_t all = usable_pixels(picture, frame.sigma).size(), within = pixels_in_range(task, optimum, g).size();
+  if (within == all || frame.pixels.size() > within) return;
+  warn(result,
+       fmt::format("{}: {} pixels ({:.2g} %) whose light is within three standard deviations of where its codes "
+                   "end were left out: what is left of their noise there is not centred.",
+                   picture.name, all - within, 100.0 * static_cast<double>(all - within) / static_cast<double>(all)));
+}
+
 void warn_of_misfit(const MicrographResult& micrograph, double range_of_all, double largest, FitResult& result) {
   // A uniform frame has no range of its own: then that of all frames, then its own level, is the yardstick.
   double range = micrograph.signal_range;
@@ -185,6 +198,7 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
       rows.high = std::max(rows.high, value);
       continue;
     }
+    warn_of_range(task, optimum, g, result);
     warn_of_outliers(task, optimum, g, result);
     warn_of_misfit(micrograph, high - low, high, result);
   }

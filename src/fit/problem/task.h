@@ -2,6 +2,7 @@
 // What every stage of a fit reads and none changes.
 
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,8 @@ struct Task {
   const Parameter& searched(std::size_t j) const { return job.parameters[unknowns.searched[j]]; }
   /// `searched` in the table's places.
   Theta with(Theta theta, const Eigen::VectorXd& searched) const {
+    if (searched.size() != static_cast<Eigen::Index>(unknowns.searched.size()))
+      throw std::logic_error("a place of another task");
     for (std::size_t j = 0; j < unknowns.searched.size(); ++j)
       theta[static_cast<std::size_t>(unknowns.searched[j])] = searched[static_cast<Eigen::Index>(j)];
     return theta;

@@ -10,6 +10,8 @@
 namespace birefit::estimation {
 namespace {
 
+bool is_cut(const Picture& picture) { return std::isfinite(picture.cut_below) || std::isfinite(picture.cut_above); }
+
 /// The noise of the frames whose residual is clearly quieter than their image was. True where one is.
 bool lower_noise(const Task& task, Optimum& optimum) {
   // What the image's own differences call noise may be fringes. Those of the residual may hold misfit: both are upper
@@ -31,6 +33,41 @@ bool lower_noise(const Task& task, Optimum& optimum) {
 }
 
 }  // namespace
+
+Pixels pixels_in_range(const Task& task, const Optimum& optimum, int g) {
+  const Picture& micrograph = task.picture(g);
+  const Image& sigma = optimum.frames[static_cast<std::size_t>(g)].sigma;
+  // Standard deviations of a pixel of the file: it is there that codes end.
+  const double reach_in_sigma = 3.0 * micrograph.scene.view.file.bin;
+  Pixels pixels = usable_pixels(micrograph, sigma);
+  if (!is_cut(micrograph)) return pixels;
+  const Image fitted = fitted_image(task, optimum.frames, g, optimum.theta);
+  std::erase_if(pixels, [&](const std::array<int, 2>& at) {
+    const double reach = reach_in_sigma * sigma(at[0], at[1]), value = fitted(at[0], at[1]);
+    return value < micrograph.cut_below + reach || value > micrograph.cut_above - reach;
+  });
+  return pixels;
+}
+
+Optimum with_settled_range(const Task& task, Optimum optimum) {
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds && !optimum.stopped; ++round) {
+    bool changed = false;
+    for (int g = 0; g < task.frames(); ++g) {
+      Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+      if (!is_cut(task.picture(g))) continue;
+      Pixels pixels = pixels_in_range(task, optimum, g);
+      // A fit of what is hardly seen would follow the few pixels that are left.
+      if (pixels.size() < usable_pixels(task.picture(g), frame.sigma).size() / 10 || pixels == frame.pixels) continue;
+      frame.pixels = std::move(pixels);
+      changed = true;
+    }
+    if (!changed) break;
+    rebuild(task, optimum);
+    solve_again(task, optimum, "without what the codes cut off");
+  }
+  return optimum;
+}
 
 Optimum with_settled_weights(const Task& task, Optimum optimum) {
   if (lower_noise(task, optimum)) {
@@ -93,7 +130,7 @@ Outliers outliers_of(const Task& task, const Optimum& optimum, int g) {
   const Image fitted = fitted_image(task, optimum.frames, g, optimum.theta);
   Image whitened(fitted.width(), fitted.height());
   Mask used(fitted.width(), fitted.height(), 0);
-  for (const auto& [x, y] : usable_pixels(micrograph, sigma)) {
+  for (const auto& [x, y] : pixels_in_range(task, optimum, g)) {
     used(x, y) = 1;
     whitened(x, y) = (micrograph.values(x, y) - fitted(x, y)) / sigma(x, y);
   }
@@ -108,7 +145,7 @@ bool leave_out(const Task& task, Optimum& optimum, int g, bool first_round) {
   Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
   Outliers& before = optimum.left_out[static_cast<std::size_t>(g)];
   Outliers found = outliers_of(task, optimum, g);
-  const Pixels usable = usable_pixels(micrograph, frame.sigma);
+  const Pixels usable = pixels_in_range(task, optimum, g);
   // So much cannot be dust: then the model is wrong, and leaving out what shows it would hide that.
   if (found.count > kMostOutliers * static_cast<double>(usable.size())) {
     if (first_round || before.count > 0)

@@ -9,6 +9,11 @@ namespace birefit::estimation {
 /// Part of an image that dust and scratches may cover at most.
 inline constexpr double kMostOutliers = 0.1;
 
+/// Usable pixels whose light the codes reach, by the fitted picture: within a few deviations of an end that cuts noise
+/// off, what is left of it is not centred. Chosen by the values, their noise would choose them.
+Pixels pixels_in_range(const Task& task, const Optimum& optimum, int frame);
+/// Without what is not in range.
+Optimum with_settled_range(const Task& task, Optimum optimum);
 /// The noise by the residual, where that is clearly lower, and the weights by the fitted signal: from the data
 /// themselves they pull a fit low, as bright outliers get small weights.
 Optimum with_settled_weights(const Task& task, Optimum optimum);

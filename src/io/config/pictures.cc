@@ -96,6 +96,21 @@ void take_region(const LoadedImage& image, const Image& variance_scale, const Gr
       std::lround(share * (static_cast<double>(image.width / bin) * (image.height / bin) - 1.0 * width * height)));
 }
 
+double linear(double code, const Transfer& transfer, double top_code) {
+  Image one(1, 1, code);
+  linearise(one, transfer, top_code);
+  return one(0, 0);
+}
+
+/// So many of the pixels at an end of the codes are no single hot or dead ones.
+constexpr double kManyAtAnEnd = 0.005;
+double share_of(const Mask& mask, const PixelRect& area) {
+  double count = 0;
+  for (int y = area.y0; y < area.y1; ++y)
+    for (int x = area.x0; x < area.x1; ++x) count += mask(x, y) != 0;
+  return count / std::max(1.0, static_cast<double>(area.width()) * area.height());
+}
+
 /// Values, mask and the reasons for exclusion; false when a problem left nothing to work with. Of a mosaic only the
 /// pixels of a `part`.
 bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const Calibration* calibration,
@@ -128,12 +143,17 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
   mark_saturated(image.values, saturation.from, saturated);
   const double step = smallest_step(image);
   const bool codes = image.top_code > 0 && settings.mosaic.parts.empty();
-  if (const auto cut = codes ? find_cut_end(End::lowest, image.values, area) : std::nullopt)
+  if (const auto cut = codes ? find_cut_end(End::lowest, image.values, area) : std::nullopt) {
     reader.warnings.push_back(fmt::format(
         "{}: {:.2g} % of the pixels sit at the lowest code, {:g}: the black was cut off, by a background that "
         "was subtracted or a contrast that was stretched. Their mean is not that of the light: take "
         "pictures with a black level above the noise, or mask what is dark.",
         name, 100 * cut->share, cut->code));
+    // Calibrated, pixels have an end each.
+    if (!calibration) micrograph.cut_below = linear(cut->code, settings.transfer, image.top_code);
+  }
+  if (codes && !calibration && share_of(saturated, area) > kManyAtAnEnd)
+    micrograph.cut_above = linear(saturation.from, settings.transfer, image.top_code);
   linearise(image.values, settings.transfer, image.top_code);
 
   Grid<Left> left(width, height, Left::not_of_part);
