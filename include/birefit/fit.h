@@ -27,6 +27,9 @@ struct FitOptions {
   /// starts polished after the scan, of four times as many looked at; more where the image is described badly
   int scan_candidates = 12;
   bool leave_out_outliers = false;  ///< pixels that stand out of the residual: dust, scratches
+  /// Of what pictures are known to depart by (Departure::name, or how some of them begin; "specks", "outside"), what is
+  /// not asked for where something is left over: how good are errors where the list lacks something?
+  std::vector<std::string> not_asked;
   /// Ceiling::wave for spheres where rays would shift a parameter, if that takes no longer than max_seconds
   bool choose_waves = false;
   double max_seconds = 60;  ///< see choose_waves

@@ -26,7 +26,7 @@ namespace {
 
 struct Arguments {
   std::string config;
-  std::vector<std::string> set, departures;
+  std::vector<std::string> set, departures, without;
   std::string out;
   int threads = -1, problems = 3, samples = 0;
   std::uint64_t seed = 1;
@@ -144,6 +144,7 @@ int run_audit(const Arguments& arguments) {
   const Interrupt interrupt;
   job.options.interrupted = &interrupt.flag();
   job.options.samples = arguments.samples;
+  job.options.not_asked = arguments.without;
   std::vector<AuditFit> fits;
   {
     std::atomic<int> done = 0;
@@ -192,6 +193,11 @@ Command add_audit_command(CLI::App& app) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command->add_option("--departure", arguments->departures, "this one alone; may be repeated")->allow_extra_args(false);
+  command
+      ->add_option("--without", arguments->without,
+                   "fits that do not ask for this where something is left over; may be repeated")
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"light", "background", "blur", "gamma", "curve", "stretch", "specks", "outside"}));
   command->add_option("--seed", arguments->seed, "of the random numbers")->capture_default_str();
   command
       ->add_option("--samples", arguments->samples,

@@ -55,6 +55,11 @@ const char* words_of(const std::string& name) {
 
 }  // namespace
 
+bool is_asked(const FitOptions& options, std::string_view departure) {
+  return std::none_of(options.not_asked.begin(), options.not_asked.end(),
+                      [&](const std::string& without) { return departure.starts_with(without); });
+}
+
 bool asks_catalogue(const Task& task, Optimum& optimum) {
   constexpr double kHopeless = 0.1;
   if (optimum.stopped || task.frames() != 1 || !task.picture(0).effects.empty()) return false;
@@ -85,9 +90,11 @@ FitJob with_catalogue(const Task& task, const Optimum& optimum) {
     const bool fitted = std::any_of(picture.uneven.begin(), picture.uneven.end(), [&](const UnevenLight& own) {
       return own.shape == one.shape && own.of_intensity == one.of_intensity;
     });
-    if (!fitted) picture.uneven.push_back({term(one.kind), one.shape, one.of_intensity, true});
+    if (!fitted && is_asked(task.job.options, one.kind.name))
+      picture.uneven.push_back({term(one.kind), one.shape, one.of_intensity, true});
   }
-  for (const Effect& one : kEffects) picture.effects.push_back({term(one.kind), one.effect});
+  for (const Effect& one : kEffects)
+    if (is_asked(task.job.options, one.kind.name)) picture.effects.push_back({term(one.kind), one.effect});
   return wider;
 }
 

@@ -1,10 +1,15 @@
 #pragma once
 // What pictures are known to depart from models by, fitted all at once where something is left over.
 
+#include <string_view>
+
 #include "fit/errors/stated.h"
 #include "fit/search/optimum.h"
 
 namespace birefit::estimation {
+
+/// Whether a departure of that name is asked for (FitOptions::not_asked).
+bool is_asked(const FitOptions& options, std::string_view departure);
 
 /// Whether noise does not explain what a fit of one picture of a sphere or disc leaves over, while the model misses
 /// less than a tenth of its contrast: then the catalogue is asked. Where noise does explain it, the optimum says so

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "fit/errors/catalogue.h"
 #include "fit/weights/settle.h"
 #include "samples/kind.h"
 #include "scene/values.h"
@@ -40,7 +41,7 @@ bool is_worth_leaving_out(double excess_before, double excess_after) {
 std::vector<FitJob> narrower_jobs(const Task& task, const Optimum& optimum) {
   std::vector<FitJob> jobs;
   const auto [all, excess] = theirs(optimum, [](int, int) { return true; });
-  if (!task.job.options.leave_out_outliers) {
+  if (!task.job.options.leave_out_outliers && is_asked(task.job.options, "specks")) {
     const Outliers specks = outliers_of(task, optimum, 0);
     const auto [count, of_specks] = theirs(optimum, [&](int x, int y) { return specks.pixels(x, y) != 0; });
     if (count > 0 && count < kMostOutliers * all && of_specks > kShare * excess) {
@@ -49,7 +50,8 @@ std::vector<FitJob> narrower_jobs(const Task& task, const Optimum& optimum) {
     }
   }
   const Scene& scene = task.picture(0).scene;
-  if (const ParameterRef diameter = traits_of(scene).sphere_diameter_um) {
+  if (const ParameterRef diameter = traits_of(scene).sphere_diameter_um;
+      diameter && is_asked(task.job.options, "outside")) {
     constexpr double kRadii = 1.08, kFewest = 0.2;  // of the pixels: they have to tell of the sphere by themselves
     const Values<double> value(optimum.theta, {}, nullptr);
     const double radius = kRadii * 0.5 * value(diameter) / value(scene.view.pixel_size_um);

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "birefit/render.h"
+#include "core/cut_end.h"
 #include "core/robust.h"
 #include "core/threads.h"
 #include "fit/errors/stated.h"
@@ -158,6 +159,19 @@ std::vector<Image> exposed(const FitJob& whole, const Disturbance* departure, Ex
   return frames;
 }
 
+/// What reading such a file finds: where its codes end. Brighter pixels are not known at all.
+void note_ends(Picture& picture) {
+  const Image& values = picture.values;
+  if (std::any_of(values.values().begin(), values.values().end(), [](double v) { return v != std::round(v); })) return;
+  const PixelRect all{0, 0, values.width(), values.height()};
+  if (const auto cut = find_cut_end(End::lowest, values, all)) picture.cut_below = cut->code;
+  const auto cut = find_cut_end(End::highest, values, all);
+  if (!cut) return;
+  picture.cut_above = cut->code;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (values.values()[i] >= cut->code) picture.mask.values()[i] = 0;
+}
+
 /// The job with these frames in place of its own.
 FitJob with_frames(const FitJob& job, const std::vector<Image>& frames) {
   FitJob again = job;
@@ -171,6 +185,7 @@ FitJob with_frames(const FitJob& job, const std::vector<Image>& frames) {
       const bool taken = picture->values.size() == seen.size();
       Mask mask = taken && picture->mask.size() == seen.size() ? picture->mask : Mask(seen.width(), seen.height(), 1);
       picture->values = seen, picture->mask = std::move(mask);
+      note_ends(*picture);
       continue;
     }
     Readings& readings = std::get<Readings>(measurement);
