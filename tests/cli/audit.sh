@@ -34,6 +34,11 @@ cmp -s b/intervals.csv c/intervals.csv || fail 'not the same numbers from the sa
 "$birefit" audit droplet.yaml --departure gamma --problems 1 --out d -q --seed 2 || fail 'seed'
 cmp -s b/intervals.csv d/intervals.csv && fail 'the same numbers from another seed'
 
+# What a fit does not ask for it charges for or refuses; what it does not know it does not take.
+"$birefit" audit droplet.yaml --departure gamma --problems 1 --out g -q --without gamma --without curve || fail 'without'
+cmp -s b/intervals.csv g/intervals.csv && fail 'asked for what it was not to ask for'
+"$birefit" audit droplet.yaml --without fog > f.txt 2>&1 && fail 'without what nobody knows'
+
 "$birefit" audit droplet.yaml --departure fog --out e > e.txt 2>&1
 [ $? -eq 2 ] || fail 'an unknown departure does not end in 2'
 says e.txt 'fog is no departure'
