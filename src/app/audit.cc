@@ -12,7 +12,6 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/output.h"
-#include "app/plot.h"
 #include "app/watch.h"
 #include "app/work.h"
 #include "birefit/audit.h"

@@ -4,20 +4,33 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "app/commands.h"
 #include "app/output.h"
-#include "app/plot.h"
 #include "birefit/io.h"
 #include "birefit/study.h"
+#include "io/report/chart.h"
 
 namespace birefit {
 namespace {
+
+/// Okabe and Ito's colours and one of Tol's, told apart by every eye.
+constexpr const char* kColours[] = {"#999999", "#000000", "#F0E442", "#E69F00", "#D55E00",
+                                    "#CC79A7", "#0072B2", "#56B4E9", "#882255", "#009E73"};
+/// The methods in the order of kColours.
+constexpr const char* kChartedMethods[] = {"layers_edge", "layers_midpoint", "ode_operator", "ode_scalar",
+                                           "wei_norman",  "wei_norman_exp",  "magnus4",      "magnus6",
+                                           "modal",       "diagonal"};
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+/// Errors below are drawn there: rounding is no method's merit.
+constexpr double kLeastError = 1e-14;
 
 struct Arguments {
   std::string out = "out/chart";
@@ -123,65 +136,76 @@ std::string summary_md(const MethodChart& chart) {
   return text;
 }
 
-std::string rays_script(const MethodChart& chart) {
-  std::string script = fmt::format(
-      "set terminal svg size 1500,820 dynamic font 'sans,13' background rgb 'white'\n"
-      "set logscale xy\nset format x '10^{{%T}}'\nset format y '10^{{%T}}'\nset grid lc rgb '#dddddd'\n"
-      "set xrange [1e-14:2]\nset yrange [0.01:20000]\nunset key\n"
-      "set multiplot layout 2,4 margins 0.05,0.99,0.08,0.94 spacing 0.045,0.12\n");
-  for (const ChartScene& scene : chart.scenes) {
-    std::string plot, data;
-    for (std::size_t m = 0; m < std::size(kChartedMethods); ++m) {
-      // A line for each length of series.
-      std::map<std::string, std::string> lines;
-      for (const ChartPoint& p : chart.points) {
-        if (p.scene == scene.name && p.method == kChartedMethods[m] && std::isfinite(p.intensity_error) &&
-            p.intensity_error < 2)
-          lines[line_of(p)] +=
-              fmt::format("{:.6g} {:.6g}\n", std::max(p.intensity_error, 1e-14), 1e6 * fastest_seconds(p));
-      }
-      std::string block;
-      for (const auto& [order, line] : lines) block += (block.empty() ? "" : "\n") + line;
-      if (block.empty()) continue;
-      data += fmt::format("$d{} << EOD\n{}EOD\n", m, block);
-      plot += fmt::format("{}$d{} with linespoints lw 1.6 pt 7 ps 0.45 lc rgb '{}'", plot.empty() ? "" : ", ", m,
-                          kColours[m]);
-    }
-    script += data + fmt::format(
-                         "set title '{} ({:.3g} rad)' noenhanced\nset xlabel 'error of the intensity' offset "
-                         "0,0.4\nset ylabel 'us a ray' offset 1.5,0\nplot {}\n",
-                         scene.name, scene.phase_rad, plot);
-  }
-  // The last place holds the legend.
-  script +=
-      "unset title; unset xlabel; unset ylabel; unset border; unset tics; unset grid; set key center center noenhanced "
-      "spacing 1.4\nplot ";
-  for (std::size_t m = 0; m < std::size(kChartedMethods); ++m)
-    script += fmt::format("{}NaN with linespoints lw 2 pt 7 ps 0.6 lc rgb '{}' title '{}'", m ? ", " : "", kColours[m],
-                          kChartedMethods[m]);
-  return script + "\nunset multiplot\n";
+Series line_with_dots(const std::string& label, const std::string& colour) {
+  Series series;
+  series.label = label;
+  series.colour = colour;
+  series.dots = 4.5;
+  return series;
 }
 
-std::string frames_script(const MethodChart& chart) {
-  std::string script = fmt::format(
-      "set terminal svg size 820,520 dynamic font 'sans,13' background rgb 'white'\nset logscale xy\n"
-      "set format x '10^{{%T}}'\nset grid lc rgb '#dddddd'\nset key top right noenhanced\n"
-      "set xlabel 'worst error of a pixel'\nset ylabel 'ms a frame of 500 x 500'\n");
-  std::set<std::string> names;
-  std::string plot;
-  int k = 0;
-  for (const ChartFrame& first : chart.frames) {
-    if (!names.insert(first.scene).second) continue;
-    script += fmt::format("$f{} << EOD\n", k);
-    for (const ChartFrame& f : chart.frames)
-      if (f.scene == first.scene)
-        script += fmt::format("{:.6g} {:.6g}\n", std::max(f.worst_error, 1e-14), 1e3 * f.seconds);
-    script += "EOD\n";
-    plot += fmt::format("{}$f{} with linespoints lw 2 pt 7 ps 0.6 lc rgb '{}' title '{}'", k ? ", " : "", k,
-                        kColours[6 + k % 4], first.scene);
-    ++k;
+/// A ray's time against the error of its intensity, a panel for every ray.
+Sheet rays_sheet(const MethodChart& measured) {
+  Sheet sheet;
+  sheet.title = "time of a ray against the error of its intensity, every transport method";
+  sheet.columns = 4;
+  for (std::size_t m = 0; m < std::size(kChartedMethods); ++m)
+    sheet.legend.push_back(line_with_dots(kChartedMethods[m], kColours[m]));
+  for (const ChartScene& scene : measured.scenes) {
+    Panel panel;
+    panel.y_label = "\u00b5s a ray";
+    panel.height = 240;
+    panel.log_y = true;
+    panel.y_range = {0.01, 20000};
+    for (std::size_t m = 0; m < std::size(kChartedMethods); ++m) {
+      // A line for each length of series.
+      std::map<std::string, std::vector<std::pair<double, double>>> lines;
+      for (const ChartPoint& p : measured.points)
+        if (p.scene == scene.name && p.method == kChartedMethods[m] && std::isfinite(p.intensity_error) &&
+            p.intensity_error < 2)
+          lines[line_of(p)].emplace_back(std::max(p.intensity_error, kLeastError), 1e6 * fastest_seconds(p));
+      Series series = line_with_dots("", kColours[m]);
+      for (const auto& [length, line] : lines) {
+        for (const auto& [error, time] : line) series.x.push_back(error), series.y.push_back(time);
+        series.x.push_back(kNaN), series.y.push_back(kNaN);
+      }
+      if (!lines.empty()) panel.series.push_back(std::move(series));
+    }
+    Chart chart;
+    chart.heading = fmt::format("{} ({:.3g} rad)", scene.name, scene.phase_rad);
+    chart.title = chart.heading;
+    chart.x_label = "error of the intensity";
+    chart.x_range = {3e-15, 3};
+    chart.log_x = true;
+    chart.width = 320;
+    chart.panels = {std::move(panel)};
+    sheet.charts.push_back(std::move(chart));
   }
-  return script + "plot " + plot + "\n";
+  return sheet;
+}
+
+Sheet frames_sheet(const MethodChart& measured) {
+  Panel panel;
+  panel.y_label = "ms a frame of 500 \u00d7 500";
+  panel.height = 380;
+  panel.log_y = true;
+  std::set<std::string> names;
+  for (const ChartFrame& first : measured.frames) {
+    const std::size_t k = names.size();
+    if (!names.insert(first.scene).second) continue;
+    Series series = line_with_dots(first.scene, kColours[6 + k % 4]);
+    for (const ChartFrame& f : measured.frames)
+      if (f.scene == first.scene)
+        series.x.push_back(std::max(f.worst_error, kLeastError)), series.y.push_back(1e3 * f.seconds);
+    panel.series.push_back(std::move(series));
+  }
+  Chart chart;
+  chart.title = "time of a frame against its worst pixel's error";
+  chart.x_label = "worst error of a pixel";
+  chart.log_x = true;
+  chart.width = 720;
+  chart.panels = {std::move(panel)};
+  return {chart.title, {chart}, 1, {}};
 }
 
 std::string waves_csv(const std::vector<WavePoint>& points) {
@@ -192,51 +216,69 @@ std::string waves_csv(const std::vector<WavePoint>& points) {
   return text;
 }
 
+constexpr const char* kModels[] = {"straight", "eikonal", "split_step", "march"};
+constexpr const char* kModelColours[] = {"#999999", "#000000", "#0072B2", "#D55E00"};
+
+/// The error of every model's pictures against their radius.
+Panel error_panel(const std::vector<WavePoint>& points, const std::string& sample) {
+  Panel panel;
+  panel.y_label = "RMS error of the picture";
+  panel.height = 300;
+  panel.log_y = true;
+  panel.y_range = {0.001, 6};
+  for (std::size_t m = 0; m < std::size(kModels); ++m) {
+    Series series = line_with_dots("", kModelColours[m]);
+    for (const WavePoint& p : points)
+      if (p.sample == sample && p.model == kModels[m] && p.effort.empty() && p.objective_na == 0.4 && p.error > 0)
+        series.x.push_back(p.radius_um), series.y.push_back(p.error);
+    panel.series.push_back(std::move(series));
+  }
+  return panel;
+}
+
+/// Time against error for one droplet.
+Panel time_panel(const std::vector<WavePoint>& points) {
+  Panel panel;
+  panel.y_label = "ms a picture";
+  panel.height = 300;
+  panel.log_y = true;
+  panel.y_range = {0.05, 20000};
+  for (std::size_t m = 0; m < std::size(kModels); ++m) {
+    Series series{Series::Kind::points, "", {}, {}, kModelColours[m], 6.5};
+    for (const WavePoint& p : points)
+      if (p.objective_na == 0.8 && p.model == kModels[m] && p.error > 0)
+        series.x.push_back(p.error), series.y.push_back(1e3 * p.seconds);
+    if (!series.x.empty()) panel.series.push_back(std::move(series));
+  }
+  return panel;
+}
+
 /// Error against radius for each sample at NA 0.4, and time against error for one droplet.
-std::string waves_script(const std::vector<WavePoint>& points) {
-  constexpr const char* kModels[] = {"straight", "eikonal", "split_step", "march"};
-  constexpr const char* kModelColours[] = {"#999999", "#000000", "#0072b2", "#d55e00"};
-  std::string script = fmt::format(
-      "set terminal svg size 1500,430 dynamic font 'sans,13' background rgb 'white'\nset logscale y\nset grid lc rgb "
-      "'#dddddd'\n"
-      "set key top left noenhanced maxrows 2 samplen 1.5 width -1\nset multiplot layout 1,4 margins "
-      "0.055,0.99,0.14,0.9 spacing 0.055,0.1\nset yrange [0.001:6]\n");
+Sheet waves_sheet(const std::vector<WavePoint>& points) {
+  Sheet sheet;
+  sheet.title = "error of pictures by rays, curved rays, propagation and march";
+  sheet.columns = 4;
+  for (std::size_t m = 0; m < std::size(kModels); ++m)
+    sheet.legend.push_back(line_with_dots(kModels[m], kModelColours[m]));
+  const auto add = [&](const std::string& heading, const std::string& x_label, Panel panel) -> Chart& {
+    Chart chart;
+    chart.title = chart.heading = heading;
+    chart.x_label = x_label;
+    chart.width = 320;
+    chart.panels = {std::move(panel)};
+    return sheet.charts.emplace_back(std::move(chart));
+  };
   std::vector<std::string> samples;
   for (const WavePoint& p : points)
     if (std::find(samples.begin(), samples.end(), p.sample) == samples.end()) samples.push_back(p.sample);
-  int block = 0;
-  for (std::size_t k = 0; k < samples.size() && k < 3; ++k) {
-    std::string plot;
-    for (std::size_t m = 0; m < std::size(kModels); ++m) {
-      std::string data;
-      for (const WavePoint& p : points)
-        if (p.sample == samples[k] && p.model == kModels[m] && p.effort.empty() && p.objective_na == 0.4 && p.error > 0)
-          data += fmt::format("{:g} {:.4g}\n", p.radius_um, p.error);
-      if (data.empty()) continue;
-      script += fmt::format("$w{} << EOD\n{}EOD\n", block, data);
-      plot += fmt::format("{}$w{} with linespoints lw 2 pt 7 ps 0.5 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ",
-                          block++, kModelColours[m], kModels[m]);
-    }
-    script += fmt::format(
-        "set title '{}, NA 0.4' noenhanced\nset xlabel 'radius (um)'\nset ylabel '{}' offset 1,0\nplot {}\n",
-        samples[k], k == 0 ? "RMS error of the picture" : "", plot);
-  }
-  std::string plot;
-  for (std::size_t m = 0; m < std::size(kModels); ++m) {
-    std::string data;
-    for (const WavePoint& p : points)
-      if (p.objective_na == 0.8 && p.model == kModels[m] && p.error > 0)
-        data += fmt::format("{:.4g} {:.4g}\n", p.error, 1e3 * p.seconds);
-    if (data.empty()) continue;
-    script += fmt::format("$w{} << EOD\n{}EOD\n", block, data);
-    plot += fmt::format("{}$w{} with points pt 7 ps 0.8 lc rgb '{}' title '{}'", plot.empty() ? "" : ", ", block++,
-                        kModelColours[m], kModels[m]);
-  }
-  if (plot.empty()) return script + "unset multiplot\n";  // of a quick run
-  return script +
-         "set logscale x\nset yrange [0.05:20000]\nset xrange [0.005:2]\nset title '9 um, NA 0.8'\nset xlabel 'RMS "
-         "error of the picture'\nset ylabel 'ms a picture' offset 1.5,0\nplot " +
-         plot + "\nunset multiplot\n";
+  for (std::size_t k = 0; k < samples.size() && k < 3; ++k)
+    add(samples[k] + ", NA 0.4", "radius (\u00b5m)", error_panel(points, samples[k])).x_range = {1, 16};
+  Panel times = time_panel(points);
+  if (times.series.empty()) return sheet;  // of a quick run
+  Chart& chart = add("9 \u00b5m, NA 0.8", "RMS error of the picture", std::move(times));
+  chart.log_x = true;
+  chart.x_range = {0.005, 2};
+  return sheet;
 }
 
 int run_chart(const Arguments& arguments) {
@@ -249,13 +291,13 @@ int run_chart(const Arguments& arguments) {
   write_file((out / "scenes.csv").string(), scenes_csv(chart));
   write_file((out / "summary.md").string(), summary_md(chart));
   if (!chart.frames.empty()) write_file((out / "frames.csv").string(), frames_csv(chart));
-  if (draw(rays_script(chart), out / "chart.svg") && !chart.frames.empty())
-    draw(frames_script(chart), out / "frames.svg");
+  write_file(out / "chart.svg", svg_file(rays_sheet(chart)));
+  if (!chart.frames.empty()) write_file(out / "frames.svg", svg_file(frames_sheet(chart)));
   const std::vector<WavePoint> waves = measure_waves(arguments.quick, [&](const std::string& what) {
     if (!arguments.quiet) std::cerr << "measuring " << what << "\n";
   });
   write_file((out / "waves.csv").string(), waves_csv(waves));
-  draw(waves_script(waves), out / "waves.svg");
+  write_file(out / "waves.svg", svg_file(waves_sheet(waves)));
   if (!arguments.quiet) std::cout << (out / "chart.csv").string() << ": " << chart.points.size() << " measurements\n";
   return kExitDone;
 }

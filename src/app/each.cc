@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "app/plot.h"
+#include "app/output.h"
 #include "core/sub_grid.h"
 #include "io/config/discs.h"
 

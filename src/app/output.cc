@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdlib>
 #include <iostream>
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "birefit/error.h"
@@ -60,6 +62,13 @@ OutputFolder::~OutputFolder() {
   for (auto made = made_.rbegin(); made != made_.rend(); ++made) fs::remove(*made, ignored);
 }
 
+void make_folder(const std::string& folder) {
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure)
+    throw UserError(Where{}, folder + " cannot be made: " + failure.message(), "name a folder that can be written");
+}
+
 void check_output_file(const fs::path& file, const std::vector<std::string>& extensions) {
   std::string extension = file.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -76,6 +85,8 @@ void check_output_file(const fs::path& file, const std::vector<std::string>& ext
   if (!can_write_in(folder))
     throw UserError({file.string()}, "its folder cannot be written to (permissions, or the disk is full)");
 }
+
+std::string csv_number(double x) { return std::isfinite(x) ? fmt::format("{:.6g}", x) : std::string(); }
 
 void print_warnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) std::cerr << "warning: " << printable(warning) << "\n";

@@ -1,5 +1,5 @@
 #pragma once
-// Whether results can be written is found out before the work, not after it.
+// Where and how results are written. Whether they can be is found out before the work, not after it.
 
 #include <filesystem>
 #include <string>
@@ -21,8 +21,14 @@ class OutputFolder {
   std::vector<std::filesystem::path> made_;  ///< folders that did not exist before, outermost first
 };
 
+/// Makes the folder; UserError when it cannot.
+void make_folder(const std::string& folder);
+
 /// Throws UserError unless the file's name ends in one of `extensions` and its folder can be written.
 void check_output_file(const std::filesystem::path& file, const std::vector<std::string>& extensions);
+
+/// As CSV: empty when not finite.
+std::string csv_number(double x);
 
 /// One line each on stderr.
 void print_warnings(const std::vector<std::string>& warnings);

@@ -15,13 +15,13 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/output.h"
-#include "app/plot.h"
 #include "app/watch.h"
 #include "app/work.h"
 #include "birefit/series.h"
 #include "core/printable.h"
 #include "core/threads.h"
 #include "io/files/table.h"
+#include "io/report/chart.h"
 
 namespace birefit {
 namespace {
@@ -101,16 +101,28 @@ class EarlierFrames {
   const fs::path frames_, earlier_;
 };
 
-/// "diameter (um)" of sample.droplet.diameter_um: the unit is part of every name.
+/// "diameter (\u00b5m)" of sample.droplet.diameter_um: the unit is part of every name. Control characters are spaces.
 std::string axis_label(const std::string& path) {
   const std::size_t dot = path.rfind('.');
   std::string name = path.substr(dot + 1);
   if (name.size() == 1 && dot != std::string::npos)
     return axis_label(path.substr(0, dot)) + ", " + name;  // "center (px), x"
-  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {
-      {"_v_per_um", "V/um"}, {"_mm2_s", "mm2/s"}, {"_per_k", "1/K"}, {"_um", "um"}, {"_nm", "nm"}, {"_cm", "cm"},
-      {"_mm", "mm"},         {"_deg", "degrees"}, {"_rad", "rad"},   {"_px", "px"}, {"_pn", "pN"}, {"_min", "min"},
-      {"_k", "K"},           {"_v", "V"},         {"_s", "s"},       {"_h", "h"}};
+  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_v_per_um", "V/\u00b5m"},
+                                                                      {"_mm2_s", "mm\u00b2/s"},
+                                                                      {"_per_k", "1/K"},
+                                                                      {"_um", "\u00b5m"},
+                                                                      {"_nm", "nm"},
+                                                                      {"_cm", "cm"},
+                                                                      {"_mm", "mm"},
+                                                                      {"_deg", "\u00b0"},
+                                                                      {"_rad", "rad"},
+                                                                      {"_px", "px"},
+                                                                      {"_pn", "pN"},
+                                                                      {"_min", "min"},
+                                                                      {"_k", "K"},
+                                                                      {"_v", "V"},
+                                                                      {"_s", "s"},
+                                                                      {"_h", "h"}};
   std::string unit;
   for (const auto& [suffix, word] : kUnits)
     if (name.size() > suffix.size() && name.ends_with(suffix)) {
@@ -118,7 +130,8 @@ std::string axis_label(const std::string& path) {
       unit = fmt::format(" ({})", word);
       break;
     }
-  std::replace(name.begin(), name.end(), '_', ' ');
+  const auto is_blank = [](unsigned char c) { return c == '_' || c < 0x20 || c == 0x7f; };
+  std::replace_if(name.begin(), name.end(), is_blank, ' ');
   return name + unit;
 }
 
@@ -134,84 +147,103 @@ double x_of(const ImageSeries& series, const std::optional<std::size_t>& column,
   return parse_number(series.frames[frame].cells[*column].text).value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
-/// A panel for every searched parameter: estimates with 95 % intervals; limits as triangles that point to what is
+/// How the picture draws what is known of a parameter.
+struct Looks {
+  Series shared{Series::Kind::line, "shared by all frames (95 %)", {}, {}, "#0072B2"};
+  Series doubtful{Series::Kind::points, "no answer", {}, {}, "#999999", 6.5, Series::Mark::circle};
+  Series known{Series::Kind::points, "estimate (95 %)", {}, {}, "#000000", 4.5};
+  Series below{Series::Kind::points, "upper limit", {}, {}, "#D55E00", 9, Series::Mark::down};
+  Series above{Series::Kind::points, "lower limit", {}, {}, "#D55E00", 9, Series::Mark::up};
+  std::vector<Series*> all() { return {&shared, &doubtful, &known, &below, &above}; }
+};
+
+void add(Series& series, double x, double y) { series.x.push_back(x), series.y.push_back(y); }
+void add(Series& series, double x, double y, double low, double high) {
+  add(series, x, y);
+  series.low.push_back(low), series.high.push_back(high);
+}
+
+/// What is known of a parameter of each frame: estimates with 95 % intervals; limits as triangles that point to what is
 /// allowed; frames without an answer as open circles. Of a shared parameter each frame's own estimate, and the common
-/// one as a band.
-std::string script_of(const ImageSeries& series, const SeriesResult& result) {
+/// one as a strip.
+Looks looks_of(const std::string& name, const std::vector<double>& x, std::pair<double, double> ends,
+               const SeriesResult& result) {
+  Looks looks;
+  const std::optional<SharedEstimate>& common = result.shared;
+  const auto names = common ? common->posterior.names : std::vector<std::string>();
+  const auto at = std::find(names.begin(), names.end(), name) - names.begin();
+  const bool shared = at < static_cast<std::ptrdiff_t>(names.size());
+  if (shared) {
+    const Posterior& all = common->posterior;
+    const double value = all.mean[at],
+                 half = interval95_factor(all.degrees_of_freedom) * std::sqrt(all.covariance(at, at));
+    for (const double place : {ends.first, ends.second}) add(looks.shared, place, value, value - half, value + half);
+  }
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const auto& fit = shared ? result.alone[i] : result.frames[i];
+    if (!fit) continue;
+    for (const ParameterEstimate& p : fit->parameters) {
+      if (p.name != name || !std::isfinite(p.value)) continue;
+      if (!fit->has_answer() || (p.limit.empty() && !std::isfinite(p.interval95_low)))
+        add(looks.doubtful, x[i], p.value);
+      else if (!p.limit.empty())
+        add(p.limit == "lower" ? looks.above : looks.below, x[i], p.limit_value);
+      else
+        add(looks.known, x[i], p.value, p.interval95_low, p.interval95_high);
+    }
+  }
+  return looks;
+}
+
+/// The least and the largest of what is finite; 0 of nothing.
+std::pair<double, double> ends_of(std::vector<double> x) {
+  std::erase_if(x, [](double value) { return !std::isfinite(value); });
+  if (x.empty()) return {0, 0};
+  const auto [first, last] = std::minmax_element(x.begin(), x.end());
+  return {*first, *last};
+}
+
+/// A panel for every searched parameter, in two columns of more than three; nothing where none was estimated.
+std::optional<Sheet> sheet_of(const ImageSeries& series, const SeriesResult& result) {
   std::vector<std::string> drawn;
   for (const auto& fit : result.alone)
     if (fit)
       for (const ParameterEstimate& p : fit->parameters)
         if (!p.linear && std::find(drawn.begin(), drawn.end(), p.name) == drawn.end()) drawn.push_back(p.name);
-  if (drawn.empty()) return {};
+  if (drawn.empty()) return std::nullopt;
   const auto x_column = abscissa(series);
-  const std::size_t columns = drawn.size() > 3 ? 2 : 1, rows = (drawn.size() + columns - 1) / columns;
-  const int width = columns == 1 ? 760 : 1160, height = static_cast<int>(60 + 230 * rows);
-  // Margins in pixels: the same whatever the number of panels.
-  std::string script = fmt::format(
-      "set terminal svg size {},{} dynamic font 'sans,13' background rgb 'white'\n"
-      "set grid lc rgb '#e4e4e4' lt 1\nset border lw 1.1\nset tics nomirror\nunset key\nset offsets 0, 0, graph 0.06, "
-      "graph 0.06\n"
-      "set multiplot layout {},{} margins {:.4f},{:.4f},{:.4f},{:.4f} spacing {:.4f},{:.4f}\n",
-      width, height, rows, columns, 100.0 / width, 1 - 20.0 / width, 52.0 / height, 1 - 14.0 / height, 110.0 / width,
-      22.0 / height);
-  for (std::size_t k = 0; k < drawn.size(); ++k) {
-    const std::string& name = drawn[k];
-    const bool shared = result.shared &&
-                        std::find(result.shared->posterior.names.begin(), result.shared->posterior.names.end(), name) !=
-                            result.shared->posterior.names.end();
-    std::string points, limits[2], doubtful;
-    double low_x = std::numeric_limits<double>::infinity(), high_x = -low_x;
-    for (std::size_t i = 0; i < series.frames.size(); ++i) {
-      const auto& fit = shared ? result.alone[i] : result.frames[i];
-      const double x = x_of(series, x_column, i);
-      low_x = std::min(low_x, x), high_x = std::max(high_x, x);
-      if (!fit) continue;
-      for (const ParameterEstimate& p : fit->parameters) {
-        if (p.name != name || !std::isfinite(p.value)) continue;
-        if (!fit->has_answer() || (p.limit.empty() && !std::isfinite(p.interval95_low)))
-          doubtful += fmt::format("{:.10g} {:.10g}\n", x, p.value);
-        else if (!p.limit.empty())
-          limits[p.limit == "lower"] += fmt::format("{:.10g} {:.10g}\n", x, p.limit_value);
-        else
-          points += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, p.value, p.interval95_low, p.interval95_high);
-      }
-    }
-    std::string plot;
-    const auto add = [&](const std::string& label, const std::string& data, const std::string& style) {
-      if (data.empty()) return;
-      script += fmt::format("${}{} << EOD\n{}EOD\n", label, k, data);
-      plot += fmt::format("{}${}{} {}", plot.empty() ? "" : ", ", label, k, style);
-    };
-    if (shared) {
-      const Posterior& all = result.shared->posterior;
-      const auto at = std::find(all.names.begin(), all.names.end(), name) - all.names.begin();
-      const double value = all.mean[at],
-                   half = interval95_factor(all.degrees_of_freedom) * std::sqrt(all.covariance(at, at));
-      std::string band;
-      for (const double x : {low_x, high_x})
-        band += fmt::format("{:.10g} {:.10g} {:.10g} {:.10g}\n", x, value, value - half, value + half);
-      add("band", band, "using 1:3:4 with filledcurves fc rgb '#56B4E9' fs transparent solid 0.4 noborder");
-      plot += fmt::format(", $band{} using 1:2 with lines lc rgb '#0072B2' lw 1.4", k);
-    }
-    add("doubtful", doubtful, "with points pt 6 ps 0.7 lw 1.3 lc rgb '#999999'");
-    // Bars and points apart: gnuplot leaves a white ring around the points of its error bars.
-    add("points", points, "using 1:3:(0):($4-$3) with vectors nohead lw 1.2 lc rgb '#000000'");
-    if (!points.empty()) plot += fmt::format(", $points{} using 1:2 with points pt 7 ps 0.5 lc rgb '#000000'", k);
-    add("below", limits[0], "with points pt 11 ps 0.8 lc rgb '#D55E00'");
-    add("above", limits[1], "with points pt 9 ps 0.8 lc rgb '#D55E00'");
-    const bool lowest = k + columns >= drawn.size();
-    const std::string x_label = x_column ? axis_label(series.columns[*x_column].name) : "frame";
-    const double room = high_x > low_x ? 0.03 * (high_x - low_x) : 1;
-    script += fmt::format(
-        "set xrange [{:.10g}:{:.10g}]\nset format x '{}'\nset ylabel {} noenhanced offset 1,0\nset xlabel {} "
-        "noenhanced\n",
-        low_x - room, high_x + room, lowest ? "%g" : "", plot_text(axis_label(name) + (shared ? ", shared" : "")),
-        plot_text(lowest ? x_label : ""));
-    // A panel without a point keeps its place.
-    script += plot.empty() ? "set multiplot next\n" : "plot " + plot + "\n";
+  std::vector<double> x;
+  for (std::size_t i = 0; i < series.frames.size(); ++i) x.push_back(x_of(series, x_column, i));
+  const auto [first, last] = ends_of(x);
+  const double room = last > first ? 0.03 * (last - first) : 1;
+
+  Sheet sheet;
+  sheet.title = "what the frames of the series say of every searched parameter";
+  sheet.columns = drawn.size() > 3 ? 2 : 1;
+  sheet.charts.resize(static_cast<std::size_t>(sheet.columns));
+  for (Chart& chart : sheet.charts) {
+    chart.title = "estimates of the frames";
+    chart.x_label = x_column ? axis_label(series.columns[*x_column].name) : "frame";
+    chart.x_range = {first - room, last + room};
+    chart.width = sheet.columns == 1 ? 740 : 570;
   }
-  return script + "unset multiplot\n";
+  Looks listed;
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    Looks looks = looks_of(drawn[k], x, {first, last}, result);
+    Panel panel;
+    panel.y_label = axis_label(drawn[k]) + (looks.shared.x.empty() ? "" : ", shared");
+    for (std::size_t i = 0; i < looks.all().size(); ++i) {
+      Series& one = *looks.all()[i];
+      if (one.x.empty()) continue;
+      *listed.all()[i] = one;
+      one.label.clear();
+      panel.series.push_back(one);
+    }
+    sheet.charts[k % sheet.charts.size()].panels.push_back(std::move(panel));
+  }
+  for (Series* one : listed.all())
+    if (!one->x.empty()) sheet.legend.push_back(*one);
+  return sheet;
 }
 
 /// Counts of verdicts and warnings, and what is shared.
@@ -345,7 +377,7 @@ int run_series(const Arguments& arguments) {
   fs::remove(out / "series.svg", code);
   fs::remove(out / "shared.csv", code);
   if (const std::string shared = shared_csv(result); !shared.empty()) write_file(out / "shared.csv", shared);
-  if (const std::string script = script_of(series, result); !script.empty()) draw(script, out / "series.svg");
+  if (const std::optional<Sheet> sheet = sheet_of(series, result)) write_file(out / "series.svg", svg_file(*sheet));
   if (!arguments.quiet) {
     if (kept > 0) std::cout << kept << " frames were up to date\n";
     std::cout << printable_lines(summary_of(series, result)) << "Table: " << printable((out / "series.csv").string())

@@ -11,9 +11,10 @@
 
 #include "app/commands.h"
 #include "app/output.h"
-#include "app/plot.h"
 #include "birefit/io.h"
 #include "birefit/study.h"
+#include "io/report/chart.h"
+#include "io/report/colour_grid.h"
 
 namespace birefit {
 namespace {
@@ -34,63 +35,51 @@ std::string table(const std::vector<StressPoint>& points) {
 /// Whole pictures have no place among the rays.
 bool of_picture(const StressPoint& p) { return p.method.find(" of a ") != std::string::npos; }
 
-/// A square for every place and method: its error where it answers, grey where it says that it cannot.
-std::string script(const std::vector<StressPoint>& points) {
-  std::vector<std::string> places, names;
-  for (const StressPoint& p : points)
-    if (!of_picture(p) && std::find(names.begin(), names.end(), p.method) == names.end()) names.push_back(p.method);
-  std::string answered, flagged, ticks;
-  std::string sweep;
+/// A cell for every place and method: its error where it answers, grey where it says that it cannot.
+ColourGrid errors_grid(const std::vector<StressPoint>& points) {
+  ColourGrid grid;
+  grid.title = "error of every method in every trap; grey where the method flags its own answer";
+  grid.palette = {{1e-14, "#0072B2"}, {1e-9, "#56B4E9"}, {1e-6, "#009E73"}, {1e-4, "#F0E442"}, {1e-2, "#D55E00"}};
+  grid.value_label = "error";
+  grid.grey_label = "flagged by the method itself";
   for (const StressPoint& p : points) {
     if (of_picture(p)) continue;
-    const std::string place = fmt::format("{} {:g}", p.sweep, p.value);
-    if (places.empty() || places.back() != place) {
-      places.push_back(place);
-      ticks += fmt::format("{}'{}' {}", ticks.empty() ? "" : ", ",
-                           p.sweep == sweep ? fmt::format("{:g}", p.value) : place, places.size() - 1);
-      sweep = p.sweep;
-    }
-    const auto m = std::find(names.begin(), names.end(), p.method) - names.begin();
-    if (!p.flag.empty())
-      flagged += fmt::format("{} {}\n", m, places.size() - 1);
-    else if (std::isfinite(p.error))
-      answered += fmt::format("{} {} {:.3g}\n", m, places.size() - 1, std::log10(std::max(p.error, 1e-14)));
+    const std::string value = fmt::format("{:g}", p.value);
+    if (grid.rows.empty() || grid.rows.back().group != p.sweep || grid.rows.back().name != value)
+      grid.rows.push_back({p.sweep, value});
+    auto column = std::find(grid.columns.begin(), grid.columns.end(), p.method);
+    if (column == grid.columns.end()) column = grid.columns.insert(column, p.method);
+    ColourGrid::Cell cell{grid.rows.size() - 1, static_cast<std::size_t>(column - grid.columns.begin()), {}};
+    if (p.flag.empty()) cell.value = p.error;
+    if (!p.flag.empty() || std::isfinite(p.error)) grid.cells.push_back(cell);
   }
-  std::string methods;
-  for (std::size_t m = 0; m < names.size(); ++m) methods += fmt::format("{}'{}' {}", m ? ", " : "", names[m], m);
-  return fmt::format(
-      "set terminal svg size 900,{} dynamic font 'sans,12' background rgb 'white'\n$a << EOD\n{}EOD\n$f << EOD\n{}EOD\n"
-      "set yrange [{}:-0.5]\nset xrange [-0.5:{}]\nset ytics noenhanced ({})\nset x2range [-0.5:{}]\nset x2tics "
-      "noenhanced rotate by 30 ({})\nunset xtics\nunset key\n"
-      "set lmargin 26\nset tmargin 6\nset cbrange [-14:-2]\nset palette defined (-14 '#0072B2', -9 '#56B4E9', -6 "
-      "'#009E73', -4 '#F0E442', -2 '#D55E00')\n"
-      "set cblabel 'log_{{10}} of the error; grey: flagged by the method itself'\n"
-      "plot $f using 1:2 with points pt 5 ps 0.9 lc rgb '#cccccc', $a using 1:2:3 with points pt 5 ps 0.9 lc palette\n",
-      120 + 17 * places.size(), answered, flagged, static_cast<double>(places.size()) - 0.5,
-      static_cast<double>(names.size()) - 0.5, ticks, static_cast<double>(names.size()) - 0.5, methods);
+  return grid;
 }
 
 /// Pictures by wave optics: error against the method's own estimate. The law: no point above the diagonal.
-std::string wave_script(const std::vector<StressPoint>& points) {
-  std::string data, plots;
-  int colour = 0;
-  for (const auto& [name, rgb] : {std::pair{"series", "#0072B2"}, {"split_step", "#D55E00"}, {"march", "#009E73"}}) {
-    data += fmt::format("$p{} << EOD\n", colour);
+Sheet waves_sheet(const std::vector<StressPoint>& points) {
+  Panel panel;
+  panel.y_label = "error of the picture";
+  panel.height = 440;
+  panel.log_y = true;
+  panel.y_range = {1e-13, 20};
+  panel.series.push_back({Series::Kind::line, "the law: not above", {1e-13, 20}, {1e-13, 20}, "#000000", 1});
+  for (const auto& [name, colour] : {std::pair{"series", "#0072B2"}, {"split_step", "#D55E00"}, {"march", "#009E73"}}) {
+    Series series{Series::Kind::points, name, {}, {}, colour, 5};
     for (const StressPoint& p : points)
       if (p.sweep.starts_with("wave_") && p.method == fmt::format("{} of a ball", name) && p.flag.empty() &&
           p.error > 1e-12)
-        data += fmt::format("{:.4g} {:.4g}\n", p.estimate, p.error);
-    data += "EOD\n";
-    plots +=
-        fmt::format(", $p{} using 1:2 with points pt 7 ps 0.6 lc rgb '{}' title '{}' noenhanced", colour++, rgb, name);
+        series.x.push_back(p.estimate), series.y.push_back(p.error);
+    panel.series.push_back(std::move(series));
   }
-  return fmt::format(
-      "set terminal svg size 640,560 dynamic font 'sans,13' background rgb 'white'\n{}set logscale xy\nset format xy "
-      "'10^{{%T}}'\n"
-      "set xrange [1e-12:10]\nset yrange [1e-13:10]\nset key top left\nset xlabel 'what the method says of its "
-      "error'\nset ylabel 'error of the picture'\nset grid lc rgb '#dddddd'\n"
-      "plot x with lines lc rgb 'black' title 'the law: not above'{}\n",
-      data, plots);
+  Chart chart;
+  chart.title = "error of wave pictures against what their method says of it";
+  chart.x_label = "what the method says of its error";
+  chart.log_x = true;
+  chart.x_range = {1e-12, 20};
+  chart.width = 600;
+  chart.panels = {std::move(panel)};
+  return {chart.title, {chart}, 1, {}};
 }
 
 int run_stress(const Arguments& arguments) {
@@ -100,8 +89,8 @@ int run_stress(const Arguments& arguments) {
     if (!arguments.quiet) std::cerr << "sweeping " << what << "\n";
   });
   write_file(out / "stress.csv", table(points));
-  draw(script(points), out / "stress.svg");
-  draw(wave_script(points), out / "stress_waves.svg");
+  write_file(out / "stress.svg", svg_file(errors_grid(points)));
+  write_file(out / "stress_waves.svg", svg_file(waves_sheet(points)));
   int broken = 0, flagged = 0, unknown = 0;
   for (const StressPoint& p : points) {
     if (!p.flag.empty())

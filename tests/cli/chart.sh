@@ -41,7 +41,12 @@ awk -F' *[|] *' '
     if (!(cell["twisted_cell", "magnus4"] > 0)) fail("magnus4 on the twisted cell: " cell["twisted_cell", "magnus4"])
     exit bad
   }' out/summary.md || exit 1
-if command -v gnuplot > /dev/null; then
-  grep -q "</svg>" out/chart.svg || { echo "FAILED: chart.svg is not complete"; exit 1; }
-fi
+for picture in chart waves; do
+  [ "$(tail -n 1 out/$picture.svg)" = "</svg>" ] || { echo "FAILED: $picture.svg is not complete"; exit 1; }
+  grep -q "[ \"ML]-\?\(nan\|inf\)[ \".]" out/$picture.svg && { echo "FAILED: what is no number is drawn in $picture.svg"; exit 1; }
+done
+# Every ray and every method is named in it.
+for name in $(tail -n +2 out/scenes.csv | cut -d, -f1) layers_edge magnus6 diagonal; do
+  grep -q ">$name[ <]" out/chart.svg || { echo "FAILED: $name is not named in chart.svg"; exit 1; }
+done
 echo "all as required"

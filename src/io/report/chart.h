@@ -1,21 +1,15 @@
 #pragma once
-// Line charts as SVG text, without a library: the report must open anywhere, for years. Private to io.
+// Line charts as SVG text, without a library: the report must open anywhere, for years, and so must the pictures of
+// `series`, `chart` and `stress`. Private to io and app.
 
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-namespace birefit {
+#include "io/report/marks.h"
 
-struct Series {
-  enum class Kind { line, points, bars };
-  Kind kind = Kind::line;
-  std::string label;         ///< of the legend; "" = not listed
-  std::vector<double> x, y;  ///< NaN interrupts a line
-  std::string colour;
-  double width = 1.6;  ///< of a line, or the diameter of a point
-};
+namespace birefit {
 
 /// A vertical line across the panel.
 struct Marker {
@@ -46,13 +40,23 @@ struct Chart {
   std::optional<std::pair<double, double>> x_range;
   std::vector<Panel> panels;  ///< stacked, one x axis
   int width = 430;
+  bool log_x = false;
+  std::string heading;  ///< above the first panel; "" = none
 };
 
-/// Steps of 1, 2 or 5 times a power of ten: the multiples inside [low, high], about `count` of them.
-std::vector<double> nice_ticks(double low, double high, int count);
-/// Decimals that the ticks of `step` need.
-std::string tick_label(double value, double step);
+/// Charts in rows: a picture that is a file of its own.
+struct Sheet {
+  std::string title;          ///< for screen readers
+  std::vector<Chart> charts;  ///< row by row
+  int columns = 1;
+  /// What the series of all charts look like, by their labels; x and y are not looked at. In the first place of the
+  /// last row that no chart takes or, where there is none, above all.
+  std::vector<Series> legend;
+};
 
+/// As an element of a page, which gives it its font and background.
 std::string svg(const Chart& chart);
+/// As a whole file.
+std::string svg_file(const Sheet& sheet);
 
 }  // namespace birefit
