@@ -131,7 +131,8 @@ Outcome with_all_departures(const Task& task, const Minima& minima, Optimum opti
   if (with_all.stopped || !believes_catalogue(missed_of_contrast(task, optimum), missed_of_contrast(wider, with_all)))
     return concluded(task, minima, std::move(optimum), false);
   with_all.came_from = std::move(before);
-  return concluded(wider, widened(wider, task, with_all.theta, minima), std::move(with_all), false);
+  const Minima places = widened(wider, task, with_all.theta, minima);
+  return concluded(wider, places, std::move(with_all), false);
 }
 
 /// Where something is left over, what is foreign to the object goes first, and then the rest is asked for its causes.
