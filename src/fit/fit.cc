@@ -95,9 +95,9 @@ Outcome concluded(const Task& task, const Minima& minima, Optimum optimum, bool 
   return outcome;
 }
 
-/// A fit of fewer pixels, with the job that it is of.
-struct Narrowed {
-  explicit Narrowed(FitJob of) : job(std::move(of)), task(job) {}
+/// A fit of another job than the one that was asked for: with more unknowns, or fewer pixels.
+struct Refit {
+  explicit Refit(FitJob of) : job(std::move(of)), task(job) {}
   FitJob job;
   Task task;
   Optimum optimum;
@@ -105,12 +105,12 @@ struct Narrowed {
 
 /// Without specks, or without all outside of the sphere, whichever leaves less over; nothing where neither takes a
 /// fifth off.
-std::unique_ptr<Narrowed> without_foreign(const Task& task, const Optimum& optimum, const Minima& minima) {
+std::unique_ptr<Refit> without_foreign(const Task& task, const Optimum& optimum, const Minima& minima) {
   const double before = excess_of(optimum);
   double least = std::numeric_limits<double>::infinity();
-  std::unique_ptr<Narrowed> best;
+  std::unique_ptr<Refit> best;
   for (FitJob& job : narrower_jobs(task, optimum)) {
-    auto fitted = std::make_unique<Narrowed>(std::move(job));
+    auto fitted = std::make_unique<Refit>(std::move(job));
     fitted->optimum = settle(fitted->task, best_with_nuisances(fitted->task, task, optimum, minima));
     if (fitted->optimum.stopped) return nullptr;
     const double after = excess_of(fitted->optimum);
@@ -121,28 +121,34 @@ std::unique_ptr<Narrowed> without_foreign(const Task& task, const Optimum& optim
   return best;
 }
 
-/// All that pictures are known to depart by, fitted at once.
-Outcome with_all_departures(const Task& task, const Minima& minima, Optimum optimum) {
+/// All that pictures are known to depart by, fitted at once; nothing where that is not to be believed.
+std::unique_ptr<Refit> with_all_departures(const Task& task, const Optimum& optimum, const Minima& minima) {
   task.say("something is left over: what pictures depart by is fitted as well");
-  const FitJob job = with_catalogue(task, optimum);
-  const Task wider(job);
-  Theta before = optimum.theta;
-  Optimum with_all = settle(wider, best_with_nuisances(wider, task, optimum, minima));
-  if (with_all.stopped || !believes_catalogue(missed_of_contrast(task, optimum), missed_of_contrast(wider, with_all)))
-    return concluded(task, minima, std::move(optimum), false);
-  with_all.came_from = std::move(before);
-  const Minima places = widened(wider, task, with_all.theta, minima);
-  return concluded(wider, places, std::move(with_all), false);
+  auto wider = std::make_unique<Refit>(with_catalogue(task, optimum));
+  wider->optimum = settle(wider->task, best_with_nuisances(wider->task, task, optimum, minima));
+  if (wider->optimum.stopped ||
+      !believes_catalogue(missed_of_contrast(task, optimum), missed_of_contrast(wider->task, wider->optimum)))
+    return nullptr;
+  wider->optimum.came_from = optimum.theta;
+  return wider;
 }
 
-/// Where something is left over, what is foreign to the object goes first, and then the rest is asked for its causes.
-/// `minima` are of this task.
+/// Where something is left over, its causes are asked for; where these do not explain all of it, what is foreign to the
+/// object is left out and the rest asked again. `minima` are of this task.
 Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
   if (beaten || !asks_catalogue(task, optimum)) return concluded(task, minima, std::move(optimum), beaten);
-  const std::unique_ptr<Narrowed> less = without_foreign(task, optimum, minima);
-  if (!less) return with_all_departures(task, minima, std::move(optimum));
-  if (!asks_catalogue(less->task, less->optimum)) return concluded(less->task, minima, std::move(less->optimum), false);
-  return with_all_departures(less->task, minima, std::move(less->optimum));
+  std::unique_ptr<Refit> last = with_all_departures(task, optimum, minima), less;
+  if (!last || leaves_discrepancy(last->task, last->optimum)) {
+    less = without_foreign(task, optimum, minima);
+    if (less && asks_catalogue(less->task, less->optimum))
+      last = with_all_departures(less->task, less->optimum, minima);
+    else if (less)
+      last = nullptr;
+  }
+  if (!last) last = std::move(less);
+  if (!last) return concluded(task, minima, std::move(optimum), false);
+  const Minima places = widened(last->task, task, last->optimum.theta, minima);
+  return concluded(last->task, places, std::move(last->optimum), false);
 }
 
 /// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
