@@ -189,8 +189,9 @@ struct ShellDirector {
   }
 };
 
-/// The families that a droplet and a cell may have.
+/// The families that a droplet may have.
 using DropletDirector = std::variant<RadialDirector, AxialDirector, BipolarDirector, ShellDirector>;
+/// The families that a cell may have.
 using CellDirector = std::variant<UniformDirector, TwistedDirector, FreederickszDirector, HelixDirector>;
 
 }  // namespace birefit
