@@ -67,7 +67,7 @@ Patterns::Polar Patterns::polar_at(int x, int y) const {
 }
 
 void Patterns::at(Eigen::Index pixel, Eigen::Ref<Eigen::VectorXd> out) const {
-  const auto [x, y] = pixels_[static_cast<std::size_t>(pixel)];
+  const int x = pixels_[static_cast<std::size_t>(pixel)][0], y = pixels_[static_cast<std::size_t>(pixel)][1];
   const double light = light_.light(x, y);
   int k = 0;
   const auto waves = [&](int from, int to, double factor) {
@@ -104,7 +104,7 @@ void Patterns::at(Eigen::Index pixel, Eigen::Ref<Eigen::VectorXd> out) const {
 }
 
 std::array<std::size_t, 2> Patterns::parts_at(Eigen::Index pixel) const {
-  const auto [x, y] = pixels_[static_cast<std::size_t>(pixel)];
+  const int x = pixels_[static_cast<std::size_t>(pixel)][0], y = pixels_[static_cast<std::size_t>(pixel)][1];
   if (!radius_px_)
     return {static_cast<std::size_t>(kParts * (x - used_.x0) / used_.width()),
             static_cast<std::size_t>(kParts * (y - used_.y0) / used_.height())};

@@ -155,7 +155,7 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
       break;
     }
     if (same && std::any_of(result.candidates.begin(), result.candidates.end(),
-                            [&](const Candidate& known) { return same(known.searched, from); }))
+                            [&, at = from](const Candidate& known) { return same(known.searched, at); }))
       continue;
     Candidate candidate;
     candidate.searched = from;
