@@ -84,7 +84,8 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
   std::vector<Item> items =
       series ? items_of(reader, *series, frame, frame + 1, nodes) : read_items(reader, root, config, nodes);
   if (!items.empty()) {
-    for (const auto& [name, node] : items[0].set) {
+    for (const auto& set : items[0].set) {
+      const std::string& name = set.first;
       const bool everywhere = std::all_of(items.begin(), items.end(), [&](const Item& item) {
         return std::any_of(item.set.begin(), item.set.end(), [&](const auto& entry) { return entry.first == name; });
       });
