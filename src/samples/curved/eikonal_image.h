@@ -19,7 +19,7 @@ class EikonalImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
   EikonalImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light);
-  void tabulate(SampleImage<S>::Wanted, int threads) override;
+  void tabulate(typename SampleImage<S>::Wanted, int threads) override;
   void light(const P& column, const P& row, S* out) const override;
   Symmetry symmetry() const override { return symmetry_; }
   bool has_passing_light() const override { return !passing_.dark(); }

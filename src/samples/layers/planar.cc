@@ -174,7 +174,7 @@ class PlanarImage final : public SampleImage<S> {
     return light_.linear() && !coupling_ && !optics_.column->absorbing && optics_.continuity == Continuity::e_and_h;
   }
   Symmetry symmetry() const override { return symmetry_; }
-  void tabulate(SampleImage<S>::Wanted wanted, int threads) override {
+  void tabulate(typename SampleImage<S>::Wanted wanted, int threads) override {
     if (wanted != SampleImage<S>::Wanted::picture || tabulated_blocks_.empty()) return;
     // Where the cone's middle lies and how wide it is carries fringes along and changes none. Seen from the side a
     // wider cone carries them by other ways than straight away from the middle: its derivative is left to rays.

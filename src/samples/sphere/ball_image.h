@@ -128,7 +128,7 @@ class BallImage final : public SampleImage<S> {
     return square.of_core ? rays_of_table_->in_core(v, cos_azimuth, sin_azimuth, mesh)
                           : rays_of_table_->at_fraction(v, cos_azimuth, sin_azimuth, mesh, core_apart_);
   }
-  void tabulate(SampleImage<S>::Wanted wanted, int threads) override {
+  void tabulate(typename SampleImage<S>::Wanted wanted, int threads) override {
     if (wanted != SampleImage<S>::Wanted::picture) return;
     std::vector<DiscSquare> squares = choices(plan_).disc;
     if (!core_apart_)  // it was when the picture was planned

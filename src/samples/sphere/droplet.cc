@@ -82,7 +82,7 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
 }
 
 template <class S>
-void DropletImage<S>::tabulate(SampleImage<S>::Wanted, int threads) {
+void DropletImage<S>::tabulate(typename SampleImage<S>::Wanted, int threads) {
   if (rest_panels_ == 0) return;
   const auto part = [&](Part which, int panels) {
     return RadialTable<S>(panels, number_of_terms(), threads, [&](const P& v, S* out) { terms(which, S(v), out); });

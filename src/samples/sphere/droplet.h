@@ -52,7 +52,7 @@ class DropletImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
   DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light);
-  void tabulate(SampleImage<S>::Wanted, int threads) override;
+  void tabulate(typename SampleImage<S>::Wanted, int threads) override;
   void light(const P& column, const P& row, S* out) const override;
   Symmetry symmetry() const override { return symmetry_; }
   int edges() const override { return shell_ && lane(plain(core_um_), 0) > 0 ? 2 : 1; }
