@@ -127,6 +127,15 @@ TEST(FieldFiles, DamagedOnesAreRefused) {
       error_of(r);
     }
   }
+  // An archive whose directory is said to lie at the end of all numbers: nothing is read there.
+  std::string directory = std::string("PK\6\6") + std::string(52, '\0');
+  directory[32] = 1;  // one entry
+  directory.replace(48, 8, 8, '\xff');
+  const std::string far = "PK\3\4" + directory + "PK\5\6" + std::string(18, '\xff');
+  VolumeRequest r = request("field_stored.npz");
+  r.path = folder / "far.npz";
+  std::ofstream(r.path, std::ios::binary) << far;
+  EXPECT_THAT(error_of(r), HasSubstr("damaged or cut off archive"));
   std::filesystem::remove_all(folder);
 }
 

@@ -157,7 +157,7 @@ struct ZipEntry {
 std::map<std::string, ZipEntry> zip_entries(const std::string& content, const std::string& file) {
   const auto damaged = [&] { refuse(file, "is a damaged or cut off archive", "save it again"); };
   const auto at = [&](std::uint64_t from, auto like) {
-    if (from + sizeof like > content.size()) damaged();
+    if (from > content.size() || content.size() - from < sizeof like) damaged();  // sums could overflow
     return static_cast<std::uint64_t>(read_as<decltype(like)>(content.data() + from));
   };
   const std::size_t end = content.rfind("PK\5\6");
