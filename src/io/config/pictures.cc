@@ -96,6 +96,7 @@ void take_region(const LoadedImage& image, const Image& variance_scale, const Gr
       std::lround(share * (static_cast<double>(image.width / bin) * (image.height / bin) - 1.0 * width * height)));
 }
 
+/// The light of one code, on the scale of the codes.
 double linear(double code, const Transfer& transfer, double top_code) {
   Image one(1, 1, code);
   linearise(one, transfer, top_code);
