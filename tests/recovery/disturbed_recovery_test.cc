@@ -339,6 +339,7 @@ TEST(DisturbedRecovery, SaturatedAndCutOff) {
   EXPECT_EQ(fits("black cut", black, false).wrong, 0);
   const Outcome seen = fits("black cut", black, true);
   EXPECT_EQ(seen.wrong + seen.without_answer, 0);
+  EXPECT_NEAR(seen.reduced, 1, 0.1);  // half of it where pixels without noise are taken along
   EXPECT_LT(std::abs(seen.birefringence.bias()), 4 / std::sqrt(10.0));
   const Outcome half = fits("cut off", cut, false);
   EXPECT_EQ(half.wrong, 0);
