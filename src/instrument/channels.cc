@@ -279,8 +279,8 @@ SpectralSum gauss_sum(const SpectralSum& fine, int n) {
 
 double cycles_per_um(const SpectralSum& sum, const std::vector<double>& t) {
   if (t.size() != sum.size()) throw std::logic_error("cycles_per_um: t is not of the sum's wavelengths");
-  // The share of all channels left out at either end: 400 to 700 nm of the CIE's observer under E.
-  constexpr double kEnds = 0.004;
+  // The share of all channels left out at either end: what is between is 394 to 695 nm of the CIE's observer under E.
+  constexpr double kEnds = 0.001;
   std::vector<double> together(sum.size(), 0.0);
   for (const std::vector<double>& w : sum.weight)
     for (std::size_t k = 0; k < w.size(); ++k) together[k] += w[k];
@@ -295,11 +295,15 @@ double cycles_per_um(const SpectralSum& sum, const std::vector<double>& t) {
 }
 
 int gauss_nodes(double cycles, double error) {
-  // Powers of ten below 1e-3; 0 and 1 are what was measured.
+  // Decades below 1e-3; 0 and 1 are what was measured.
   const double decades = std::clamp(-3 - std::log10(error), -1.0, 3.0);
-  return static_cast<int>(std::ceil(7 + 5 * decades + (3.5 + 0.3 * decades) * cycles));
+  return static_cast<int>(std::ceil(7 + 5 * decades + (3.8 + 0.5 * decades) * cycles));
 }
-int uniform_nodes(double cycles) { return static_cast<int>(std::ceil(20 + 1.6 * cycles)); }
+int line_nodes(double phase_deviation) {
+  const double s = phase_deviation;
+  return static_cast<int>(std::ceil(2 + s * (3 + 0.2 * s)));
+}
+int uniform_nodes(double cycles) { return static_cast<int>(std::ceil(42 + 1.6 * cycles)); }
 
 double difference(const SpectralSum& a, const SpectralSum& b, const std::function<double(double)>& intensity) {
   const std::vector<double> of_a = a.of(intensity), of_b = b.of(intensity);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <numbers>
-#include <numeric>
 #include <stdexcept>
 
 namespace birefit {
@@ -109,7 +109,7 @@ void Coherence::tabulate() {
   }
 }
 
-Coherence::WithSlope<double> Coherence::sum(std::size_t row, double g) const {
+Coherence::WithSlope<double> Coherence::beyond(std::size_t row, double g) const {
   WithSlope<double> v{0, 0, 0, 0};
   for (std::size_t k = 0; k < t_.size(); ++k) {
     double s, c;
@@ -123,29 +123,51 @@ Coherence::WithSlope<double> Coherence::sum(std::size_t row, double g) const {
   return v;
 }
 
-Coherence::WithSlope<double> Coherence::values(std::size_t row, double g) const {
-  const double size = std::abs(g), place = size / width_;
-  if (!(place < static_cast<double>(panels_))) return sum(row, g);
-  const std::size_t p = static_cast<std::size_t>(place);
-  const Panel& panel = panel_[row * panels_ + p];
-  const double x = p == 0 ? 2 * place * place - 1 : 2 * (place - static_cast<double>(p)) - 1;
-  double loss = 0, im = 0, loss_slope = 0, im_slope = 0;
+// A coefficient of each lane's own panel, whose number is a whole `p`.
+static double pick(const double* from, double p, std::size_t stride) {
+  return from[static_cast<std::size_t>(p) * stride];
+}
+static Pack pick(const double* from, const Pack& p, std::size_t stride) {
+  return Pack::gather(from, xsimd::batch_cast<std::int64_t>(p * static_cast<double>(stride)));
+}
+template <class P, class Coefficient>
+BIREFIT_INLINE Coherence::WithSlope<P> Coherence::polynomials(const P& x, const Coefficient& coefficient) {
+  P loss(0.0), im(0.0), loss_slope(0.0), im_slope(0.0);
   for (std::size_t c = kPoints; c-- > 0;) {
     loss_slope = loss_slope * x + loss;
     im_slope = im_slope * x + im;
-    loss = loss * x + panel.power[c][0];
-    im = im * x + panel.power[c][1];
+    loss = loss * x + coefficient(2 * c);
+    im = im * x + coefficient(2 * c + 1);
   }
-  if (p == 0) {
-    // x = 2 (g/width)^2 - 1
-    const double dx = 4 * g / (width_ * width_);
-    return {g * g * loss, g * im, 2 * g * loss + g * g * loss_slope * dx, im + g * im_slope * dx};
-  }
-  const double scale = 2 / width_, sign = g < 0 ? -1 : 1;
-  return {loss, sign * im, sign * loss_slope * scale, im_slope * scale};
+  return {loss, im, loss_slope, im_slope};
 }
 
-Coherence::WithSlope<Pack> Coherence::values(std::size_t row, const Pack& g) const {
+template <class P>
+Coherence::WithSlope<P> Coherence::values(std::size_t row, const P& g) const {
+  const P size = max_of(g, P(0.0) - g), place = size * (1 / width_);
+  if (!all(place < P(static_cast<double>(panels_)))) return beyond(row, g);
+  using std::floor, xsimd::floor;
+  const P p = floor(place);
+  const auto first = p == P(0.0);
+  const P x = select(first, 2.0 * place * place, 2.0 * (place - p)) - P(1.0);
+  const double* power = panel_[row * panels_].power[0];
+  constexpr std::size_t kStride = sizeof(Panel) / sizeof(double);
+  // Neighbours in a picture mostly share a panel.
+  const double* shared = power + static_cast<std::size_t>(lane(p, 0)) * kStride;
+  const WithSlope<P> v = all(p == P(lane(p, 0)))
+                             ? polynomials(x, [&](std::size_t i) { return P(shared[i]); })
+                             : polynomials(x, [&](std::size_t i) { return pick(power + i, p, kStride); });
+  // In the first panel x = 2 (g/width)^2 - 1, and the polynomials are of loss/g^2 and im/g.
+  const P dx = g * (4 / (width_ * width_)), sign = select(g < P(0.0), P(-1.0), P(1.0));
+  const double scale = 2 / width_;
+  return {select(first, g * g * v.loss, v.loss), select(first, g * v.im, sign * v.im),
+          select(first, g * (2.0 * v.loss + g * v.loss_slope * dx), sign * v.loss_slope * scale),
+          select(first, v.im + g * v.im_slope * dx, v.im_slope * scale)};
+}
+template Coherence::WithSlope<double> Coherence::values(std::size_t, const double&) const;
+template Coherence::WithSlope<Pack> Coherence::values(std::size_t, const Pack&) const;
+
+Coherence::WithSlope<Pack> Coherence::beyond(std::size_t row, const Pack& g) const {
   alignas(64) double at[kLanes], out[4][kLanes];
   g.store_aligned(at);
   for (int i = 0; i < kLanes; ++i) {
@@ -162,13 +184,12 @@ Coherence::WithSlope<Pack> Coherence::values(std::size_t row, const Pack& g) con
 double gaussian_line_error(const PhaseSeries<double>& phase, double sigma) {
   using C = std::complex<double>;
   const double s2 = sigma * sigma;
-  const C z(1, -s2 * phase.d2), m = C(0, s2 * phase.d1) / z, u = s2 / z;
-  const double envelope = std::abs(std::exp(-0.5 * s2 * phase.d1 * phase.d1 / z) / std::sqrt(z));
-  const C fourth = m * m * m * m + 6.0 * m * m * u + 3.0 * u * u;
-  // <y^6> of the square of the third order; d4 is about -4 d3, that of a path difference without dispersion.
-  const C m2 = m * m, sixth = m2 * m2 * m2 + 15.0 * m2 * m2 * u + 45.0 * m2 * u * u + 15.0 * u * u * u;
-  return 0.5 * envelope *
-         (std::abs(phase.d3 / 6 * (phase.d3 / 6) * sixth) * 0.5 + std::abs(4 * phase.d3 / 24 * fourth));
+  const C z(1, -s2 * phase.d2), u = s2 / z, m2 = -phase.d1 * phase.d1 * u * u;
+  const double envelope = std::abs(std::exp(-0.5 * phase.d1 * phase.d1 * u) / std::sqrt(z));
+  // <y^4> and <y^6> about the moved mean: of the fourth order and of half the square of the third.
+  const C fourth = m2 * m2 + 6.0 * m2 * u + 3.0 * u * u;
+  const C sixth = m2 * m2 * m2 + 15.0 * m2 * m2 * u + 45.0 * m2 * u * u + 15.0 * u * u * u;
+  return envelope * std::abs(C(0, phase.d4 / 24) * fourth - phase.d3 * phase.d3 / 72 * sixth);
 }
 
 }  // namespace birefit

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/scalar.h"
+#include "core/taylor.h"
 #include "instrument/channels.h"
 
 namespace birefit {
@@ -27,7 +28,7 @@ struct MeanPhase {
 class Coherence {
  public:
   /// Of the sum's weights with t (1/um, finite, above 0) at its wavelengths; tables up to |G| = reach_um (above 0), in
-  /// panels of 16 Chebyshev points: within 1e-11 of the sum itself, chi' within 1e-9 times the largest 2 pi t
+  /// panels of 16 Chebyshev points: within 1e-13 of the sum itself, chi' within 1e-10
   /// (measured: docs/methods.md). Beyond the table the sum is made at every call, a thousand times slower.
   Coherence(const SpectralSum&, const std::vector<double>& t, double reach_um);
   /// Of any rows of weights over t, which need no sum of 1: of weights times dt/dp a derivative by a number p of the
@@ -60,9 +61,13 @@ class Coherence {
     double power[kPoints][2];
   };
   void tabulate();
-  WithSlope<double> values(std::size_t row, double g) const;
-  WithSlope<Pack> values(std::size_t row, const Pack& g) const;
-  WithSlope<double> sum(std::size_t row, double g) const;
+  template <class P>
+  WithSlope<P> values(std::size_t row, const P& g) const;
+  /// Of a panel by the place in it, and their derivatives by that.
+  template <class P, class Coefficient>
+  static WithSlope<P> polynomials(const P& x, const Coefficient& coefficient);
+  WithSlope<double> beyond(std::size_t row, double g) const;
+  WithSlope<Pack> beyond(std::size_t row, const Pack& g) const;
   static MeanPhase<double> raise(double, const WithSlope<double>& v) { return {v.loss, v.im}; }
   static MeanPhase<Pack> raise(const Pack&, const WithSlope<Pack>& v) { return {v.loss, v.im}; }
   template <class B, int N>
@@ -78,20 +83,15 @@ class Coherence {
   std::vector<Panel> panel_;  // [row][panel]
 };
 
-/// Phase difference of a retarder of path difference g * D(l) by relative wavelength y = l/l0 - 1: value and the first
-/// three derivatives at y = 0.
+/// A phase difference by relative wavelength y = l/l0 - 1: value and derivatives at y = 0, rad.
 template <class S>
 struct PhaseSeries {
-  S d0, d1, d2, d3;
+  S d0, d1, d2, d3, d4;
 };
-/// Of a path difference `at_line` (um, at the line's centre l0) and its first three derivatives by y over itself: D'/D,
-/// D''/D and D'''/D (0 without dispersion).
+/// Of a law evaluated at the wavelength l0 Taylor<S, 4>::variable(1) (core/taylor.h).
 template <class S>
-PhaseSeries<S> phase_series(const S& at_line, double line_um, const std::array<double, 3>& relative = {}) {
-  // delta = 2 pi G (1 + r1 y + r2 y^2/2 + r3 y^3/6)/(l0 (1 + y))
-  const S d = at_line * (6.283185307179586 / line_um);
-  const double r1 = relative[0], r2 = relative[1], r3 = relative[2];
-  return {d, d * (r1 - 1), d * (r2 - 2 * r1 + 2), d * (r3 - 3 * r2 + 6 * r1 - 6)};
+PhaseSeries<S> phase_series(const Taylor<S, 4>& by_y) {
+  return {by_y.c[0], by_y.c[1], by_y.c[2] * 2.0, by_y.c[3] * 6.0, by_y.c[4] * 24.0};
 }
 
 /// Mean of e^{i delta} over a line that is Gaussian in wavelength, `sigma` = fwhm/(2.3548 l0): chirp (d2) in closed
