@@ -13,8 +13,9 @@ using Eigen::Matrix3d, Eigen::Vector3d;
 Vector3d vector(const Xyz& c) { return {c.x, c.y, c.z}; }
 /// Tristimulus values of Y = 1 by chromaticity.
 Vector3d of_chromaticity(double x, double y) { return {x / y, 1, (1 - x - y) / y}; }
-/// The white of sRGB as IEC 61966-2-1 has it, D65 to four digits.
-Vector3d screen_white() { return of_chromaticity(0.3127, 0.3290); }
+/// D65 as ASTM E308 has it. IEC 61966-2-1 says (0.3127, 0.3290), the same to the digits given: colours of either differ
+/// by 1e-4.
+Vector3d screen_white() { return {0.95047, 1, 1.08883}; }
 
 /// From tristimulus values (white of Y = 1) to shares of the primaries of sRGB, IEC 61966-2-1, which make the white
 /// with equal shares.
