@@ -110,7 +110,8 @@ SpectralTable spectral_table(std::vector<double> wavelength_um, std::vector<doub
 void check_spectrum(const Spectrum& spectrum, const Where& where, const std::string& name) {
   const auto within = [&](double value, double least, double most, const char* what, const char* unit) {
     if (value >= least && value <= most) return;
-    const bool nanometres = std::string(unit) == "um" && value >= 1e3 * least && value > most && value <= 1e3 * most;
+    const bool nanometres =
+        std::string(unit) == "um" && value >= 1 && value >= 1e3 * least && value > most && value <= 1e3 * most;
     throw UserError(where, fmt::format("{}: {} of {} {} is outside [{}, {}]", name, what, value, unit, least, most),
                     nanometres ? fmt::format("{} looks like nanometres", value) : std::string());
   };
@@ -119,11 +120,11 @@ void check_spectrum(const Spectrum& spectrum, const Where& where, const std::str
                     [&](const Planck& b) { within(b.temperature_k, 500, 30000, "a temperature", "K"); },
                     [&](const GaussianLine& g) {
                       within(g.centre_um, kLeastUm, kMostUm, "a centre", "um");
-                      within(g.fwhm_um, kLeastWidth, g.centre_um / 4, "a full width at half maximum", "um");
+                      within(g.fwhm_um, kLeastWidth, g.centre_um, "a full width at half maximum", "um");
                     },
                     [&](const FlatBand& b) {
                       within(b.centre_um, kLeastUm, kMostUm, "a centre", "um");
-                      within(b.width_um, kLeastWidth, b.centre_um / 2, "a width", "um");
+                      within(b.width_um, kLeastWidth, b.centre_um, "a width", "um");
                       within(b.edge_um, kLeastWidth, b.width_um, "an edge", "um");
                     },
                     [&](const SpectralTable& t) { check_table(t, where, name); }},

@@ -16,20 +16,20 @@ struct EqualEnergy {};
 
 /// A black body's power by wavelength, 1 at 560 nm. Illuminant A is one (illuminant_a).
 struct Planck {
-  double temperature_k = 0;  ///< above 0
+  double temperature_k = 0;  ///< 500 to 30,000
 };
 
 /// A Gaussian in wavelength, 1 at its centre, as makers of lines and of filters state it; 0 where it is below 2.3e-16.
 struct GaussianLine {
-  double centre_um = 0;  ///< above 0
-  double fwhm_um = 0;    ///< full width at half maximum, above 0
+  double centre_um = 0;  ///< 0.1 to 20
+  double fwhm_um = 0;    ///< full width at half maximum, in (0, centre_um]
 };
 
 /// A filter that is 1 within a band and falls to 0 along straight edges. Edges are never sharp: what passes then has a
 /// derivative by the band's place.
 struct FlatBand {
-  double centre_um = 0;  ///< above 0
-  double width_um = 0;   ///< between the two places where half passes, above 0
+  double centre_um = 0;  ///< 0.1 to 20
+  double width_um = 0;   ///< between the two places where half passes, in (0, centre_um]
   double edge_um = 0;    ///< from 1 to 0, in (0, width_um]
 };
 
