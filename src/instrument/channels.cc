@@ -295,9 +295,10 @@ double cycles_per_um(const SpectralSum& sum, const std::vector<double>& t) {
 }
 
 int gauss_nodes(double cycles, double error) {
-  // Decades below 1e-3; 0 and 1 are what was measured.
-  const double decades = std::clamp(-3 - std::log10(error), -1.0, 3.0);
-  return static_cast<int>(std::ceil(7 + 5 * decades + (3.8 + 0.5 * decades) * cycles));
+  // Decades below 1e-3, d. Beyond 14 cycles most of the fringes have gone from the channels.
+  const double d = std::clamp(-3 - std::log10(error), 0.0, 3.0);
+  const double seen = std::min(cycles, 14.0), gone = cycles - seen;
+  return static_cast<int>(std::ceil(7 + 5 * d + (3.8 + 0.5 * d) * seen + (2.4 + d * (0.65 + 0.25 * d)) * gone));
 }
 int line_nodes(double phase_deviation) {
   const double s = phase_deviation;

@@ -82,13 +82,14 @@ SpectralSum gauss_sum(const SpectralSum& fine, int n);
 /// CIE's observer has 1.03 times the difference of t between 400 and 700 nm.
 double cycles_per_um(const SpectralSum&, const std::vector<double>& t);
 /// Nodes of gauss_sum for an intensity with so many cycles (retardance times cycles_per_um), to hold an error of the
-/// intensity in [1e-6, 1e-2] of white: 7 + 3.8 cycles for 1e-3, 12 + 4.3 for 1e-4, and on in proportion to the
-/// logarithm. Measured on twisted cells, the CIE's observer and a camera, up to 30 cycles.
+/// intensity in [1e-6, 1e-3] of white: 7 + 3.8 cycles for 1e-3, 12 + 4.3 for 1e-4, and on in proportion to the
+/// logarithm; less for each cycle above 14. Measured on twisted cells, the CIE's observer and a camera, up to 30
+/// cycles.
 int gauss_nodes(double cycles, double error);
 /// Nodes of gauss_sum for 1e-4 with a Gaussian line as lamp or filter, by the standard deviation of the phase over the
 /// line (rad), up to 6. More where the line's foot reaches an absorption.
 int line_nodes(double phase_deviation);
-/// Wavelengths of Channels::uniform for 1e-3, 42 + 1.6 cycles: fewer than gauss_nodes above 16 cycles. Spectra as
+/// Wavelengths of Channels::uniform for 1e-3, 42 + 1.6 cycles: fewer than gauss_nodes above 20 cycles. Spectra as
 /// smooth as the CIE's observer under E are done with 20 + 1.9 cycles, fewer than gauss_nodes above 7.
 int uniform_nodes(double cycles);
 /// Largest difference between two sums in any channel: of n nodes and n + 3, the error of the

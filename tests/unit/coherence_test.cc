@@ -354,6 +354,8 @@ TEST(SpectralNodes, CountsAreEnoughAndNotTooMany) {
         for (const auto& cell : cells) error = std::max(error, difference(sum, fine, cell));
         return error;
       };
+      for (const double error : {1e-5, 1e-6})
+        EXPECT_LT(worst(gauss_sum(fine, gauss_nodes(cycles, error))), error) << lamp << " " << cycles;
       for (const double error : {1e-3, 1e-4}) {
         const int n = gauss_nodes(cycles, error);
         EXPECT_LT(worst(gauss_sum(fine, n)), error) << lamp << " " << cycles;
