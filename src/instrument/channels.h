@@ -90,10 +90,11 @@ int gauss_nodes(double cycles, double error);
 /// line (rad), up to 6. More where the line's foot reaches an absorption.
 int line_nodes(double phase_deviation);
 /// Wavelengths of Channels::uniform for 1e-3, 42 + 1.6 cycles: fewer than gauss_nodes above 20 cycles. Spectra as
-/// smooth as the CIE's observer under E are done with 20 + 1.9 cycles, fewer than gauss_nodes above 7.
+/// smooth as the CIE's observer under E are done with 20 + 1.9 cycles, fewer than gauss_nodes above 7. Errors do not
+/// fall steadily where tables have kinks: ask `difference`.
 int uniform_nodes(double cycles);
-/// Largest difference between two sums in any channel: of n nodes and n + 3, the error of the
-/// former within a factor of three.
+/// Largest difference between two sums in any channel: of n Gauss nodes and n + 3, the error of the former within a
+/// factor of three.
 double difference(const SpectralSum&, const SpectralSum&, const std::function<double(double)>& intensity);
 
 }  // namespace birefit

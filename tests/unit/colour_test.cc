@@ -4,11 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
 
+#include "instrument/interference_colour.h"
 #include "reference_table.h"
+#include "white_light.h"
 
 namespace birefit {
 namespace {
@@ -102,6 +105,85 @@ TEST(Colour, CodesOfTheScreen) {
   for (double x = -0.2; x < 1.5; x += 0.01) EXPECT_NEAR(srgb_light(srgb_code(x)), x, 1e-12);
   // The two pieces meet to the digits that the standard gives.
   EXPECT_NEAR(12.92 * 0.0031308, srgb_code(0.00313081), 1e-6);
+}
+
+/// A camera under illuminant A, a quartz wedge.
+struct Wedge {
+  Channels channels{illuminant_a(), {}, camera()};
+  SpectralSum fine = channels.fine(8);
+  Coherence chi{fine, turns(fine, "quartz"), 8};
+  std::vector<double> colour(double g) const {
+    std::vector<double> x;
+    for (std::size_t c = 0; c < 3; ++c) x.push_back(0.5 * chi.at(c, g).loss);
+    return x;
+  }
+  const std::vector<double> noise{0.01, 0.01, 0.01};
+};
+
+TEST(InterferenceColour, SaysTheRetardanceUpToTwoMicrometres) {
+  const Wedge wedge;
+  for (const double g : {0.02, 0.05, 0.2, 0.5, 1.0, 1.2, 2.0}) {
+    const auto found = retardances_of(wedge.chi, wedge.colour(g), wedge.noise);
+    ASSERT_FALSE(found.empty());
+    EXPECT_NEAR(found.front().g_um, g, 1e-6);
+    EXPECT_NEAR(found.front().odds, 1, 0);
+    EXPECT_EQ(found.size(), 1u) << g;
+    EXPECT_LT(found.front().error_um, g < 0.05 ? 0.01 : 0.0031) << g;
+  }
+  // One pair of colours below 2 um is the same within noise of 1 %: of odds one half.
+  const auto pair = retardances_of(wedge.chi, wedge.colour(1.74), wedge.noise);
+  ASSERT_EQ(pair.size(), 2u);
+  EXPECT_NEAR(pair[1].g_um, 0.122, 1e-3);
+  EXPECT_NEAR(pair[1].odds, 0.46, 0.02);
+  // Black says 0, and that its error is not one of a slope.
+  const auto black = retardances_of(wedge.chi, {0, 0, 0}, wedge.noise);
+  ASSERT_EQ(black.size(), 1u);
+  EXPECT_LT(black.front().g_um, 1e-4);
+  EXPECT_GT(black.front().error_um, 1);
+}
+
+TEST(InterferenceColour, IsAmbiguousBeyond) {
+  const Wedge wedge;
+  for (const auto& [g, error] : {std::pair{3.0, 0.0086}, {5.0, 0.032}}) {
+    const auto found = retardances_of(wedge.chi, wedge.colour(g), wedge.noise);
+    EXPECT_GT(found.size(), 3u);
+    EXPECT_NEAR(found.front().g_um, g, 1e-6);
+    EXPECT_NEAR(found.front().error_um, error, 0.02 * error);
+    EXPECT_GT(found[1].odds, 0.9);
+    for (std::size_t i = 1; i < found.size(); ++i) EXPECT_LE(found[i].odds, found[i - 1].odds);
+  }
+}
+
+// Under E the observer sees a quartz retarder that has a double more than 0.1 um away within a CIEDE2000 of 5, 3 and 2
+// from these retardances on, and only greys within 10, 3 and 1 beyond those.
+TEST(InterferenceColour, DoublesAndGreys) {
+  const Channels channels(EqualEnergy{}, {}, observer());
+  const SpectralSum fine = channels.fine(8);
+  const Coherence chi(fine, turns(fine, "quartz"), 8);
+  const std::vector<double>& w = channels.white();
+  const Xyz white{w[0] / w[1], 1, w[2] / w[1]};
+  const double step = 0.01;
+  std::vector<Lab> seen;
+  for (int i = 0; i <= 800; ++i) seen.push_back(lab_of(interference_colour(chi, i * step, white), white));
+  const Lab grey = lab_of({0.5 * white.x, 0.5 * white.y, 0.5 * white.z}, white);
+  for (const auto& [limit, from] : {std::pair{5.0, 0.38}, {3.0, 1.0}, {2.0, 2.87}}) {
+    int first = 0;
+    const auto has_double = [&](int i) {
+      for (int j = 0; j <= 800; ++j)
+        if (std::abs(i - j) * step > 0.1 &&
+            ciede2000(seen[static_cast<std::size_t>(i)], seen[static_cast<std::size_t>(j)]) < limit)
+          return true;
+      return false;
+    };
+    while (!has_double(first)) ++first;
+    EXPECT_NEAR(first * step, from, 0.025) << limit;
+  }
+  for (const auto& [limit, beyond] : {std::pair{10.0, 3.39}, {3.0, 5.49}, {1.0, 5.82}}) {
+    int last = 0;
+    for (int i = 0; i <= 800; ++i)
+      if (ciede2000(seen[static_cast<std::size_t>(i)], grey) > limit) last = i;
+    EXPECT_NEAR(last * step, beyond, 0.015) << limit;
+  }
 }
 
 }  // namespace
