@@ -45,9 +45,9 @@ class Channels {
   /// up to a factor.
   const std::vector<double>& white() const { return white_; }
 
-  /// Four Gauss points within each piece between kinks of any of the spectra, pieces no longer than a nanometre: exact
-  /// to 1e-10 for phases 2 pi G t, t = 1/l times a dispersion of at most 1.5, of up to `reach_um` = |G|. In white light
-  /// a lamp and an observer of 1 nm have 1,880 wavelengths for 20 um and less.
+  /// Four Gauss points within each piece between kinks of any of the spectra, pieces of a nanometre at most and shorter
+  /// where the phase 2 pi G t of retardances up to |G| = reach_um asks for it: within 1e-9 for dispersions as strong as
+  /// a nematic's. With the CIE's observer 1,880 wavelengths for 20 um and less.
   SpectralSum fine(double reach_um = 20) const;
   /// The middles of n equal intervals of 1/wavelength over the range, weights scaled anew: errs by the channels'
   /// coherence at path differences of n/(width of the range in 1/wavelength) less that of the intensity.

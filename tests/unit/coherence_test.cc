@@ -286,6 +286,26 @@ TEST(GaussianLine, OrdersOfThePhase) {
   EXPECT_LT(nodes, 1e-4);
 }
 
+// By the thickness of a plate and by the width of the line, in lanes.
+TEST(GaussianLine, HasDerivatives) {
+  const double l0 = 0.55;
+  const auto mean = [&](const auto& g, const auto& fwhm) {
+    using S = std::decay_t<decltype(g)>;
+    using Series = Taylor<S, 4>;
+    const Series l = Series::variable(S(1.0)) * Series(S(l0));
+    return gaussian_line(phase_series(Series(2 * kPi * g) * dispersion("quartz", l) / l), fwhm * S(1 / (2.3548 * l0)));
+  };
+  Dual<Pack, 2> g(Pack(30.0)), fwhm(Pack(0.01));
+  g.d[0] = fwhm.d[1] = Pack(1.0);
+  const MeanPhase<Dual<Pack, 2>> m = mean(g, fwhm);
+  EXPECT_NEAR(lane(m.loss.value, 0), mean(30.0, 0.01).loss, 1e-12);
+  const double step = 1e-5;
+  EXPECT_NEAR(lane(m.loss.d[0], 0), (mean(30 + step, 0.01).loss - mean(30 - step, 0.01).loss) / (2 * step), 1e-7);
+  EXPECT_NEAR(lane(m.im.d[0], 0), (mean(30 + step, 0.01).im - mean(30 - step, 0.01).im) / (2 * step), 1e-7);
+  EXPECT_NEAR(lane(m.loss.d[1], 0), (mean(30.0, 0.01 + step).loss - mean(30.0, 0.01 - step).loss) / (2 * step), 1e-2);
+  EXPECT_NEAR(lane(m.im.d[1], 0), (mean(30.0, 0.01 + step).im - mean(30.0, 0.01 - step).im) / (2 * step), 1e-2);
+}
+
 /// Ideal retarder of uniform twist (closed form, Jones 1948; tangential field only): angles in rad.
 double twisted_cell(double um, double thickness, double twist, double entry, double polarizer, double analyzer) {
   using C = std::complex<double>;
