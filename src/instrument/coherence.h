@@ -27,9 +27,9 @@ struct MeanPhase {
 /// Tables of chi and chi' over G, a row for every channel and one for every derivative of its weights.
 class Coherence {
  public:
-  /// Of the sum's weights with t (1/um, finite, above 0) at its wavelengths; tables up to |G| = reach_um (above 0), in
-  /// panels of 16 Chebyshev points: within 1e-13 of the sum itself, chi' within 1e-10
-  /// (measured: docs/methods.md). Beyond the table the sum is made at every call, a thousand times slower.
+  /// Of the sum's weights with t (1/um, finite, above 0) at its wavelengths; tables up to |G| = reach_um (above 0),
+  /// within 1e-13 of the sum itself, chi' within 1e-10. Beyond them the sum is made at every call, a thousand times
+  /// slower, and good to the reach that it was made for (Channels::fine).
   Coherence(const SpectralSum&, const std::vector<double>& t, double reach_um);
   /// Of any rows of weights over t, which need no sum of 1: of weights times dt/dp a derivative by a number p of the
   /// dispersion, dchi/dp = 2 pi i G (sum - loss + i im).
