@@ -33,6 +33,7 @@ struct Config {
   FitJob job;                                 ///< measurements empty for render-only configs
   std::vector<SignalTable> signals;           ///< empty when the job is of images
   Scene scene;                                ///< of the first measurement, or of `image_size_px`
+  std::vector<Scene> colours;                 ///< of a picture of red, green and blue: the same scene in each
   Observable observable;                      ///< what is measured in it
   std::vector<std::filesystem::path> inputs;  ///< every file that was read beside the config
   /// of a frame of a series: all that determines its fit (birefit/series.h); goes into fit.json

@@ -1,9 +1,11 @@
 #pragma once
 // What lights and images a sample.
 
+#include <optional>
 #include <variant>
 #include <vector>
 
+#include "birefit/light.h"
 #include "birefit/number_spec.h"
 #include "birefit/parameters.h"
 
@@ -48,14 +50,15 @@ using PolarizingPart = std::variant<Retarder, Rotator>;
 
 /// Light, polarizers and lenses, from the lamp to the camera; azimuths from +x, counter-clockwise in the image.
 struct Microscope {
-  ParameterRef wavelength_nm;  ///< vacuum
-  ParameterRef polarizer_deg;  ///< not given: none, the light that comes in is unpolarized
-  ParameterRef analyzer_deg;   ///< not given: none, all that leaves the sample is seen
+  ParameterRef wavelength_nm;  ///< vacuum; with `channel_light` one of its wavelengths, which pictures do not depend on
+  std::optional<ChannelLight> channel_light;  ///< not given: a line of this wavelength
+  ParameterRef polarizer_deg;                 ///< not given: none, the light that comes in is unpolarized
+  ParameterRef analyzer_deg;                  ///< not given: none, all that leaves the sample is seen
   /// Flux that is let through along the polarizer over flux across it, both as they come in; >= 1; not given: ideal.
   ParameterRef polarizer_extinction_ratio, analyzer_extinction_ratio;
   /// Between polarizer and sample, between sample and analyser; in the order in which light meets them.
   std::vector<PolarizingPart> before, behind;
-  /// FWHM; not given: not stated, a line. Modelled by discs (a Gaussian), else it enters the model error.
+  /// FWHM of a line that is Gaussian in wavelength; not given: not stated, a single wavelength. Without channel_light.
   ParameterRef bandwidth_nm;
   ParameterRef condenser_na;  ///< not given: not stated; not modelled: enters the model error
   /// Not given: not stated. Waves: the objective's band limit; droplet rays leaving steeper than this are lost.
@@ -71,6 +74,7 @@ struct Microscope {
                  "vacuum");
     visit.number("light.bandwidth_nm", self.bandwidth_nm, numbers::within(0, 5000, "nm").left_out(),
                  "FWHM of the line");
+    visit.inside("light", self.channel_light);
     visit.number("polarizer_deg", self.polarizer_deg, numbers::dial(), "from +x");
     visit.number("analyzer_deg", self.analyzer_deg, numbers::dial(), "from +x");
     visit.number("polarizer_extinction_ratio", self.polarizer_extinction_ratio,

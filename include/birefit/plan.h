@@ -17,6 +17,8 @@ struct WavePlan;  // grids of wave optics, render/wave.h
 
 struct SampleChoices;  // what a kind of sample tabulates, samples/choices.h
 
+struct WavelengthRule;  // the wavelengths of a sum and their weights, instrument/channel_light.h
+
 /// How the means over pixels are made of rays.
 struct PixelMeans {
   /// Samples per pixel side by distance from (center_x_px, center_y_px), one entry per bin_px; 1 = the point value with
@@ -54,6 +56,8 @@ struct RenderPlan {
   int steps = 1;             ///< equal mesh steps in u (diagonal: Gauss nodes)
   std::vector<double> mesh;  ///< adapted mesh in u, instead of `steps` where not empty
   PixelMeans means;
+  /// set: the picture is a sum over these wavelengths, all else of the plan holds for each; null: a single line
+  std::shared_ptr<const WavelengthRule> wavelengths;
   std::shared_ptr<const SampleChoices> own;  ///< the kind's, which nobody else reads; none: its defaults
   /// set: the whole picture at once by wave optics, and nothing of the above but the words
   std::shared_ptr<const WavePlan> wave;

@@ -25,6 +25,7 @@ Command add_schema_command(CLI::App& app);
 Command add_chart_command(CLI::App& app);
 Command add_stress_command(CLI::App& app);
 Command add_audit_command(CLI::App& app);
+Command add_michel_levy_command(CLI::App& app);
 
 inline constexpr int kExitDone = 0;
 inline constexpr int kExitNoAnswer = 1;

@@ -35,8 +35,8 @@ const ImageLibraries& libraries() {
 
 LoadedImage load_image(const ImageRequest& request) { return libraries().load_image(request); }
 
-std::string encode_image(const Image& image, const std::filesystem::path& path, double pixel_size_um) {
-  return libraries().encode_image(image, path, pixel_size_um);
+std::string encode_channels(std::span<const Image> channels, const std::filesystem::path& path, double pixel_size_um) {
+  return libraries().encode_channels(channels, path, pixel_size_um);
 }
 
 std::vector<unsigned char> encode_png(const std::vector<unsigned char>& samples, int width, int height, int channels) {

@@ -44,7 +44,7 @@ int run(int argc, char** argv) {
   const std::vector<Command> commands = {add_fit_command(app),    add_series_command(app),  add_render_command(app),
                                          add_jones_command(app),  add_explain_command(app), add_chart_command(app),
                                          add_stress_command(app), add_audit_command(app),   add_new_command(app),
-                                         add_schema_command(app)};
+                                         add_schema_command(app), add_michel_levy_command(app)};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -52,7 +52,7 @@ int run(int argc, char** argv) {
                                                [&](const Command& c) { return c.app->get_name() == argv[1]; });
     if (argc > 1 && argv[1][0] != '-' && !known) {
       std::cerr << "birefit: unknown command " << printable(argv[1])
-                << "; known: fit, series, render, jones, explain, chart, stress, audit, new and schema\n";
+                << "; known: fit, series, render, jones, explain, chart, stress, audit, michel-levy, new and schema\n";
       return kExitUserError;
     }
     // Help and version are "errors" of code 0 to CLI11; all others are the user's.

@@ -1,8 +1,10 @@
 // birefit render: the forward image at the config's values.
 
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -11,6 +13,7 @@
 #include "app/work.h"
 #include "birefit/io.h"
 #include "core/printable.h"
+#include "instrument/colour.h"
 #include "io/files/file.h"
 
 namespace birefit {
@@ -41,11 +44,22 @@ int run_render(const Arguments& arguments) {
 
   const Theta theta = config.job.parameters.values();
   const auto [chosen, rendering] = do_work(config, memory_to_render(config.scene), [&] {
-    const RenderPlan chosen = plan(config.scene, config.job.demand, theta, config.observable);
-    Rendering rendering = render(config.scene, chosen, theta, {}, arguments.threads);
+    const std::vector<Scene>& scenes = config.colours.empty() ? std::vector<Scene>{config.scene} : config.colours;
+    RenderPlan chosen;
+    Rendering rendering;
+    std::vector<Image> channels;
+    for (const Scene& scene : scenes) {
+      chosen = plan(scene, config.job.demand, theta, config.observable);
+      rendering = render(scene, chosen, theta, {}, arguments.threads);
+      channels.push_back(rendering.intensity);
+    }
+    // As cameras write what is to be looked at.
+    if (channels.size() > 1 && std::filesystem::path(arguments.out).extension() == ".png")
+      for (Image& channel : channels)
+        for (double& value : channel.values()) value = srgb_code(value);
     const ParameterRef size = config.scene.view.pixel_size_um;
     const double pixel_size_um = size ? size.in(theta) : 0;
-    write_file(arguments.out, encode_image(rendering.intensity, arguments.out, pixel_size_um));
+    write_file(arguments.out, encode_channels(channels, arguments.out, pixel_size_um));
     return std::pair(chosen, std::move(rendering));
   });
   if (!arguments.quiet) {

@@ -218,7 +218,7 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
         s.microscope.analyzer_deg = constant(t, "next analyzer_deg", a + turn);
       });
   }
-  if (known(now.wavelength_nm)) {
+  if (known(now.wavelength_nm) && !now.channel_light) {
     const double nm = table[now.wavelength_nm].value;
     for (const double other : {450.0, 532.0, 589.0, 633.0, 700.0})
       if (std::abs(other / nm - 1) > 0.05)

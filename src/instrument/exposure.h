@@ -8,6 +8,8 @@
 
 namespace birefit {
 
+struct WavelengthRule;  // instrument/channel_light.h
+
 /// Light of one direction: all that a sample's picture knows of lamp and polarizing parts.
 template <class S>
 struct Beam {
@@ -20,6 +22,15 @@ struct Beam {
 class BeamMaker {
  public:
   BeamMaker(const Microscope& microscope, Direction direction) : microscope_(&microscope), direction_(direction) {}
+  /// The same light for a sample that sums the wavelengths of a rule itself (SampleKind::sums_wavelengths), or, null,
+  /// of one. The rule must outlive it.
+  BeamMaker with(const WavelengthRule* rule) const {
+    BeamMaker light = *this;
+    light.rule_ = rule;
+    return light;
+  }
+  const WavelengthRule* rule() const { return rule_; }
+  const Microscope& microscope() const { return *microscope_; }
   template <class S>
   Beam<S> in(const Values<S>& value) const {
     return {direction_, Line<S>(*microscope_, value)};
@@ -28,6 +39,7 @@ class BeamMaker {
  private:
   const Microscope* microscope_;
   Direction direction_;
+  const WavelengthRule* rule_ = nullptr;
 };
 
 /// Directions that do not interfere, and their shares of the light, which sum to 1.

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
+
+#include "instrument/beam.h"
+#include "instrument/exposure.h"
 
 namespace birefit {
 namespace {
@@ -16,12 +20,12 @@ constexpr double kPlacesPerUm = 50;
 struct Misfit {
   double value = 0, slope = 0, curvature = 0;
 };
-Misfit misfit(const Coherence& chi, const std::vector<double>& recorded, const std::vector<double>& noise, double g) {
+Misfit misfit(const ColourCurve& curve, const std::vector<double>& recorded, const std::vector<double>& noise, double g) {
   Misfit m;
   Dual<double, 1> at(g);
   at.d[0] = 1;
-  for (std::size_t c = 0; c < chi.channels(); ++c) {
-    const Dual<double, 1> x = chi.at(c, at).loss * 0.5;
+  for (std::size_t c = 0; c < curve.channels(); ++c) {
+    const Dual<double, 1> x = curve.at(c, at);
     const double off = (x.value - recorded[c]) / noise[c], rate = x.d[0] / noise[c];
     m.value += off * off;
     m.slope += 2 * off * rate;
@@ -30,25 +34,57 @@ Misfit misfit(const Coherence& chi, const std::vector<double>& recorded, const s
   return m;
 }
 
+/// Rows of weights times b, then times c.
+std::vector<std::vector<double>> rows_of(const SpectralSum& sum, const std::vector<FringeOfLine>& fringe) {
+  if (fringe.size() != sum.size()) throw std::logic_error("ColourCurve: a fringe for every wavelength");
+  std::vector<std::vector<double>> rows;
+  for (const auto part : {&FringeOfLine::b, &FringeOfLine::c})
+    for (const std::vector<double>& weight : sum.weight) {
+      std::vector<double>& row = rows.emplace_back();
+      for (std::size_t k = 0; k < weight.size(); ++k) row.push_back(weight[k] * (fringe[k].*part));
+    }
+  return rows;
+}
+
 }  // namespace
 
-std::vector<RetardanceOfColour> retardances_of(const Coherence& chi, const std::vector<double>& recorded,
+FringeOfLine diagonal_fringe(const Microscope& microscope, const Values<double>& value) {
+  const Line<double> line = BeamMaker(microscope, {}).in(value).line;
+  const double twice = 2 * (value.radians(microscope.polarizer_deg) + 0.25 * std::numbers::pi), x = std::sin(twice),
+               z = std::cos(twice);
+  const RetarderForm<double>& f = line.form();
+  const double sines = f.xx * x * x + 2 * f.xz * x * z + f.zz * z * z;
+  // cos^2, sin^2 and twice sin cos of half the phase
+  return {0.5 * (f.ww + sines), 0.5 * (f.ww - sines), f.wx * x + f.wz * z};
+}
+
+ColourCurve::ColourCurve(const SpectralSum& sum, const std::vector<FringeOfLine>& fringe, const std::vector<double>& t,
+                         double reach_um)
+    : chi_(rows_of(sum, fringe), t, reach_um) {
+  for (const std::vector<double>& weight : sum.weight) {
+    double open = 0;
+    for (std::size_t k = 0; k < weight.size(); ++k) open += weight[k] * (fringe[k].a + fringe[k].b);
+    open_.push_back(open);
+  }
+}
+
+std::vector<RetardanceOfColour> retardances_of(const ColourCurve& curve, const std::vector<double>& recorded,
                                                const std::vector<double>& noise, double least_odds) {
-  if (recorded.size() != chi.channels() || noise.size() != chi.channels())
+  if (recorded.size() != curve.channels() || noise.size() != curve.channels())
     throw std::logic_error("retardances_of: a value and its noise for every channel");
   for (const double sd : noise)
     if (!(sd > 0)) throw std::logic_error("retardances_of: noise is above 0");
-  const int last = std::max(1, static_cast<int>(std::ceil(kPlacesPerUm * chi.reach_um())));
-  const double step = chi.reach_um() / last;
+  const int last = std::max(1, static_cast<int>(std::ceil(kPlacesPerUm * curve.reach_um())));
+  const double step = curve.reach_um() / last;
   std::vector<RetardanceOfColour> found;
   const auto take = [&](double g) {
-    const Misfit m = misfit(chi, recorded, noise, g);
+    const Misfit m = misfit(curve, recorded, noise, g);
     found.push_back(
         {g, m.curvature > 0 ? std::sqrt(2 / m.curvature) : std::numeric_limits<double>::infinity(), m.value, 0});
   };
   // A minimum lies where the slope turns from below 0 to above: bisection finds it whatever the shape. At either end of
   // the range it may lie without; at 0 itself every slope is 0.
-  const auto slope = [&](double g) { return misfit(chi, recorded, noise, g).slope; };
+  const auto slope = [&](double g) { return misfit(curve, recorded, noise, g).slope; };
   double from = 1e-3 * step, before = slope(from);
   if (before > 0) take(0);
   for (int i = 1; i <= last; ++i) {
@@ -72,9 +108,9 @@ std::vector<RetardanceOfColour> retardances_of(const Coherence& chi, const std::
   return found;
 }
 
-Xyz interference_colour(const Coherence& chi, double g, const Xyz& white) {
-  if (chi.channels() != 3) throw std::logic_error("interference_colour: the observer has three channels");
-  const auto share = [&](std::size_t c) { return 0.5 * chi.at(c, g).loss; };
+Xyz interference_colour(const ColourCurve& curve, double g, const Xyz& white) {
+  if (curve.channels() != 3) throw std::logic_error("interference_colour: the observer has three channels");
+  const auto share = [&](std::size_t c) { return curve.at(c, g); };
   return {white.x * share(0), white.y * share(1), white.z * share(2)};
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "birefit/error.h"
+#include "birefit/light.h"
 
 namespace birefit {
 
@@ -31,12 +32,6 @@ struct FlatBand {
   double centre_um = 0;  ///< 0.1 to 20
   double width_um = 0;   ///< between the two places where half passes, in (0, centre_um]
   double edge_um = 0;    ///< from 1 to 0, in (0, width_um]
-};
-
-/// Linear between its entries, 0 outside of them. Made by spectral_table.
-struct SpectralTable {
-  std::vector<double> wavelength_um;  ///< growing, at least two
-  std::vector<double> value;          ///< as many, none below 0, one above
 };
 
 using Spectrum = std::variant<EqualEnergy, Planck, GaussianLine, FlatBand, SpectralTable>;

@@ -10,8 +10,10 @@
 #include "birefit/error.h"
 #include "birefit/memo.h"
 #include "birefit/render.h"
+#include "instrument/channel_light.h"
 #include "instrument/exposure.h"
 #include "medium/validity.h"
+#include "render/light_plan.h"
 #include "samples/choices.h"
 #include "samples/kind.h"
 #include "samples/tables/polar_table.h"
@@ -90,14 +92,9 @@ void note_material(const Scene& scene, const Values<double>& value, RenderPlan& 
       100 * law->birefringence_uncertainty, largest, unsure, law->birefringence_uncertainty));
 }
 
-}  // namespace
-
-RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, const Observable& observable) {
-  check_references(scene, theta);
-  check_method(scene, asked);
+/// In light of the one wavelength that theta has.
+RenderPlan plan_line(const Scene& scene, const Demand& demand, const Theta& theta, const Observable& observable) {
   check_validity(scene, temperatures(scene), theta);
-  Demand demand = asked;
-  if (!demand.memo) demand.memo = std::make_shared<Memo>();
   const Values<double> value(theta, {}, demand.memo.get());
   const SampleKind& kind = kind_of(scene, observable);
   const Exposure exposure = exposure_of(scene.microscope);
@@ -134,6 +131,49 @@ RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, con
   return result;
 }
 
+/// The largest retardance of the picture, with all that the microscope's parts add (rad).
+double all_phases(const Scene& scene, const Demand& demand, const Theta& theta) {
+  const Values<double> value(theta, {}, demand.memo.get());
+  double sum = largest_phase(scene, value);
+  for (const double phase : part_phases(scene.microscope, value)) sum += std::abs(phase);
+  return sum;
+}
+
+/// Pixels on a spiral about the view's middle.
+std::vector<std::array<int, 2>> few_pixels(const View& view) {
+  constexpr int kPixels = 12;
+  std::vector<std::array<int, 2>> pixels;
+  for (int i = 0; i < kPixels; ++i) {
+    const double radius = 0.45 * std::min(view.width, view.height) * i / kPixels, azimuth = 2.399963 * i;
+    pixels.push_back(
+        {std::clamp(static_cast<int>(0.5 * view.width + radius * std::cos(azimuth)), 0, view.width - 1),
+         std::clamp(static_cast<int>(0.5 * view.height + radius * std::sin(azimuth)), 0, view.height - 1)});
+  }
+  return pixels;
+}
+
+}  // namespace
+
+RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, const Observable& observable) {
+  check_references(scene, theta);
+  check_method(scene, asked);
+  Demand demand = asked;
+  if (!demand.memo) demand.memo = std::make_shared<Memo>();
+  const std::optional<LightBand> band = light_band(scene.microscope, theta);
+  if (!band) return plan_line(scene, demand, theta, observable);
+  // Where phases are largest, numbers are hardest to hold.
+  const Theta planned = band->narrow ? theta : at_wavelength(scene.microscope, theta, band->low_um);
+  check_validity(scene, temperatures(scene), at_wavelength(scene.microscope, theta, band->high_um));
+  RenderPlan result = plan_line(scene, demand, planned, observable);
+  plan_wavelengths(scene, theta, *band, kind_of(scene, observable).sums_line,
+                   {[&](const Theta& at) { return all_phases(scene, demand, at); },
+                    [&](const RenderPlan& trial) {
+                      return render_pixels(scene, trial, theta, few_pixels(scene.view), {}, 1).intensity;
+                    }},
+                   result);
+  return result;
+}
+
 bool outgrown(const RenderPlan& now, const RenderPlan& before) {
   if (now.means.edge_points > before.means.edge_points || now.means.defect_points > before.means.defect_points)
     return true;
@@ -147,6 +187,9 @@ bool outgrown(const RenderPlan& now, const RenderPlan& before) {
 
 bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
   const PixelMeans &means = now.means, &had = before.means;
+  // A few wavelengths more or less are those of another value, not of another picture.
+  const auto wavelengths = [](const RenderPlan& plan) { return plan.wavelengths ? plan.wavelengths->size() : 1; };
+  if (10 * wavelengths(now) > 12 * wavelengths(before) + 20) return true;
   if (now.method != before.method || (choices(now).disc.empty() && now.steps > before.steps) ||
       now.mesh.size() > before.mesh.size() || has_finer_tables(choices(now), choices(before)) ||
       (had.fringes && !means.fringes) || outgrown(now, before))

@@ -11,6 +11,7 @@
 #include "core/threads.h"
 #include "render/band.h"
 #include "render/exposed.h"
+#include "render/sums.h"
 #include "samples/choices.h"
 #include "samples/kind.h"
 #include "samples/pixels/edge_pixels.h"
@@ -480,38 +481,23 @@ void render_direction(const Scene& scene, const RenderPlan& plan, const BeamMake
     });
 }
 
-/// sum = kept * sum + share * part.
-void mix(Image& sum, double kept, const Image& part, double share) {
-  for (std::size_t i = 0; i < sum.size(); ++i) sum.values()[i] = kept * sum.values()[i] + share * part.values()[i];
-}
-void mix(Rendering& sum, double kept, const Rendering& part, double share) {
-  mix(sum.intensity, kept, part.intensity, share);
-  for (std::size_t j = 0; j < sum.derivatives.size(); ++j) mix(sum.derivatives[j], kept, part.derivatives[j], share);
-}
-void mix(PixelRendering& sum, double kept, const PixelRendering& part, double share) {
-  sum.intensity = kept * sum.intensity + share * part.intensity;
-  sum.derivatives = kept * sum.derivatives + share * part.derivatives;
-}
-
-/// The one loop over directions: of_one(light, result) for each of them, and their sum by weight. Of a single one
-/// `into` holds what it brings, bit for bit.
-template <class Result, class OfOne>
-void sum_over_directions(const Exposure& exposure, Result& into, const OfOne& of_one) {
-  of_one(exposure.directions.front(), into);
-  for (std::size_t k = 1; k < exposure.directions.size(); ++k) {
-    Result part;
-    of_one(exposure.directions[k], part);
-    mix(into, k == 1 ? exposure.weights.front() : 1.0, part, exposure.weights[k]);
-  }
+/// The sample's picture is a sum over wavelengths of itself.
+bool sample_sums(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
+  const auto sums = kind_of(scene, plan.observable).sums_wavelengths;
+  return plan.wavelengths && sums && sums(scene, plan, theta);
 }
 
 }  // namespace
 
 void render(const Scene& scene, const RenderPlan& plan, const Exposure& exposure, const Theta& theta,
             const std::vector<int>& active, int threads, Rendering& into) {
-  sum_over_directions(exposure, into, [&](const BeamMaker& light, Rendering& one) {
-    render_direction(scene, plan, light, theta, active, threads, one);
-  });
+  const auto of_line = [&](const Theta& at, const std::vector<int>& of_scene, const WavelengthRule* rule,
+                           Rendering& line) {
+    sum_over_directions(exposure, line, [&](const BeamMaker& light, Rendering& one) {
+      render_direction(scene, plan, light.with(rule), at, of_scene, threads, one);
+    });
+  };
+  sum_over_wavelengths(scene.microscope, plan, theta, active, sample_sums(scene, plan, theta), into, of_line);
 }
 
 void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
@@ -530,9 +516,13 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const E
                              const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
                              int threads) {
   PixelRendering out;
-  sum_over_directions(exposure, out, [&](const BeamMaker& light, PixelRendering& one) {
-    render_direction(scene, plan, light, theta, pixels, active, threads, one);
-  });
+  const auto of_line = [&](const Theta& at, const std::vector<int>& of_scene, const WavelengthRule* rule,
+                           PixelRendering& line) {
+    sum_over_directions(exposure, line, [&](const BeamMaker& light, PixelRendering& one) {
+      render_direction(scene, plan, light.with(rule), at, pixels, of_scene, threads, one);
+    });
+  };
+  sum_over_wavelengths(scene.microscope, plan, theta, active, sample_sums(scene, plan, theta), out, of_line);
   return out;
 }
 
@@ -545,9 +535,12 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
 Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   if (plan.wave) throw std::logic_error("wave optics has no rays to take one at a time");
   Rendering r;
-  sum_over_directions(exposure_of(scene.microscope), r, [&](const BeamMaker& light, Rendering& one) {
-    render_planes<double>(scene, plan, light, theta, {}, 1, {&one.intensity});
-  });
+  const auto of_line = [&](const Theta& at, const std::vector<int>&, const WavelengthRule*, Rendering& line) {
+    sum_over_directions(exposure_of(scene.microscope), line, [&](const BeamMaker& light, Rendering& one) {
+      render_planes<double>(scene, plan, light, at, {}, 1, {&one.intensity});
+    });
+  };
+  sum_over_wavelengths(scene.microscope, plan, theta, {}, false, r, of_line);
   return std::move(r.intensity);
 }
 

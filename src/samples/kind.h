@@ -46,6 +46,10 @@ struct SampleKind {
   void (*jones)(const Scene&, const RenderPlan&, const Values<double>&, JonesTable&) = nullptr;
   /// Whether pictures may have a symmetry; null: none has.
   bool (*symmetric)(const Scene&) = nullptr;
+  /// Whether the picture by this plan is a sum over wavelengths of itself, where that costs less than so many pictures:
+  /// made by a BeamMaker with a rule; null: never.
+  bool (*sums_wavelengths)(const Scene&, const RenderPlan&, const Theta&) = nullptr;
+  bool sums_line = false;    ///< knows Microscope::bandwidth_nm in closed form
   bool passes_axis = false;  ///< rays run along the optic axis somewhere: no transport in the modes' slow solutions
   /// Whether either mode can run on a ray of its own (Rays::eikonal); null: never.
   bool (*curved_rays)(const Scene&) = nullptr;

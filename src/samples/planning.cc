@@ -30,19 +30,7 @@ void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double
 }
 
 void note_illumination(const Scene& scene, const Values<double>& value, double largest_phase, RenderPlan& plan) {
-  const Microscope& m = scene.microscope;
-  const double bandwidth_nm = value.get(m.bandwidth_nm, 0.0), condenser_na = value.get(m.condenser_na, 0.0);
-  if (bandwidth_nm > 0) {
-    const double s = largest_phase * bandwidth_nm / 2.355 / value(m.wavelength_nm);
-    const double loss = 0.5 * (1 - std::exp(-0.5 * s * s));
-    plan.model_error = std::hypot(plan.model_error, loss);
-    if (loss > 1e-3)
-      plan.warnings.push_back(
-          fmt::format("The light's bandwidth of {:g} nm is not modelled; at the largest retardance here ({:.3g} rad) "
-                      "it changes the "
-                      "intensity by up to {:.2g}.",
-                      bandwidth_nm, largest_phase, loss));
-  }
+  const double condenser_na = value.get(scene.microscope.condenser_na, 0.0);
   if (condenser_na > 0) {
     const double s = largest_phase * condenser_na * condenser_na / 8;  // mean phase shift over the cone, n ~ 1.5
     const double loss = std::min(0.5, 0.5 * std::abs(s));

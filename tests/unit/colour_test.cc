@@ -111,10 +111,10 @@ TEST(Colour, CodesOfTheScreen) {
 struct Wedge {
   Channels channels{illuminant_a(), {}, camera()};
   SpectralSum fine = channels.fine(8);
-  Coherence chi{fine, turns(fine, "quartz"), 8};
+  ColourCurve curve{fine, std::vector<FringeOfLine>(fine.size()), turns(fine, "quartz"), 8};
   std::vector<double> colour(double g) const {
     std::vector<double> x;
-    for (std::size_t c = 0; c < 3; ++c) x.push_back(0.5 * chi.at(c, g).loss);
+    for (std::size_t c = 0; c < 3; ++c) x.push_back(curve.at(c, g));
     return x;
   }
   const std::vector<double> noise{0.01, 0.01, 0.01};
@@ -123,7 +123,7 @@ struct Wedge {
 TEST(InterferenceColour, SaysTheRetardanceUpToTwoMicrometres) {
   const Wedge wedge;
   for (const double g : {0.02, 0.05, 0.2, 0.5, 1.0, 1.2, 2.0}) {
-    const auto found = retardances_of(wedge.chi, wedge.colour(g), wedge.noise);
+    const auto found = retardances_of(wedge.curve, wedge.colour(g), wedge.noise);
     ASSERT_FALSE(found.empty());
     EXPECT_NEAR(found.front().g_um, g, 1e-6);
     EXPECT_NEAR(found.front().odds, 1, 0);
@@ -131,12 +131,12 @@ TEST(InterferenceColour, SaysTheRetardanceUpToTwoMicrometres) {
     EXPECT_LT(found.front().error_um, g < 0.05 ? 0.01 : 0.0031) << g;
   }
   // One pair of colours below 2 um is the same within noise of 1 %: of odds one half.
-  const auto pair = retardances_of(wedge.chi, wedge.colour(1.74), wedge.noise);
+  const auto pair = retardances_of(wedge.curve, wedge.colour(1.74), wedge.noise);
   ASSERT_EQ(pair.size(), 2u);
   EXPECT_NEAR(pair[1].g_um, 0.122, 1e-3);
   EXPECT_NEAR(pair[1].odds, 0.46, 0.02);
   // Black says 0, and that its error is not one of a slope.
-  const auto black = retardances_of(wedge.chi, {0, 0, 0}, wedge.noise);
+  const auto black = retardances_of(wedge.curve, {0, 0, 0}, wedge.noise);
   ASSERT_EQ(black.size(), 1u);
   EXPECT_LT(black.front().g_um, 1e-4);
   EXPECT_GT(black.front().error_um, 1);
@@ -145,7 +145,7 @@ TEST(InterferenceColour, SaysTheRetardanceUpToTwoMicrometres) {
 TEST(InterferenceColour, IsAmbiguousBeyond) {
   const Wedge wedge;
   for (const auto& [g, error] : {std::pair{3.0, 0.0086}, {5.0, 0.032}}) {
-    const auto found = retardances_of(wedge.chi, wedge.colour(g), wedge.noise);
+    const auto found = retardances_of(wedge.curve, wedge.colour(g), wedge.noise);
     EXPECT_GT(found.size(), 3u);
     EXPECT_NEAR(found.front().g_um, g, 1e-6);
     EXPECT_NEAR(found.front().error_um, error, 0.02 * error);
@@ -159,12 +159,12 @@ TEST(InterferenceColour, IsAmbiguousBeyond) {
 TEST(InterferenceColour, DoublesAndGreys) {
   const Channels channels(EqualEnergy{}, {}, observer());
   const SpectralSum fine = channels.fine(8);
-  const Coherence chi(fine, turns(fine, "quartz"), 8);
+  const ColourCurve curve(fine, std::vector<FringeOfLine>(fine.size()), turns(fine, "quartz"), 8);
   const std::vector<double>& w = channels.white();
   const Xyz white{w[0] / w[1], 1, w[2] / w[1]};
   const double step = 0.01;
   std::vector<Lab> seen;
-  for (int i = 0; i <= 800; ++i) seen.push_back(lab_of(interference_colour(chi, i * step, white), white));
+  for (int i = 0; i <= 800; ++i) seen.push_back(lab_of(interference_colour(curve, i * step, white), white));
   const Lab grey = lab_of({0.5 * white.x, 0.5 * white.y, 0.5 * white.z}, white);
   for (const auto& [limit, from] : {std::pair{5.0, 0.38}, {3.0, 1.0}, {2.0, 2.87}}) {
     int first = 0;

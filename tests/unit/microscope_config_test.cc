@@ -133,6 +133,8 @@ TEST(DescribedNumbers, StandInTheDocumentAsTheyAre) {
   add_rows<SideCamera>("view.camera", rows);
   each_kind<PolarizingPart>([&]<class Part>(const Part*) { add_rows<Part>(Part::kKey, rows); });
   add_rows<Microscope>("microscope", rows);
+  add_rows<Lamp>("microscope.light.lamp", rows);
+  add_rows<LightFilter>("microscope.light.filters", rows);
   add_rows<View>("micrograph", rows);
   std::ifstream file(fs::path(BIREFIT_SOURCE_DIR) / "docs/configuration.md");
   std::stringstream text;

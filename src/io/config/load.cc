@@ -16,6 +16,7 @@
 #include "io/config/disc.h"
 #include "io/config/fit.h"
 #include "io/config/items.h"
+#include "io/config/light.h"
 #include "io/config/micrograph.h"
 #include "io/config/mosaic.h"
 #include "io/config/overrides.h"
@@ -199,7 +200,15 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     }
     items.clear();
   }
-  for (std::size_t i = 0; i < items.size(); ++i) micrographs.push_back(apply_set(reader, shared, items[i], i));
+  const std::vector<MicrographSettings> channels = by_channel(settings);
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    const Picture own = apply_set(reader, shared, items[i], i);
+    for (const MicrographSettings& of_channel : channels) {
+      Picture& picture = micrographs.emplace_back(own);
+      choose_channel(reader, of_channel.channel, settings.channel_where, picture.scene);
+      if (channels.size() > 1) own_levels(reader, of_channel.channel, picture);
+    }
+  }
 
   // An image may have a focus of its own, which only waves know.
   for (const Picture& own : micrographs) {
@@ -284,7 +293,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
       const Where where = image ? Where{image->string()} : item.image_where;
       if (const std::optional<LoadedImage> loaded = has_ring_table(scene)
                                                         ? load_ring_table(reader, file, where, scene, config.observable)
-                                                        : try_load(reader, settings, file, item.page, where)) {
+                                                        : try_load(reader, channels[0], file, item.page, where)) {
         set_view(reader, loaded->width, loaded->height, loaded->pixel_size_um, name, scene);
         demand_pixel_size(scene, loaded->uneven_pixel_um);
         if (reader.problems.empty()) {
@@ -305,7 +314,12 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
       reader.problems.add({reader.file}, "needs image_size_px: [width, height] or micrograph.image");
     }
     config.scene = scene;
-    if (use == ConfigUse::plan) config.job.measurements = {micrographs[0]};
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      Scene& of_channel = micrographs[c].scene;
+      of_channel.view = scene.view;
+      if (channels.size() > 1) config.colours.push_back(of_channel);
+      if (use == ConfigUse::plan) config.job.measurements.push_back(micrographs[c]);
+    }
   } else if (!view_only) {
     if (!list && signals.empty() && !items[0].image && !image) {
       const Block micrograph{root.find("micrograph"), "micrograph",
@@ -313,8 +327,9 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
       if (!micrograph.node || !micrograph.node->find("image")) reader.missing(micrograph, "image");
     }
     // Images are loaded although something else is wrong: their mistakes are reported in the same run.
-    std::optional<Calibration> calibration;
-    if (settings.calibrated() && signals.empty()) calibration = load_calibration(reader, settings);
+    std::vector<std::optional<Calibration>> calibrations(channels.size());
+    for (std::size_t c = 0; c < channels.size(); ++c)
+      if (settings.calibrated() && signals.empty()) calibrations[c] = load_calibration(reader, channels[c]);
     const std::optional<LoadedMask> user_mask =
         signals.empty() ? load_user_mask(reader, settings) : std::nullopt;  // tables have read theirs
     std::vector<Observable> observables(micrographs.size());
@@ -323,20 +338,24 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     std::string of_codes;    // the first photograph of which nothing says how codes follow light
     const YamlNode* block = root.find("micrograph");
     const bool transfer_stated = block && block->find("transfer");
-    const bool frames_missing = settings.calibrated() && !calibration;
+    const bool frames_missing = settings.calibrated() && !std::all_of(calibrations.begin(), calibrations.end(),
+                                                                      [](const auto& c) { return c.has_value(); });
     const bool mask_missing = settings.mask && !user_mask;
-    for (std::size_t i = 0; i < items.size(); ++i) {
-      const Item& item = items[i];
+    for (std::size_t i = 0; i < micrographs.size(); ++i) {
+      const Item& item = items[i / channels.size()];
+      const MicrographSettings& own = channels[i % channels.size()];
+      const std::optional<Calibration>& calibration = calibrations[i % channels.size()];
       Picture& micrograph = micrographs[i];
       if (!item.image && !(image && !list)) continue;
       const bool replaced = image && !list;
       const std::filesystem::path file = replaced ? *image : reader.resolve(*item.image);
       const Where where = replaced ? Where{file.string()} : item.image_where;
-      micrograph.name =
-          printable(file.filename().string()) + (item.page.given() && list ? " (" + item.page.words() + ")" : "");
+      micrograph.name = printable(file.filename().string()) +
+                        (item.page.given() && list ? " (" + item.page.words() + ")" : "") +
+                        (channels.size() > 1 && own.mosaic.parts.empty() ? " (" + own.channel + ")" : "");
       std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene)
                                               ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
-                                              : try_load(reader, settings, file, item.page, where);
+                                              : try_load(reader, own, file, item.page, where);
       if (!loaded) continue;
       if (size && (loaded->width != (*size)[0] || loaded->height != (*size)[1]))
         reader.problems.add(root.find("image_size_px")->where,
@@ -353,11 +372,11 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
         continue;
       }
       if (frames_missing || mask_missing) continue;
-      if (loaded->colour || !settings.mosaic.bayer.empty())
+      if ((loaded->colour || !settings.mosaic.bayer.empty()) && !micrograph.scene.microscope.channel_light)
         of_colours = of_colours.empty() ? micrograph.name : of_colours;
       if (loaded->colour && loaded->bits == 8 && !transfer_stated && of_codes.empty()) of_codes = micrograph.name;
-      filled[i] = pictures_of(reader, settings, calibration ? &*calibration : nullptr,
-                              user_mask ? &*user_mask : nullptr, std::move(*loaded), where, micrograph);
+      filled[i] = pictures_of(reader, own, calibration ? &*calibration : nullptr, user_mask ? &*user_mask : nullptr,
+                              std::move(*loaded), where, micrograph);
     }
     // A frame's own mistake, with which the others of its series have nothing to do.
     if (series && sound && !frames_missing && !mask_missing && !reader.problems.empty())
@@ -377,17 +396,18 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
           of_colours +
           ": a channel of a colour camera passes light about 100 nm wide, unless a filter or the lamp's "
           "line makes it less; the model takes one wavelength. State microscope.light.bandwidth_nm (1 for "
-          "a laser); in white light the intervals do not hold.");
+          "a laser), or the lamp, light: {lamp: A}, and the camera; else the intervals do not hold.");
       reader.misfit.push_back(of_colours + " is a colour camera's channel, whose light is no single wavelength");
     }
     if (!of_codes.empty())
       reader.warnings.push_back(of_codes +
                                 ": colours of 8 bits are sRGB codes as a rule, which are no measure of light; they are "
                                 "taken as linear. State micrograph.transfer: srgb, or linear.");
-    if (calibration && calibration->has_crossed && settings.offset_automatic) {
-      Parameter& offset = reader.table[settings.offset];
-      offset.value = calibration->crossed_median;
-      offset.prior_sd = calibration->crossed_sd;
+    for (std::size_t c = 0; c < channels.size() && settings.offset_automatic; ++c) {
+      if (!calibrations[c] || !calibrations[c]->has_crossed) continue;
+      Parameter& offset = reader.table[channels.size() == 1 ? settings.offset : micrographs[c].offset];
+      offset.value = calibrations[c]->crossed_median;
+      offset.prior_sd = calibrations[c]->crossed_sd;
     }
     if (!micrographs.empty()) {
       config.scene = filled[0].empty() ? micrographs[0].scene : filled[0][0].scene;

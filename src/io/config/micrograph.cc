@@ -118,13 +118,13 @@ void read_calibration(ConfigReader& reader, const Block& root, const Block& micr
     reader.warnings.push_back("calibration has a flat and no dark: what the camera shows without light is taken as 0.");
 }
 
-/// r, g, b, mean or a number.
+/// r, g, b, all three, mean or a number.
 std::string read_channel(ConfigReader& reader, const Block& block) {
   const YamlNode* node = block.find("channel");
   if (node && node->is_scalar() && !node->text.empty() &&
       node->text.find_first_not_of("0123456789") == std::string::npos)
     return node->text;
-  return reader.choice(block, "channel", {"r", "g", "b", "mean"}).value_or("");
+  return reader.choice(block, "channel", {"r", "g", "b", "rgb", "mean"}).value_or("");
 }
 
 /// A number, or [x, y] of pixels that are square after all.
@@ -165,6 +165,18 @@ std::optional<PixelRect> read_roi(ConfigReader& reader, const Block& block, Wher
   return std::nullopt;
 }
 
+std::vector<MicrographSettings> by_channel(const MicrographSettings& settings) {
+  if (settings.channel != "rgb") return {settings};
+  std::vector<MicrographSettings> all;
+  for (const char* channel : {"r", "g", "b"}) {
+    MicrographSettings own = settings;
+    own.channel = channel;
+    if (!own.mosaic.bayer.empty()) own.mosaic.parts = bayer_parts(own.mosaic.bayer, *channel);
+    all.push_back(std::move(own));
+  }
+  return all;
+}
+
 void keep_positive(Parameter& gain) {
   if (gain.automatic && !std::isfinite(gain.lower)) gain.lower = gain.physical_lower = 0;
 }
@@ -184,6 +196,10 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   settings.image_where = place("image");
   settings.page = read_page(reader, block);
   settings.channel = read_channel(reader, block);
+  settings.channel_where = place("channel");
+  if (settings.channel == "rgb" && reader.camera.empty())
+    reader.problems.add(settings.channel_where, "channel: rgb needs the light and what the camera sees of it",
+                        "microscope: {light: {lamp: A}, camera: {sensitivity: nikon_d5100}}");
   settings.mosaic = read_mosaic(reader, block, settings.channel);
 
   settings.pixel_size_um = read_pixel_size(reader, block, scene);

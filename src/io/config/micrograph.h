@@ -18,7 +18,8 @@ struct MicrographSettings {
   std::optional<std::string> image;
   Where image_where;
   PageChoice page;
-  std::string channel;
+  std::string channel;  ///< "rgb": all three, each a picture of its own
+  Where channel_where;
   MosaicSettings mosaic;
   Transfer transfer;
   ParameterRef pixel_size_um;  ///< none: the file's
@@ -42,6 +43,8 @@ struct MicrographSettings {
 
 /// Of a scene whose sample is read. Mistakes go to the reader's problems.
 MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene, Quantity quantity);
+/// The same of each picture that a file makes by its colours; of a single one the settings themselves.
+std::vector<MicrographSettings> by_channel(const MicrographSettings& settings);
 /// `roi_px` of a block; nothing without it, and with a problem.
 std::optional<PixelRect> read_roi(ConfigReader& reader, const Block& block, Where& where);
 /// An automatic gain: a negative one would pass off dark fringes as bright ones, half an order away.

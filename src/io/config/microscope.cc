@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/config/described.h"
+#include "io/config/light.h"
 #include "scene/polariscope.h"
 
 namespace birefit {
@@ -136,13 +137,14 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
       reader.block(root, "microscope",
                    {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg", "objective_na",
                     "condenser_na", "focus_um", "imaging", "directions", "quarter_wave", "compensator", "before",
-                    "behind", "polarizer_extinction_ratio", "analyzer_extinction_ratio"},
+                    "behind", "polarizer_extinction_ratio", "analyzer_extinction_ratio", "camera"},
                    true);
-  const Block light = reader.block(block, "light", {"wavelength_nm", "bandwidth_nm"}, true);
-  const auto of_light = [&](const char* key) { return described<Microscope>(std::string("light.") + key); };
-  microscope.wavelength_nm = reader.number(light, "wavelength_nm", of_light("wavelength_nm"));
-  if (light.find("bandwidth_nm"))
-    microscope.bandwidth_nm = reader.number(light, "bandwidth_nm", of_light("bandwidth_nm"));
+  read_light(reader, block, microscope);
+  reader.camera = read_camera(reader, block);
+  if (!reader.camera.empty() && !microscope.channel_light)
+    reader.problems.add(block.find("camera")->where,
+                        "camera is given beside a single line, whose light it cannot change",
+                        "state the light: {lamp: A}, or leave camera out");
 
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material); constant && constant->resonance_nm) {
     const Parameter &resonance = reader.table[constant->resonance_nm], &light = reader.table[microscope.wavelength_nm];

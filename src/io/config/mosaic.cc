@@ -73,21 +73,25 @@ MosaicSettings read_mosaic(ConfigReader& reader, const Block& micrograph, const 
   } else if (bayer) {
     settings.bayer = reader.choice(micrograph, "bayer", {"rggb", "bggr", "grbg", "gbrg"}).value_or("");
     if (settings.bayer.empty()) return settings;
-    if (channel != "r" && channel != "g" && channel != "b") {
+    if (channel != "r" && channel != "g" && channel != "b" && channel != "rgb") {
       const YamlNode* given = micrograph.find("channel");
       reader.problems.add(given ? given->where : bayer->where,
-                          "bayer needs channel: r, g or b" + (channel.empty() ? "" : ", found " + channel),
-                          "each colour is a picture of its own, fitted at its own wavelength");
+                          "bayer needs channel: r, g, b or rgb" + (channel.empty() ? "" : ", found " + channel),
+                          "each colour is a picture of its own");
       return settings;
     }
-    const bool two = channel == "g";
-    for (int i = 0; i < 4; ++i)
-      if (settings.bayer[static_cast<std::size_t>(i)] == channel[0]) {
-        const std::string number = two ? std::to_string(settings.parts.size() + 1) : "";
-        settings.parts.push_back({i % 2, i / 2, channel + number, {}});
-      }
+    for (const char colour : channel)
+      for (MosaicPart& part : bayer_parts(settings.bayer, colour)) settings.parts.push_back(std::move(part));
   }
   return settings;
+}
+
+std::vector<MosaicPart> bayer_parts(const std::string& bayer, char colour) {
+  std::vector<MosaicPart> parts;
+  for (int i = 0; i < 4; ++i)
+    if (bayer.at(static_cast<std::size_t>(i)) == colour)
+      parts.push_back({i % 2, i / 2, colour + (colour == 'g' ? std::to_string(parts.size() + 1) : ""), {}});
+  return parts;
 }
 
 Mask part_of(const MosaicPart& part, int width, int height) {

@@ -26,6 +26,9 @@ struct MosaicSettings {
 /// `channel`: that of the micrograph, which chooses the colour. What contradicts goes to the reader's problems.
 MosaicSettings read_mosaic(ConfigReader& reader, const Block& micrograph, const std::string& channel);
 
+/// The pixels of one colour ('r', 'g', 'b') in a mosaic whose first cell is `bayer`.
+std::vector<MosaicPart> bayer_parts(const std::string& bayer, char colour);
+
 /// Does the config state a polarization mosaic? Each of its pictures then has an analyser of its own.
 bool states_polarization_mosaic(const YamlNode& root);
 

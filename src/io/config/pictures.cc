@@ -229,7 +229,12 @@ bool is_unstated_mosaic(ConfigReader& reader, const MicrographSettings& settings
 }  // namespace
 
 void say(ConfigReader& reader, const std::filesystem::path& file, const std::vector<std::string>& notes) {
-  for (const std::string& note : notes) reader.warnings.push_back(file.filename().string() + ": " + note);
+  for (const std::string& note : notes) {
+    const std::string words = file.filename().string() + ": " + note;
+    // A file of several colours is read once for each.
+    if (std::find(reader.warnings.begin(), reader.warnings.end(), words) == reader.warnings.end())
+      reader.warnings.push_back(words);
+  }
 }
 
 std::optional<LoadedImage> try_load(ConfigReader& reader, const MicrographSettings& settings,

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "birefit/io.h"
+#include "birefit/light.h"
 #include "birefit/number_spec.h"
 #include "io/config/yaml.h"
 
@@ -66,6 +68,8 @@ class ConfigReader {
   /// `physics: {ceiling: auto}` on a sphere: waves where they pay, within the time given for a fit (s).
   bool choose_waves = false;
   double max_seconds = 60;
+  /// What the camera's channels see, by their names; "" of a camera without colours.
+  std::map<std::string, std::shared_ptr<const SpectralTable>> camera;
 
   /// The block at a key, its keys checked against `known`.
   Block block(const Block& parent, const std::string& key, const std::vector<std::string>& known, bool required);

@@ -106,18 +106,32 @@ Json sample_schema() {
   return sample;
 }
 
+Json text(const char* words) { return {{"type", "string"}, {"description", words}}; }
+
 Json microscope_schema() {
   Json microscope = {{"type", "object"}, {"description", "what lights and images the sample"}};
   add<Microscope>(microscope);
   for (const char* key : {"polarizer_deg", "analyzer_deg"})
     microscope["properties"][key]["anyOf"].push_back({{"const", "none"}});
+  Json& light = microscope["properties"]["light"]["properties"];
+  Json lamp = {{"type", "object"}}, filter = {{"type", "object"}};
+  add<Lamp>(lamp);
+  add<LightFilter>(filter);
+  for (Json* given : {&lamp, &filter}) {
+    (*given)["properties"]["file"] = text("table of wavelength_nm and a value");
+    (*given)["additionalProperties"] = false;
+  }
+  light["lamp"] = {{"description", "in place of wavelength_nm: light of all wavelengths"},
+                   {"anyOf", {{{"enum", {"A", "D65", "E"}}}, lamp}}};
+  light["filters"] = {{"description", "what the lamp's light passes"}, {"type", "array"}, {"items", filter}};
+  Json camera = {{"type", "object"}, {"additionalProperties", false}};
+  camera["properties"]["sensitivity"] = text("cie_1931, nikon_d5100, or a table of wavelength_nm and r, g, b");
+  microscope["properties"]["camera"] = camera;
   Json part = {{"type", "object"}};
   each_kind<PolarizingPart>([&]<class One>(const One*) { add<One>(part, One::kKey); });
   for (const char* key : {"before", "behind"}) microscope["properties"][key] = {{"type", "array"}, {"items", part}};
   return microscope;
 }
-
-Json text(const char* words) { return {{"type", "string"}, {"description", words}}; }
 
 Json one_of(const char* words, const std::vector<std::string>& values) {
   return {{"description", words}, {"enum", values}};
@@ -142,7 +156,7 @@ Json micrograph_schema() {
   keys["saturation_counts"] = {{"description", "counts from which a pixel is saturated"}, {"type", "number"}};
   for (const auto& [key, words] : std::vector<std::pair<const char*, const char*>>{
            {"page", "of a file of several, from 0; or {t, z, c}"},
-           {"channel", "r, g, b, mean, or a number from 0"},
+           {"channel", "r, g, b, rgb (all three), mean, or a number from 0"},
            {"transfer", "how codes follow light: linear, srgb, {gamma: ..}"},
            {"gain", "value = gain * intensity + offset"},
            {"offset", "value = gain * intensity + offset"},

@@ -156,6 +156,10 @@ void write_files(const std::vector<FileContent>& files, const std::vector<fs::pa
 
 void write_file(const std::filesystem::path& path, const std::string& content) { write_files({{path, content}}); }
 
+std::string encode_image(const Image& image, const std::filesystem::path& path, double pixel_size_um) {
+  return encode_channels({&image, 1}, path, pixel_size_um);
+}
+
 void save_image(const Image& image, const std::filesystem::path& path) { write_file(path, encode_image(image, path)); }
 
 void end_by_signal(int signal) {

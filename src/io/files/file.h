@@ -2,6 +2,7 @@
 // Whole files, written completely or not at all. Private to io.
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ void write_files(const std::vector<FileContent>& files, const std::vector<std::f
 /// What save_image would write, and .npy (float64): the format follows from the extension of `path`. TIFFs state the
 /// pixel size (0: not known).
 std::string encode_image(const Image& image, const std::filesystem::path& path, double pixel_size_um = 0);
+/// The same of one channel or of red, green and blue, of one size.
+std::string encode_channels(std::span<const Image> channels, const std::filesystem::path& path,
+                            double pixel_size_um = 0);
 
 /// Ends the program by this signal, but never with half a file behind: at once, or as soon as what is being written
 /// has its final name. Safe in a signal handler.

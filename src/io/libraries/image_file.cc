@@ -495,21 +495,29 @@ std::string encode(const std::string& format, const OIIO::ImageSpec& spec, const
 
 }  // namespace
 
-std::string encode_image(const Image& image, const fs::path& path, double pixel_size_um) {
+std::string encode_channels(std::span<const Image> channels, const fs::path& path, double pixel_size_um) {
   const std::string extension = lower_case(path.extension().string());
-  if (image.empty()) throw std::logic_error("save_image: empty image");
+  const Image& first = channels.front();
+  if (first.empty()) throw std::logic_error("save_image: empty image");
+  const auto count = static_cast<int>(channels.size());
+  const auto samples_by = [&]<class T>(const auto& sample) {
+    std::vector<T> samples;
+    samples.reserve(first.size() * channels.size());
+    for (std::size_t i = 0; i < first.size(); ++i)
+      for (const Image& channel : channels) samples.push_back(sample(channel.values()[i]));
+    return samples;
+  };
   if (extension == ".png") {
-    std::vector<std::uint16_t> samples(image.size());
-    std::transform(image.values().begin(), image.values().end(), samples.begin(), [](double value) {
+    const auto samples = samples_by.operator()<std::uint16_t>([](double value) {
       return static_cast<std::uint16_t>(std::lround(value > 0 ? std::min(value, 1.0) * 65535 : 0.0));  // NaN is 0
     });
-    return encode("png", OIIO::ImageSpec(image.width(), image.height(), 1, TypeDesc::UINT16), samples);
+    return encode("png", OIIO::ImageSpec(first.width(), first.height(), count, TypeDesc::UINT16), samples);
   }
-  if (extension == ".npy") return encode_npy(image);
+  if (extension == ".npy") return encode_npy(channels);
   if (extension != ".tif" && extension != ".tiff" && extension != ".exr")
     throw UserError({path.string()}, "has an unknown image extension '" + extension + "'",
                     "use .tif or .exr (32-bit float), .npy (64-bit) or .png (16-bit, 0 to 1)");
-  OIIO::ImageSpec spec(image.width(), image.height(), 1, TypeDesc::FLOAT);
+  OIIO::ImageSpec spec(first.width(), first.height(), count, TypeDesc::FLOAT);
   // TIFFs unpacked: no two of ImageJ, tifffile and scikit-image read the same packing of floats.
   spec.attribute("compression", extension == ".exr" ? "zip" : "none");
   if (pixel_size_um > 0) {
@@ -519,7 +527,7 @@ std::string encode_image(const Image& image, const fs::path& path, double pixel_
     spec.attribute("XResolution", pixels_per_cm);
     spec.attribute("YResolution", pixels_per_cm);
   }
-  const std::vector<float> samples(image.values().begin(), image.values().end());
+  const auto samples = samples_by.operator()<float>([](double value) { return static_cast<float>(value); });
   return encode(extension == ".exr" ? "openexr" : "tiff", spec, samples);
 }
 

@@ -18,7 +18,7 @@ Grid<float> median_of_neighbours(const Grid<float>& values);
 struct ImageLibraries {
   const char* version = BIREFIT_VERSION;  ///< of birefit; the rest is known only where it is the program's
   decltype(&birefit::load_image) load_image = &birefit::load_image;
-  decltype(&birefit::encode_image) encode_image = &birefit::encode_image;
+  decltype(&birefit::encode_channels) encode_channels = &birefit::encode_channels;
   decltype(&birefit::encode_png) encode_png = &birefit::encode_png;
   decltype(&birefit::find_disc) find_disc = &birefit::find_disc;
   decltype(&birefit::median_of_neighbours) median_of_neighbours = &birefit::median_of_neighbours;

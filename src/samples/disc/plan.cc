@@ -81,9 +81,7 @@ RenderPlan plan_disc(const Planning& planning) {
         fmt::format("fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um "
                     "leaves these out",
                     fastest));
-  Scene one_colour = scene;  // the bandwidth is part of a disc's model
-  one_colour.microscope.bandwidth_nm = {};
-  note_illumination(one_colour, value, largest_phase, plan);
+  note_illumination(scene, value, largest_phase, plan);
   return plan;
 }
 
@@ -104,6 +102,7 @@ const SampleKind kDisc{.name = "disc",
                        .is = is_sample<StressedDisc>,
                        .plan = plan_disc,
                        .phases_rad = disc_phases,
+                       .sums_line = true,
                        .traits = disc_traits,
                        .zone = disc_zone};
 

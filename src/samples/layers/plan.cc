@@ -210,19 +210,8 @@ RenderPlan plan_reflections(const Planning& planning, const PlanarOptics<double>
   plan.reasons.push_back("asked for by physics.ceiling: all reflections, between the two faces too");
   if (plan.numerical_error > plan.demand.intensity_accuracy)
     plan.warnings.push_back(fmt::format("Even {} steps err by {}.", plan.steps, sci(plan.numerical_error)));
-  double largest_phase = 0, round_trip = 0;
-  OpticalPoint<double> middle;
-  const double half[1] = {0.5};
-  o.column->sample(half, &middle);
+  double largest_phase = 0;
   for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
-  round_trip = 2 * o.k0 * std::sqrt(middle.ordinary) * middle.depth_slope_um;
-  const double bandwidth = value.get(scene.microscope.bandwidth_nm, 0.0) / value(scene.microscope.wavelength_nm);
-  if (round_trip * bandwidth > 1)
-    plan.warnings.push_back(
-        fmt::format("Light of this bandwidth does not interfere between the faces (the phase of a round trip spreads "
-                    "by {:.2g} rad), but is computed "
-                    "as if it did: ceiling one_way is nearer to what is seen.",
-                    round_trip * bandwidth));
   note_illumination(scene, value, largest_phase, plan);
   return plan;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "instrument/channel_light.h"
 #include "instrument/exposure.h"
 #include "samples/choices.h"
 #include "samples/image.h"
@@ -78,14 +79,48 @@ DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const 
     if (!can_tabulate()) rest_panels_ = 0;
   }
   by_inverse_edge_ = Sensitivity<S>(inverse_edge_);
-  passing_ = PassingLight<S>(value(scene.view.pixel_size_um), optics_.radius_um, light_.line().open());
+  S open = light_.line().open();
+  if (light.rule()) {
+    sum_over(*light.rule(), scene, plan, value, light);
+    open = S(0.0);
+    for (const Colour& colour : colours_) open = open + colour.weight * colour.image->light_.line().open();
+  }
+  passing_ = PassingLight<S>(value(scene.view.pixel_size_um), optics_.radius_um, open);
+}
+
+template <class S>
+void DropletImage<S>::sum_over(const WavelengthRule& rule, const Scene& scene, const RenderPlan& plan,
+                               const Values<S>& value, const BeamMaker& light) {
+  // A wavelength of the sum is no parameter: those of the light move the weights.
+  std::vector<int> active = value.active();
+  for (int& index : active)
+    if (index == scene.microscope.wavelength_nm.index) index = -1;
+  for (std::size_t k = 0; k < rule.size(); ++k) {
+    const Theta theta = at_wavelength(scene.microscope, value.theta(), 1e-3 * rule.wavelength_nm[k]);
+    S weight(rule.weight[k]);
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (std::size_t n = 0; n < rule.index.size(); ++n)
+        for (std::size_t j = 0; j < value.active().size(); ++j)
+          if (value.active()[j] == rule.index[n]) weight.d[j] = weight.d[j] + P(rule.slope[n][k]);
+    colours_.push_back({weight, std::make_unique<DropletImage>(scene, plan, Values<S>(theta, active, value.memo()),
+                                                               light.with(nullptr))});
+  }
 }
 
 template <class S>
 void DropletImage<S>::tabulate(typename SampleImage<S>::Wanted, int threads) {
   if (rest_panels_ == 0) return;
+  const int count = number_of_terms();
   const auto part = [&](Part which, int panels) {
-    return RadialTable<S>(panels, number_of_terms(), threads, [&](const P& v, S* out) { terms(which, S(v), out); });
+    return RadialTable<S>(panels, count, threads, [&](const P& v, S* out) {
+      if (colours_.empty()) return terms(which, S(v), out);
+      for (int k = 0; k < count; ++k) out[k] = S(0.0);
+      S one[kMostTerms];
+      for (const Colour& colour : colours_) {
+        colour.image->terms(which, S(v), one);
+        for (int k = 0; k < count; ++k) out[k] = out[k] + colour.weight * one[k];
+      }
+    });
   };
   centre_ = part(Part::centre, centre_panels_);
   rest_ = part(Part::rest, rest_panels_);
@@ -217,6 +252,22 @@ void DropletImage<S>::light(const P& column, const P& row, S* out) const {
   }
   const P rho_um = select(inside, place.rho_um, plain(edge_um_) * P(0.5));
   out[0] = select(inside, rest_panels_ == 0 ? traced(rho_um, place) : read(rho_um, place), S(0.0));
+}
+
+bool droplet_sums_wavelengths(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
+  const SampleChoices& own = choices(plan);
+  if (plan.wave || own.radial_panels == 0 || own.series_reach_um > 0 || plan.demand.rays == Rays::eikonal ||
+      !looks_round(std::get<Droplet>(scene.sample)))
+    return false;
+  const auto ratio_at = [&](double nm) {
+    const Theta there = at_wavelength(scene.microscope, theta, 1e-3 * nm);
+    const DropletOptics<double> o = droplet_optics(scene, Values<double>(there, {}, plan.demand.memo.get()));
+    return o.n_o / o.n_host;
+  };
+  const std::vector<double>& nm = plan.wavelengths->wavelength_nm;
+  if (ratio_at(nm.front()) != ratio_at(nm.back())) return false;  // each wavelength's rays go their own ways
+  const Values<double> value(theta, {}, plan.demand.memo.get());
+  return DropletImage<double>(scene, plan, value, exposure_of(scene.microscope).directions.front()).can_tabulate();
 }
 
 template <class S>

@@ -89,6 +89,8 @@ class DropletImage final : public SampleImage<S> {
   }
 
  private:
+  /// Makes colours_.
+  void sum_over(const WavelengthRule&, const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
   void terms_at(const S& rho_um, S* out) const;
   S traced(const P& rho_um, const typename RoundView<S>::Place&) const;
   S read(const P& rho_um, const typename RoundView<S>::Place&) const;
@@ -107,7 +109,16 @@ class DropletImage final : public SampleImage<S> {
   Sensitivity<S> by_inverse_edge_, by_inverse_core_, by_inverse_core_root_;
   int centre_panels_, rest_panels_;
   RadialTable<S> centre_, rest_;
+  /// The same droplet at the wavelengths of a rule, whose sum is tabulated; none: the picture is of one.
+  struct Colour {
+    S weight;
+    std::unique_ptr<DropletImage> image;
+  };
+  std::vector<Colour> colours_;
 };
+
+/// Its tables by this plan are of light of all wavelengths: the same radius is the same ray in all of them.
+bool droplet_sums_wavelengths(const Scene&, const RenderPlan&, const Theta&);
 
 template <class S>
 std::unique_ptr<SampleImage<S>> make_droplet_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);

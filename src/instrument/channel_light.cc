@@ -1,0 +1,108 @@
+#include "instrument/channel_light.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace birefit {
+namespace {
+
+/// A number of the light and how much of the channel's own unit one of its own is.
+struct LightNumber {
+  ParameterRef ref;
+  double unit;
+};
+constexpr double kUmPerNm = 1e-3;
+
+/// In the order of Channels::numbers().
+std::vector<LightNumber> numbers_of(const Microscope& microscope) {
+  if (!microscope.channel_light) return {{microscope.wavelength_nm, kUmPerNm}, {microscope.bandwidth_nm, kUmPerNm}};
+  std::vector<LightNumber> numbers;
+  const ChannelLight& light = *microscope.channel_light;
+  if (light.lamp.planck_k) numbers.push_back({light.lamp.planck_k, 1});
+  for (const LightFilter& filter : light.filters) {
+    if (filter.table) continue;
+    numbers.push_back({filter.centre_nm, kUmPerNm});
+    numbers.push_back({filter.fwhm_nm, kUmPerNm});
+  }
+  return numbers;
+}
+
+/// A sum's place at which this share of the only channel is passed.
+std::size_t place_of_share(const SpectralSum& sum, double share) {
+  const std::vector<double>& weight = sum.weight.front();
+  double passed = 0;
+  std::size_t k = 0;
+  while (k + 1 < weight.size() && passed + weight[k] < share) passed += weight[k++];
+  return k;
+}
+
+}  // namespace
+
+Channels channels_of(const ChannelLight& light, const Theta& theta, std::vector<Spectrum> sensitivities,
+                     const Where& where) {
+  Spectrum lamp = EqualEnergy{};
+  if (light.lamp.table)
+    lamp = *light.lamp.table;
+  else if (light.lamp.planck_k)
+    lamp = Planck{light.lamp.planck_k.in(theta)};
+  std::vector<Spectrum> filters;
+  for (const LightFilter& filter : light.filters) {
+    if (filter.table)
+      filters.emplace_back(*filter.table);
+    else
+      filters.emplace_back(GaussianLine{kUmPerNm * filter.centre_nm.in(theta), kUmPerNm * filter.fwhm_nm.in(theta)});
+  }
+  return Channels(std::move(lamp), std::move(filters), std::move(sensitivities), where);
+}
+
+Channels channel_of(const Microscope& microscope, const Theta& theta, const Where& where) {
+  if (!microscope.channel_light)
+    return Channels(
+        GaussianLine{kUmPerNm * microscope.wavelength_nm.in(theta), kUmPerNm * microscope.bandwidth_nm.in(theta)}, {},
+        {EqualEnergy{}}, where);
+  const ChannelLight& light = *microscope.channel_light;
+  return channels_of(light, theta, {light.sensitivity ? Spectrum(*light.sensitivity) : Spectrum(EqualEnergy{})}, where);
+}
+
+std::shared_ptr<const WavelengthRule> wavelength_rule(const Microscope& microscope, const Theta& theta,
+                                                      const SpectralSum& fine, int n) {
+  const SpectralSum sum = gauss_sum(fine, n);
+  auto rule = std::make_shared<WavelengthRule>();
+  for (const double um : sum.wavelength_um) rule->wavelength_nm.push_back(um / kUmPerNm);
+  rule->weight = sum.weight.front();
+  const std::vector<LightNumber> numbers = numbers_of(microscope);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto& [ref, unit] = numbers[i];
+    rule->index.push_back(ref.index);
+    rule->made_for.push_back(theta.at(static_cast<std::size_t>(ref.index)));
+    rule->slope.push_back(sum.slope.at(i).front());
+    for (double& slope : rule->slope.back()) slope *= unit * ref.times;
+  }
+  return rule;
+}
+
+std::shared_ptr<const WavelengthRule> rule_at(const std::shared_ptr<const WavelengthRule>& rule,
+                                              const Microscope& microscope, const Theta& theta) {
+  bool same = true;
+  for (std::size_t i = 0; i < rule->index.size(); ++i)
+    same = same && theta.at(static_cast<std::size_t>(rule->index[i])) == rule->made_for[i];
+  if (same) return rule;
+  return wavelength_rule(microscope, theta, channel_of(microscope, theta).fine(), static_cast<int>(rule->size()));
+}
+
+std::array<double, 2> band_um(const SpectralSum& sum) {
+  constexpr double kEnds = 0.001;
+  return {sum.wavelength_um[place_of_share(sum, kEnds)], sum.wavelength_um[place_of_share(sum, 1 - kEnds)]};
+}
+
+double mean_um(const SpectralSum& sum) {
+  return sum.of([](double um) { return um; }).front();
+}
+
+Theta at_wavelength(const Microscope& microscope, Theta theta, double um) {
+  const ParameterRef ref = microscope.wavelength_nm;
+  theta.at(static_cast<std::size_t>(ref.index)) = ref.stated(um / kUmPerNm);
+  return theta;
+}
+
+}  // namespace birefit
