@@ -23,7 +23,7 @@ struct ConstantIndices {
   static void describe(Self& self, Visit&& visit) {
     visit.number("ordinary", self.ordinary, numbers::tabulated_index(), "n_o");
     visit.number("birefringence", self.birefringence, numbers::within(-1, 1).known_within_share(0.01), "n_e - n_o");
-    visit.number("resonance_nm", self.resonance_nm, numbers::within(50, 20000, "nm").left_out(),
+    visit.number("resonance_nm", self.resonance_nm, numbers::within(50, 20000, "nm").left_out().known_within(15),
                  "of the absorption band by which the birefringence varies, that given being of 589.3 nm");
   }
 };

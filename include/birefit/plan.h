@@ -58,6 +58,8 @@ struct RenderPlan {
   PixelMeans means;
   /// set: the picture is a sum over these wavelengths, all else of the plan holds for each; null: a single line
   std::shared_ptr<const WavelengthRule> wavelengths;
+  /// propagated waves: a plan for each of them, whose grids fit it; else empty
+  std::vector<RenderPlan> of_wavelengths;
   std::shared_ptr<const SampleChoices> own;  ///< the kind's, which nobody else reads; none: its defaults
   /// set: the whole picture at once by wave optics, and nothing of the above but the words
   std::shared_ptr<const WavePlan> wave;

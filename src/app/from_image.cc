@@ -95,8 +95,9 @@ void fill_image(const std::string& file, const Opened& opened, Lines& lines, Fil
     keys.push_back("channel: g                 # r, g, b or mean");
     filled.found.push_back("colour channels: green is taken, channel: g");
     filled.missing.push_back(
-        "was there a filter or a laser? A channel of a colour camera passes light about 100 nm wide, white light is "
-        "not modelled: state microscope.light.wavelength_nm and bandwidth_nm, and trust no interval without a filter");
+        "was there a filter or a laser? Then state microscope.light.wavelength_nm and bandwidth_nm. A channel of a "
+        "colour camera passes light about 100 nm wide: white light is fitted in all colours by channel: rgb, light: "
+        "{lamp: A} and camera: {sensitivity: nikon_d5100}");
     if (image.bits == 8) {
       keys.push_back("transfer: srgb             # how codes follow light: linear where the camera wrote raw values");
       filled.missing.push_back(

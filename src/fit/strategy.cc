@@ -175,8 +175,30 @@ Waves waves_of(const FitJob& job) {
   return waves;
 }
 
-/// By rays or by waves, as they matter.
+bool is_in_white_light(const FitJob& job) {
+  bool white = false;
+  for_each_scene(job.measurements, [&](const Scene& scene) { white = white || scene.microscope.channel_light; });
+  return white;
+}
+/// Rays that curve go other ways at every wavelength.
+bool has_dispersion(const FitJob& job) {
+  bool dispersion = false;
+  for_each_scene(job.measurements, [&](const Scene& scene) {
+    const auto* constant = std::get_if<ConstantIndices>(&scene.material);
+    dispersion = dispersion || !constant || constant->resonance_nm || scene.surround_dispersion;
+  });
+  return dispersion;
+}
+
+/// By rays or by waves, as they matter. In white light a fit by waves, or by curved rays where there is dispersion,
+/// takes minutes, and is only made where it is asked for: what straight rays leave out is in the errors all the same.
 FitResult fit_by_chosen_waves(const FitJob& job) {
+  if (is_in_white_light(job)) {
+    FitJob by_rays = job;
+    by_rays.options.choose_waves = false;
+    by_rays.options.choose_rays = job.options.choose_rays && !has_dispersion(job);
+    return fit_by_given_waves(by_rays);
+  }
   if (!job.options.choose_waves) return fit_by_given_waves(job);
   FitJob chosen = job;
   chosen.options.choose_waves = false;

@@ -64,10 +64,18 @@ Channels channel_of(const Microscope& microscope, const Theta& theta, const Wher
   return channels_of(light, theta, {light.sensitivity ? Spectrum(*light.sensitivity) : Spectrum(EqualEnergy{})}, where);
 }
 
-std::shared_ptr<const WavelengthRule> wavelength_rule(const Microscope& microscope, const Theta& theta,
-                                                      const SpectralSum& fine, int n) {
-  const SpectralSum sum = gauss_sum(fine, n);
+std::shared_ptr<const WavelengthRule> wavelength_rule(const Microscope& microscope, const Theta& theta, double reach_um,
+                                                      int n) {
+  const Channels channel = channel_of(microscope, theta);
+  SpectralSum sum;
+  if (reach_um > 0) {
+    const SpectralSum fine = channel.fine(reach_um);
+    sum = gauss_sum(fine, std::min(n, static_cast<int>(fine.size()) / 4));
+  } else {
+    sum = channel.uniform(n);
+  }
   auto rule = std::make_shared<WavelengthRule>();
+  rule->reach_um = reach_um;
   for (const double um : sum.wavelength_um) rule->wavelength_nm.push_back(um / kUmPerNm);
   rule->weight = sum.weight.front();
   const std::vector<LightNumber> numbers = numbers_of(microscope);
@@ -87,7 +95,7 @@ std::shared_ptr<const WavelengthRule> rule_at(const std::shared_ptr<const Wavele
   for (std::size_t i = 0; i < rule->index.size(); ++i)
     same = same && theta.at(static_cast<std::size_t>(rule->index[i])) == rule->made_for[i];
   if (same) return rule;
-  return wavelength_rule(microscope, theta, channel_of(microscope, theta).fine(), static_cast<int>(rule->size()));
+  return wavelength_rule(microscope, theta, rule->reach_um, static_cast<int>(rule->size()));
 }
 
 std::array<double, 2> band_um(const SpectralSum& sum) {

@@ -8,6 +8,7 @@
 
 #include "birefit/microscope.h"
 #include "birefit/parameters.h"
+#include "core/scalar.h"
 #include "instrument/channels.h"
 
 namespace birefit {
@@ -19,17 +20,31 @@ struct WavelengthRule {
   std::vector<int> index;
   std::vector<std::vector<double>> slope;
   std::vector<double> made_for;  ///< theta[index]
+  /// How it is made: by the Gauss rule of a sum that is fine enough for path differences of reach_um (Channels::fine),
+  /// or, 0, in equal steps (Channels::uniform).
+  double reach_um = 0;
 
   std::size_t size() const { return wavelength_nm.size(); }
 };
+
+/// The weight of a wavelength with its derivatives: `active` as Values have them.
+template <class S>
+S weight_in(const WavelengthRule& rule, std::size_t k, const std::vector<int>& active) {
+  S weight(rule.weight[k]);
+  if constexpr (ScalarTraits<S>::derivatives > 0)
+    for (std::size_t n = 0; n < rule.index.size(); ++n)
+      for (std::size_t j = 0; j < active.size(); ++j)
+        if (active[j] == rule.index[n]) weight.d[j] = weight.d[j] + PlainOf<S>(rule.slope[n][k]);
+  return weight;
+}
 
 /// The one channel that the microscope's light makes: of its channel_light, else of its line with a bandwidth (above
 /// 0). UserError as Channels has it.
 Channels channel_of(const Microscope&, const Theta&, const Where& = {});
 /// The microscope's channel_light by other sensitivities than its own.
 Channels channels_of(const ChannelLight&, const Theta&, std::vector<Spectrum> sensitivities, const Where& = {});
-/// n wavelengths by the Gauss rule of `fine`, a finer sum of the same channel.
-std::shared_ptr<const WavelengthRule> wavelength_rule(const Microscope&, const Theta&, const SpectralSum& fine, int n);
+/// n wavelengths, at most a quarter of the finer sum's.
+std::shared_ptr<const WavelengthRule> wavelength_rule(const Microscope&, const Theta&, double reach_um, int n);
 /// The rule with as many wavelengths at these values: the same where no number of the light is another.
 std::shared_ptr<const WavelengthRule> rule_at(const std::shared_ptr<const WavelengthRule>&, const Microscope&,
                                               const Theta&);

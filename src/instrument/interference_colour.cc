@@ -20,7 +20,8 @@ constexpr double kPlacesPerUm = 50;
 struct Misfit {
   double value = 0, slope = 0, curvature = 0;
 };
-Misfit misfit(const ColourCurve& curve, const std::vector<double>& recorded, const std::vector<double>& noise, double g) {
+Misfit misfit(const ColourCurve& curve, const std::vector<double>& recorded, const std::vector<double>& noise,
+              double g) {
   Misfit m;
   Dual<double, 1> at(g);
   at.d[0] = 1;

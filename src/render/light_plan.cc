@@ -17,14 +17,14 @@ constexpr double kEndsOfLine = 3.09;
 
 /// More wavelengths until the means over a few pixels change no more: echoes between the faces of a layer go by longer
 /// ways than its retardance.
-void settle_on_means(const Scene& scene, const Theta& theta, const LightBand& band, const LightProbe& probe,
-                     RenderPlan& plan) {
+void settle_on_means(const Scene& scene, const Theta& theta, const LightProbe& probe, RenderPlan& plan) {
   Eigen::VectorXd before = probe.means(plan);
   for (;;) {
     const int n = static_cast<int>(plan.wavelengths->size()), more = n + n / 2 + 3;
-    if (more > static_cast<int>(band.fine.size()) / 4) return;
+    constexpr int kMost = 400;
+    if (more > kMost) return;
     RenderPlan finer = plan;
-    finer.wavelengths = wavelength_rule(scene.microscope, theta, band.fine, more);
+    finer.wavelengths = wavelength_rule(scene.microscope, theta, plan.wavelengths->reach_um, more);
     const Eigen::VectorXd now = probe.means(finer);
     const double change = (now - before).cwiseAbs().maxCoeff();
     if (change <= plan.demand.intensity_accuracy) return;
@@ -40,8 +40,7 @@ std::optional<LightBand> light_band(const Microscope& microscope, const Theta& t
   if (narrow && !(microscope.bandwidth_nm && microscope.bandwidth_nm.in(theta) > 0)) return std::nullopt;
   LightBand band;
   band.narrow = narrow;
-  band.fine = channel_of(microscope, theta).fine();
-  const auto ends = band_um(band.fine);
+  const auto ends = band_um(channel_of(microscope, theta).fine());
   band.low_um = ends[0], band.high_um = ends[1];
   return band;
 }
@@ -55,8 +54,9 @@ void plan_wavelengths(const Scene& scene, const Theta& theta, const LightBand& b
                cycles = turned / (2 * std::numbers::pi), deviation = turned / (2 * kEndsOfLine);
   // Phases that are stated for the light there is, whatever its wavelength, do not say how they vary within it.
   const bool known = turned > 0;
-  const double spread = known ? deviation
-                              : short_end * m.bandwidth_nm.in(theta) / (2.3548200450309493 * m.wavelength_nm.in(theta));
+  const double spread = known || !band.narrow
+                            ? deviation
+                            : short_end * m.bandwidth_nm.in(theta) / (2.3548200450309493 * m.wavelength_nm.in(theta));
   const double loss = 0.5 * (1 - std::exp(-0.5 * spread * spread));
   const bool pictures = plan.observable.quantity == Quantity::intensity;
   if (band.narrow && (!pictures || !known || loss <= plan.demand.intensity_accuracy)) {
@@ -68,13 +68,23 @@ void plan_wavelengths(const Scene& scene, const Theta& theta, const LightBand& b
                       m.bandwidth_nm.in(theta), loss));
     return;
   }
+  // Polynomials as high as the nodes need are integrated by a sum as fine as the fringes are.
+  constexpr double kReachUm = 20;
+  double reach_um = std::max(kReachUm, 1.5 * short_end * band.low_um / (2 * std::numbers::pi));
   const double share = 0.5 * plan.demand.intensity_accuracy;  // of the error, for the sum
-  constexpr double kFewDeviations = 4;                        // as far as counts for lines were measured
   int nodes = gauss_nodes(cycles, share);
-  if (band.narrow && deviation < kFewDeviations) nodes = std::min(nodes, line_nodes(deviation) + 3);
-  nodes = std::clamp(nodes, 1, static_cast<int>(band.fine.size()) / 4);
-  plan.wavelengths = wavelength_rule(m, theta, band.fine, nodes);
-  if (plan.demand.ceiling == Ceiling::reflections) settle_on_means(scene, theta, band, probe, plan);
+  if (band.narrow) {
+    // The nodes of a Gaussian lie the farther apart the fewer they are, and equal steps do with fewer where many
+    // fringes are to be lost: over the line's foot of 17 deviations, wider in 1/wavelength by 1.4 at most, as near as
+    // the fringes and a tail of 1e-5 ask.
+    constexpr double kFewDeviations = 6, kFoot = 17 * 1.4, kTail = 0.76;
+    const bool even = deviation > kFewDeviations;
+    nodes = even ? static_cast<int>(std::ceil(kFoot * (deviation / (2 * std::numbers::pi) + kTail)))
+                 : line_nodes(deviation) + 3;
+    if (even) reach_um = 0;
+  }
+  plan.wavelengths = wavelength_rule(m, theta, reach_um, nodes);
+  if (plan.demand.ceiling == Ceiling::reflections) settle_on_means(scene, theta, probe, plan);
   plan.numerical_error += share;
   plan.cost_seconds *= static_cast<double>(plan.wavelengths->size());
   plan.reasons.push_back(fmt::format(

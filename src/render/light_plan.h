@@ -7,13 +7,11 @@
 
 #include "birefit/plan.h"
 #include "birefit/scene.h"
-#include "instrument/channels.h"
 
 namespace birefit {
 
 /// The microscope's light where it is more than a line.
 struct LightBand {
-  SpectralSum fine;
   double low_um = 0, high_um = 0;  ///< between which nearly all of it is
   bool narrow = false;             ///< a line with a bandwidth
 };

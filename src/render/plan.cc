@@ -171,6 +171,10 @@ RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, con
                       return render_pixels(scene, trial, theta, few_pixels(scene.view), {}, 1).intensity;
                     }},
                    result);
+  if (result.wave && result.wavelengths)
+    for (const double nm : result.wavelengths->wavelength_nm)
+      result.of_wavelengths.push_back(
+          plan_line(scene, demand, at_wavelength(scene.microscope, theta, 1e-3 * nm), observable));
   return result;
 }
 

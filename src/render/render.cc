@@ -491,10 +491,10 @@ bool sample_sums(const Scene& scene, const RenderPlan& plan, const Theta& theta)
 
 void render(const Scene& scene, const RenderPlan& plan, const Exposure& exposure, const Theta& theta,
             const std::vector<int>& active, int threads, Rendering& into) {
-  const auto of_line = [&](const Theta& at, const std::vector<int>& of_scene, const WavelengthRule* rule,
-                           Rendering& line) {
+  const auto of_line = [&](const RenderPlan& own, const Theta& at, const std::vector<int>& of_scene,
+                           const WavelengthRule* rule, Rendering& line) {
     sum_over_directions(exposure, line, [&](const BeamMaker& light, Rendering& one) {
-      render_direction(scene, plan, light.with(rule), at, of_scene, threads, one);
+      render_direction(scene, own, light.with(rule), at, of_scene, threads, one);
     });
   };
   sum_over_wavelengths(scene.microscope, plan, theta, active, sample_sums(scene, plan, theta), into, of_line);
@@ -516,10 +516,10 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const E
                              const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
                              int threads) {
   PixelRendering out;
-  const auto of_line = [&](const Theta& at, const std::vector<int>& of_scene, const WavelengthRule* rule,
-                           PixelRendering& line) {
+  const auto of_line = [&](const RenderPlan& own, const Theta& at, const std::vector<int>& of_scene,
+                           const WavelengthRule* rule, PixelRendering& line) {
     sum_over_directions(exposure, line, [&](const BeamMaker& light, PixelRendering& one) {
-      render_direction(scene, plan, light.with(rule), at, pixels, of_scene, threads, one);
+      render_direction(scene, own, light.with(rule), at, pixels, of_scene, threads, one);
     });
   };
   sum_over_wavelengths(scene.microscope, plan, theta, active, sample_sums(scene, plan, theta), out, of_line);
@@ -535,9 +535,10 @@ PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const T
 Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   if (plan.wave) throw std::logic_error("wave optics has no rays to take one at a time");
   Rendering r;
-  const auto of_line = [&](const Theta& at, const std::vector<int>&, const WavelengthRule*, Rendering& line) {
+  const auto of_line = [&](const RenderPlan& own, const Theta& at, const std::vector<int>&, const WavelengthRule*,
+                           Rendering& line) {
     sum_over_directions(exposure_of(scene.microscope), line, [&](const BeamMaker& light, Rendering& one) {
-      render_planes<double>(scene, plan, light, at, {}, 1, {&one.intensity});
+      render_planes<double>(scene, own, light, at, {}, 1, {&one.intensity});
     });
   };
   sum_over_wavelengths(scene.microscope, plan, theta, {}, false, r, of_line);

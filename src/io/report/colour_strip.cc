@@ -11,7 +11,8 @@
 namespace birefit {
 namespace {
 
-constexpr double kLeft = 70, kTop = 34, kWide = 900, kStrip = 64, kBetween = 26, kPanel = 300, kBottom = 46, kRight = 24;
+constexpr double kLeft = 70, kTop = 34, kWide = 900, kStrip = 64, kBetween = 26, kPanel = 300, kBottom = 46,
+                 kRight = 24;
 constexpr const char* kInk = "#2b2f36";
 constexpr const char* kFrame = "#8a919b";
 /// From the nearest on.
@@ -35,8 +36,8 @@ std::string strip(const ColourStrips::Strip& given, double top) {
   const double width = kWide / static_cast<double>(given.colours.size());
   for (std::size_t i = 0; i < given.colours.size(); ++i)
     out += fmt::format("<rect x=\"{:.2f}\" y=\"{}\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"/>\n",
-                       kLeft + width * static_cast<double>(i), top, std::min(width + 0.4, kWide - width * static_cast<double>(i)),
-                       kStrip, hex(given.colours[i]));
+                       kLeft + width * static_cast<double>(i), top,
+                       std::min(width + 0.4, kWide - width * static_cast<double>(i)), kStrip, hex(given.colours[i]));
   return out + frame(top, kStrip);
 }
 
@@ -44,9 +45,10 @@ std::string ticks_below(const AxisScale& x, double top, const std::string& label
   int power = 0;
   std::string out;
   for (const AxisTick& tick : axis_ticks(x, 10, power))
-    out += fmt::format("<path d=\"M{:.1f} {}v5\" stroke=\"{}\"/><text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}"
-                       "</text>\n",
-                       x(tick.value), top, kFrame, x(tick.value), top + 19, tick.label);
+    out += fmt::format(
+        "<path d=\"M{:.1f} {}v5\" stroke=\"{}\"/><text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}"
+        "</text>\n",
+        x(tick.value), top, kFrame, x(tick.value), top + 19, tick.label);
   return out + fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n", kLeft + 0.5 * kWide, top + 38,
                            with_power(label, power));
 }
@@ -56,9 +58,10 @@ std::string doubles_panel(const ColourStrips& chart, const AxisScale& x, double 
   std::string out;
   int power = 0;
   for (const AxisTick& tick : axis_ticks(y, 6, power))
-    out += fmt::format("<path d=\"M{} {:.1f}h-5\" stroke=\"{}\"/><text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}"
-                       "</text>\n",
-                       kLeft, y(tick.value), kFrame, kLeft - 9, y(tick.value) + 4, tick.label);
+    out += fmt::format(
+        "<path d=\"M{} {:.1f}h-5\" stroke=\"{}\"/><text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}"
+        "</text>\n",
+        kLeft, y(tick.value), kFrame, kLeft - 9, y(tick.value) + 4, tick.label);
   out += fmt::format("<text transform=\"translate({} {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n", kLeft - 52,
                      top + 0.5 * kPanel, escape_html(chart.doubles_label));
   for (std::size_t step = chart.steps.size(); step-- > 0;) {

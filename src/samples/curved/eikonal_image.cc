@@ -1,8 +1,10 @@
 #include "samples/curved/eikonal_image.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "instrument/channel_light.h"
 #include "instrument/exposure.h"
 #include "samples/choices.h"
 
@@ -21,6 +23,11 @@ EikonalImage<S>::EikonalImage(const Scene& scene, const RenderPlan& plan, const 
       panels_(choices(plan).part_panels),
       allowed_tail_(std::max(0.05 * plan.demand.intensity_accuracy, 3 * plan.numerical_error)) {
   passing_ = PassingLight<S>(value(scene.view.pixel_size_um), optics_.radius_um, light_.line().open());
+  if (const WavelengthRule* rule = light.rule()) {
+    const double nm = lane(plain(value(scene.microscope.wavelength_nm)), 0);
+    for (std::size_t k = 0; k < rule->size(); ++k)
+      colours_.push_back({nm / rule->wavelength_nm[k], weight_in<S>(*rule, k, value.active())});
+  }
   std::vector<S> ends = fan_p_.ends_um();
   ends.insert(ends.end(), fan_s_.ends_um().begin(), fan_s_.ends_um().end());
   const auto place = [](const S& end) { return lane(plain(end), 0); };
@@ -65,7 +72,18 @@ void EikonalImage<S>::terms_at(const S& rho_um, S* out) const {
           s_field = aplanatic_ ? s.amplitude : s.amplitude * inverse_root(s.cos_turn);
   // The matrix is (p exp(i phase), s) in the (radial, azimuthal) frame.
   S sine, cosine;
-  sin_cos(p.phase_rad - s.phase_rad, sine, cosine);
+  const S phase = p.phase_rad - s.phase_rad;
+  if (colours_.empty()) {
+    sin_cos(phase, sine, cosine);
+  } else {
+    // What passes is linear in both; their means stand for a retarder whose contrast is less than 1.
+    sine = cosine = S(0.0);
+    for (const Colour& colour : colours_) {
+      S one_sine, one_cosine;
+      sin_cos(S(colour.phase * phase), one_sine, one_cosine);
+      sine = sine + colour.weight * one_sine, cosine = cosine + colour.weight * one_cosine;
+    }
+  }
   if (!light_.line().linear())
     return light_.terms({{p_field * cosine, p_field * sine}, {}, {}, {s_field}}, S(1.0), true, out);
   const S sum = 0.25 * (p_field * p_field + s_field * s_field), mixed = 0.5 * p_field * s_field * cosine;
@@ -165,6 +183,19 @@ void EikonalImage<S>::light(const P& column, const P& row, S* out) const {
     }
   }
   if constexpr (kSlopes) view_.add_moves_and_turns(place, by_rho, by_angle, result);
+}
+
+bool eikonal_sums_wavelengths(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
+  const Microscope& m = scene.microscope;
+  const bool plain_light = m.channel_light && m.before.empty() && m.behind.empty() && m.polarizer_deg &&
+                           m.analyzer_deg && !m.polarizer_extinction_ratio && !m.analyzer_extinction_ratio;
+  if (!plain_light) return false;
+  const auto indices_at = [&](double nm) {
+    const Theta there = at_wavelength(m, theta, 1e-3 * nm);
+    const DropletOptics<double> o = droplet_optics(scene, Values<double>(there, {}, plan.demand.memo.get()));
+    return std::array<double, 3>{o.n_o, o.n_e, o.n_host};
+  };
+  return indices_at(plan.wavelengths->wavelength_nm.front()) == indices_at(plan.wavelengths->wavelength_nm.back());
 }
 
 template <class S>

@@ -65,7 +65,17 @@ class EikonalImage final : public SampleImage<S> {
   std::vector<Part> parts_;  ///< from the axis outwards, two for each stretch between ends
   std::vector<int> panels_;  ///< of the parts
   double allowed_tail_;      ///< of tables that are read
+  /// Of a picture that is a sum over wavelengths, in a medium without dispersion: phases go with 1/wavelength.
+  struct Colour {
+    double phase;  ///< over that of optics_
+    S weight;
+  };
+  std::vector<Colour> colours_;  ///< none: a single line
 };
+
+/// Its tables by this plan are of light of all wavelengths: rays go the same ways in all of them, and so do fields
+/// beside the sample.
+bool eikonal_sums_wavelengths(const Scene&, const RenderPlan&, const Theta&);
 
 template <class S>
 std::unique_ptr<SampleImage<S>> make_eikonal_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);

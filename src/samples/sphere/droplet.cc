@@ -9,6 +9,7 @@
 #include "instrument/channel_light.h"
 #include "instrument/exposure.h"
 #include "samples/choices.h"
+#include "samples/curved/eikonal_image.h"
 #include "samples/image.h"
 #include "samples/sphere/droplet.h"
 #include "transport/method.h"
@@ -52,9 +53,9 @@ constexpr double kCentre = 1.0 / 64;
 
 template <class S>
 DropletImage<S>::DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value,
-                              const BeamMaker& light)
+                              const BeamMaker& light, const RimTable* rim)
     : optics_(droplet_optics(scene, value, continuity_of(plan.demand))),
-      rim_(rim_table(optics_)),
+      rim_(rim ? *rim : rim_table(optics_)),
       method_(transport_method<S>(plan.method)),
       mesh_(plan.mesh.empty() ? uniform_mesh(plan.steps) : plan.mesh),
       aplanatic_(scene.microscope.aplanatic),
@@ -97,13 +98,9 @@ void DropletImage<S>::sum_over(const WavelengthRule& rule, const Scene& scene, c
     if (index == scene.microscope.wavelength_nm.index) index = -1;
   for (std::size_t k = 0; k < rule.size(); ++k) {
     const Theta theta = at_wavelength(scene.microscope, value.theta(), 1e-3 * rule.wavelength_nm[k]);
-    S weight(rule.weight[k]);
-    if constexpr (ScalarTraits<S>::derivatives > 0)
-      for (std::size_t n = 0; n < rule.index.size(); ++n)
-        for (std::size_t j = 0; j < value.active().size(); ++j)
-          if (value.active()[j] == rule.index[n]) weight.d[j] = weight.d[j] + P(rule.slope[n][k]);
-    colours_.push_back({weight, std::make_unique<DropletImage>(scene, plan, Values<S>(theta, active, value.memo()),
-                                                               light.with(nullptr))});
+    colours_.push_back({weight_in<S>(rule, k, value.active()),
+                        std::make_unique<DropletImage>(scene, plan, Values<S>(theta, active, value.memo()),
+                                                       light.with(nullptr), &rim_)});
   }
 }
 
@@ -256,9 +253,9 @@ void DropletImage<S>::light(const P& column, const P& row, S* out) const {
 
 bool droplet_sums_wavelengths(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   const SampleChoices& own = choices(plan);
-  if (plan.wave || own.radial_panels == 0 || own.series_reach_um > 0 || plan.demand.rays == Rays::eikonal ||
-      !looks_round(std::get<Droplet>(scene.sample)))
+  if (plan.wave || own.radial_panels == 0 || own.series_reach_um > 0 || !looks_round(std::get<Droplet>(scene.sample)))
     return false;
+  if (plan.demand.rays == Rays::eikonal) return eikonal_sums_wavelengths(scene, plan, theta);
   const auto ratio_at = [&](double nm) {
     const Theta there = at_wavelength(scene.microscope, theta, 1e-3 * nm);
     const DropletOptics<double> o = droplet_optics(scene, Values<double>(there, {}, plan.demand.memo.get()));
@@ -266,6 +263,7 @@ bool droplet_sums_wavelengths(const Scene& scene, const RenderPlan& plan, const 
   };
   const std::vector<double>& nm = plan.wavelengths->wavelength_nm;
   if (ratio_at(nm.front()) != ratio_at(nm.back())) return false;  // each wavelength's rays go their own ways
+  if (!std::holds_alternative<ShellDirector>(std::get<Droplet>(scene.sample).director)) return true;
   const Values<double> value(theta, {}, plan.demand.memo.get());
   return DropletImage<double>(scene, plan, value, exposure_of(scene.microscope).directions.front()).can_tabulate();
 }

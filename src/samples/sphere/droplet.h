@@ -51,7 +51,9 @@ template <class S>
 class DropletImage final : public SampleImage<S> {
  public:
   using P = PlainOf<S>;
-  DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light);
+  /// `rim`: of a droplet whose rays go the same ways; null: its own is made.
+  DropletImage(const Scene& scene, const RenderPlan& plan, const Values<S>& value, const BeamMaker& light,
+               const RimTable* rim = nullptr);
   void tabulate(typename SampleImage<S>::Wanted, int threads) override;
   void light(const P& column, const P& row, S* out) const override;
   Symmetry symmetry() const override { return symmetry_; }

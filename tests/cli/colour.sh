@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# White light and colour cameras: a photograph fitted in all its colours, rendered, and read by its colours.
+# usage: colour.sh BIREFIT SOURCE_DIR
+set -u
+birefit=$(realpath "$1")
+source=$(realpath "$2")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+fail() { echo "FAIL $1"; failures=$((failures + 1)); }
+
+# All three colours at once: the truth within three standard errors and a thousandth, which its makers' sums hold.
+"$birefit" fit "$source/fit_configs/colour_droplet.yaml" --out colours > colours.txt 2> colours.err || fail "colours: $(tail -3 colours.err)"
+while IFS=, read -r name value; do
+  [[ $name == name ]] && continue
+  awk -v name="$name" -v truth="$value" '
+    $1 == name && $2 == "=" { found = 1; off = $3 - truth; most = 3 * $5 + 0.001 * truth; inside = $5 > 0 && off * off < most * most }
+    END { exit !(found && inside) }' colours.txt || fail "colours: $name = $value is not $(grep -m1 "$name" colours.txt)"
+done < "$source/data/colour_droplet/truth.csv"
+
+cat > cell.yaml <<'Y'
+image_size_px: [6, 4]
+micrograph: {channel: rgb, gain: 1, offset: 0}
+sample:
+  cell: {thickness_um: 5, director: {uniform: {azimuth_deg: 45, tilt_deg: 0}}}
+  material: {ordinary: 1.5, birefringence: 0.2, resonance_nm: 220}
+  surround: {index: 1.5}
+physics: {ceiling: e_only}
+microscope:
+  light: {lamp: A}
+  camera: {sensitivity: nikon_d5100}
+  polarizer_deg: 0
+  analyzer_deg: 90
+Y
+# A cell of 1 um of retardance: its colour says so, whichever way it was written.
+"$birefit" render cell.yaml --out cell.tif --quiet || fail 'render: tif'
+"$birefit" render cell.yaml --out cell.npy --quiet && head -c 100 cell.npy | grep -q "(4, 6, 3)" || fail 'render: npy'
+"$birefit" render cell.yaml --out cell.png --quiet && file cell.png | grep -q '6 x 4, 16-bit/color RGB' || fail "render: png: $(file cell.png)"
+"$birefit" michel-levy cell.yaml --image cell.tif --out map > map.txt || fail 'michel-levy: no map'
+grep -q '24 pixels, 24 of them' map.txt || fail "michel-levy: $(cat map.txt)"
+"$birefit" michel-levy cell.yaml --out chart > /dev/null || fail 'michel-levy: no chart'
+for f in michel_levy.svg michel_levy.png michel_levy.csv; do [[ -s chart/$f ]] || fail "michel-levy: no $f"; done
+# Of the table: nothing passes at 0, and at 1 um what the cell's picture shows.
+awk -F, 'NR == 2 { dark = $1 == 0 && $2 + $3 + $4 < 1e-6 } END { exit !dark }' chart/michel_levy.csv || fail "michel-levy: $(sed -n 2p chart/michel_levy.csv)"
+if [[ -s map/retardance_nm.tif ]] && /usr/bin/python3 -c 'import numpy, PIL' 2> /dev/null; then
+  /usr/bin/python3 - <<'P' || fail 'michel-levy: the map is not 1000 nm'
+import numpy, PIL.Image
+found = numpy.array(PIL.Image.open("map/retardance_nm.tif"))
+assert found.shape == (4, 6) and abs(found - 1000).max() < 2, found
+colours, table = numpy.load("cell.npy"), numpy.genfromtxt("chart/michel_levy.csv", delimiter=",", skip_header=1)
+row = table[table[:, 0] == 1000][0]
+assert abs(colours[0, 0] - row[1:4]).max() < 3e-4, (colours[0, 0], row)
+P
+fi
+
+# What does not go together is said, with its place.
+says() {  # WHAT SED ..
+  sed "${@:2}" cell.yaml > wrong.yaml
+  "$birefit" render wrong.yaml --out wrong.tif > /dev/null 2> wrong.txt
+  [[ $? == 2 ]] && grep -q "$1" wrong.txt && grep -q 'yaml:[0-9]\|lamp.csv:' wrong.txt || fail "$1: $(cat wrong.txt)"
+}
+says 'needs the light and what the camera sees' -e '/camera:/d'
+says 'it is not said which colour' -e 's/channel: rgb, //'
+says 'has no sensitivity of its own' -e 's/channel: rgb/channel: mean/'
+says 'no camera that birefit knows' -e 's/nikon_d5100/nikon/'
+says 'given beside a lamp' -e 's/lamp: A/lamp: A, wavelength_nm: 590/'
+says 'given beside a single line' -e 's/lamp: A/wavelength_nm: 590/'
+says 'filters are given without a lamp' -e 's/lamp: A/wavelength_nm: 590, filters: [{centre_nm: 546, fwhm_nm: 10}]/'
+says 'a half-wave voltage is of one' -e 's/cell: .*/crystal: {half_wave_voltage_v: 1500, bias_v: 100, field_along: x}/' -e '/material/d'
+printf 'wavelength_um,power\n400,1\n700,2\n' > lamp.csv
+says 'looks like nanometres' -e 's/lamp: A/lamp: {file: lamp.csv}/'
+printf 'wavelength_nm,power\n500,1\n600,2\n' > lamp.csv
+says 'lies outside' -e 's/lamp: A/lamp: {file: lamp.csv}/'
+printf 'wavelength_nm,power\n400,1\n500,-2\n700,1\n' > lamp.csv
+says 'is negative' -e 's/lamp: A/lamp: {file: lamp.csv}/'
+printf 'nm,power\n400,1\n700,2\n' > lamp.csv
+says 'is no spectrum' -e 's/lamp: A/lamp: {file: lamp.csv}/'
+
+((failures == 0)) && echo "white light: all as it should be"
+exit "$failures"
