@@ -59,8 +59,7 @@ ColourStrips strips_of(const std::vector<ChartColour>& chart) {
   for (const ChartColour& one : chart) {
     eye.colours.push_back(one.screen);
     if (one.channels.size() == 3)
-      camera.colours.push_back(
-          {srgb_code(one.channels[0]), srgb_code(one.channels[1]), srgb_code(one.channels[2])});
+      camera.colours.push_back({srgb_code(one.channels[0]), srgb_code(one.channels[1]), srgb_code(one.channels[2])});
   }
   picture.strips.push_back(std::move(eye));
   if (!camera.colours.empty()) picture.strips.push_back(std::move(camera));
@@ -120,8 +119,7 @@ int run_michel_levy(const Arguments& arguments) {
   const bool maps = !arguments.image.empty();
   const std::optional<std::filesystem::path> image =
       maps ? std::optional<std::filesystem::path>(arguments.image) : std::nullopt;
-  const Config config =
-      load_config(arguments.config, maps ? ConfigUse::fit : ConfigUse::render, image, arguments.set);
+  const Config config = load_config(arguments.config, maps ? ConfigUse::fit : ConfigUse::render, image, arguments.set);
   std::vector<Scene> scenes;
   if (maps) {
     for (const Measurement& measurement : config.job.measurements)
@@ -172,7 +170,7 @@ Command add_michel_levy_command(CLI::App& app) {
   add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out, "folder for chart and maps (default out/michel_levy)");
   command->add_option("--image", arguments->image, "a photograph: the retardance of every pixel from its colour");
-  command->add_option("--up-to-um", arguments->up_to_um, "largest retardance (um, default 3)")
+  command->add_option("--largest", arguments->up_to_um, "largest retardance of the chart and of maps (um, default 3)")
       ->check(CLI::Range(0.2, 20.0));
   command->add_option("--noise", arguments->noise, "standard deviation of a pixel's channels, of white (default 0.01)")
       ->check(CLI::Range(1e-6, 1.0));

@@ -18,7 +18,7 @@ schema = json.load(open('schema.json'))
 known = {'$schema', 'title', 'description', 'default', 'type', 'properties', 'additionalProperties', 'items', 'anyOf',
          'enum', 'const', 'minimum', 'maximum', 'exclusiveMinimum', 'exclusiveMaximum', 'minItems', 'maxItems',
          'minProperties', 'maxProperties'}
-types = {'object': dict, 'array': list, 'string': str, 'number': (int, float), 'integer': int}
+types = {'object': dict, 'array': list, 'string': str, 'number': (int, float), 'integer': int, 'boolean': bool}
 
 
 def mistakes(value, s, place=''):
@@ -27,7 +27,7 @@ def mistakes(value, s, place=''):
     found = []
     if 'type' in s:
         wanted = s['type'] if isinstance(s['type'], list) else [s['type']]
-        if not any(isinstance(value, types[t]) for t in wanted) or isinstance(value, bool):
+        if not any(isinstance(value, types[t]) for t in wanted) or (isinstance(value, bool) and 'boolean' not in wanted):
             return [place]
     if 'const' in s and value != s['const'] or 'enum' in s and value not in s['enum']:
         found.append(place)

@@ -33,12 +33,13 @@ std::string frame(double top, double height) {
 /// Its colours side by side, each a hair wider than its place so that no page shines through.
 std::string strip(const ColourStrips::Strip& given, double top) {
   std::string out = fmt::format("<text x=\"{}\" y=\"{:.1f}\">{}</text>\n", kLeft, top - 6, escape_html(given.name));
+  out += "<g shape-rendering=\"crispEdges\">\n";
   const double width = kWide / static_cast<double>(given.colours.size());
   for (std::size_t i = 0; i < given.colours.size(); ++i)
     out += fmt::format("<rect x=\"{:.2f}\" y=\"{}\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"/>\n",
                        kLeft + width * static_cast<double>(i), top,
                        std::min(width + 0.4, kWide - width * static_cast<double>(i)), kStrip, hex(given.colours[i]));
-  return out + frame(top, kStrip);
+  return out + "</g>\n" + frame(top, kStrip);
 }
 
 std::string ticks_below(const AxisScale& x, double top, const std::string& label) {
