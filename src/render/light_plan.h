@@ -5,6 +5,8 @@
 #include <functional>
 #include <optional>
 
+#include <Eigen/Dense>
+
 #include "birefit/plan.h"
 #include "birefit/scene.h"
 
