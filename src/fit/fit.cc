@@ -41,11 +41,11 @@ Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool bea
   const Eigen::VectorXd sd = covariances.with_misfit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   foretell_curved_rays(task, optimum, sd, left_out);
   foretell_waves(task, optimum, sd, left_out);
+  foretell_light(task, optimum, left_out);
   pay_for_discrepancy(task, optimum, covariances);
   pay_for_stated(task, optimum, covariances);
   beyond_weights = covariances.with_misfit.covariance - covariances.of_noise.covariance;
-  for (const auto& change : {left_out.by_curved_rays, left_out.by_waves})
-    if (change) beyond_weights += *change * change->transpose();
+  for (const Eigen::VectorXd& change : left_out.changes()) beyond_weights += change * change.transpose();
   FitResult result = report(task, optimum, minima, std::move(rivals), left_out, std::move(covariances), beaten);
   return {std::move(result), left_out.change_by_curved_rays, left_out.change_by_waves};
 }

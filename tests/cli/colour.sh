@@ -19,6 +19,14 @@ while IFS=, read -r name value; do
     END { exit !(found && inside) }' colours.txt || fail "colours: $name = $value is not $(grep -m1 "$name" colours.txt)"
 done < "$source/data/colour_droplet/truth.csv"
 
+# In other light, or by another camera, than is stated: no answer, or an interval that holds the truth.
+for wrong in microscope.light.lamp=D65 microscope.light.lamp=E microscope.camera.sensitivity=cie_1931; do
+  "$birefit" fit "$source/fit_configs/colour_droplet.yaml" --set "$wrong" --out wrong > wrong.txt 2> /dev/null || continue
+  grep -q '"grade": "answer with misfit"' wrong/fit.json || fail "$wrong: a plain answer"
+  awk -v truth=0.165 '$1 == "sample.material.birefringence" { gsub(/[\[\]]/, ""); for (i = 1; i < NF; ++i) if ($i == "..") inside = $(i - 1) <= truth && truth <= $(i + 1) }
+    END { exit !inside }' wrong.txt || fail "$wrong: $(grep -m1 birefringence wrong.txt)"
+done
+
 cat > cell.yaml <<'Y'
 image_size_px: [6, 4]
 micrograph: {channel: rgb, gain: 1, offset: 0}

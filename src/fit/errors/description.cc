@@ -26,7 +26,9 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
 
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {
   constexpr double kMostOfContrast = 0.03, kMostOfValue = 0.1, kMostOfBounds = 0.25;
-  const double missed = missed_of_contrast(task, optimum);
+  double squares = 0;  // over the colours of a photograph
+  for (int g = 0; g < task.frames(); ++g) squares += std::pow(missed_of_contrast(task, optimum, g), 2);
+  const double missed = std::sqrt(squares / task.frames());
   if (missed > kMostOfContrast) {
     result.described = false;
     return fmt::format(

@@ -277,13 +277,13 @@ std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
 
 }  // namespace
 
-double missed_of_contrast(const Task& task, const Optimum& optimum) {
+double missed_of_contrast(const Task& task, const Optimum& optimum, int frame) {
   const LeastSquares& problem = *optimum.problem;
-  const Eigen::ArrayXd sigma = problem.pixels(0).sigma.array(),
-                       residual = problem.noise_whitened_residual(0).array() * sigma;
-  const auto [low, high] = problem.intensity_range(0);
+  const Eigen::ArrayXd sigma = problem.pixels(frame).sigma.array(),
+                       residual = problem.noise_whitened_residual(frame).array() * sigma;
+  const auto [low, high] = problem.intensity_range(frame);
   const double missed = std::sqrt(std::max(0.0, (residual.square() - sigma.square()).mean()));
-  return missed / std::max(std::abs(task.gain_of(0, optimum.theta)) * (high - low), 1e-300);
+  return missed / std::max(std::abs(task.gain_of(frame, optimum.theta)) * (high - low), 1e-300);
 }
 
 bool leaves_discrepancy(const Task& task, const Optimum& optimum) { return left_over(task, optimum).has_value(); }

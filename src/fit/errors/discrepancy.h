@@ -23,7 +23,7 @@ std::vector<Eigen::MatrixXd> covariances_by_discrepancy(const Task& task, const 
 /// Whether there are any.
 bool leaves_discrepancy(const Task& task, const Optimum& optimum);
 
-/// What the model of the first picture misses beyond its noise, as RMS over the range of the model's light.
-double missed_of_contrast(const Task& task, const Optimum& optimum);
+/// What the model of a picture misses beyond its noise, as RMS over the range of the model's light.
+double missed_of_contrast(const Task& task, const Optimum& optimum, int frame = 0);
 
 }  // namespace birefit::estimation

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include <fmt/format.h>
 
+#include "fit/errors/discrepancy.h"
 #include "fit/problem/light.h"
 #include "samples/kind.h"
 #include "samples/waves/wave.h"
@@ -45,9 +47,13 @@ SolveOptions few_steps(const Task& task, int steps) {
   return few;
 }
 
-/// Fits the optimum's model to other values of its pixels: the change of all unknowns.
-Eigen::VectorXd change_by_values(const Task& task, const Optimum& optimum, const std::vector<Image>& values,
-                                 int steps) {
+/// Fits the optimum's model to other values of its pixels: the change of all unknowns, and what the fit misses of the
+/// values, RMS over the range of the model's light, of the picture that it misses most of.
+struct OtherValues {
+  Eigen::VectorXd change;
+  double missed = 0;
+};
+OtherValues change_by_values(const Task& task, const Optimum& optimum, const std::vector<Image>& values, int steps) {
   std::vector<PixelSet> sets;
   std::vector<RenderPlan> plans;
   for (int g = 0; g < task.frames(); ++g) {
@@ -63,7 +69,24 @@ Eigen::VectorXd change_by_values(const Task& task, const Optimum& optimum, const
   problem.set_misfit(optimum.problem->misfit());
   Eigen::VectorXd searched = optimum.searched;
   problem.solve(searched, few_steps(task, steps));
-  return change_of_unknowns(task, optimum.theta, problem.theta());
+  OtherValues other{change_of_unknowns(task, optimum.theta, problem.theta())};
+  for (int g = 0; g < task.frames(); ++g) {
+    const Eigen::ArrayXd residual = problem.noise_whitened_residual(g).array() * problem.pixels(g).sigma.array();
+    const auto [low, high] = problem.intensity_range(g);
+    const double range = std::abs(task.gain_of(g, problem.theta())) * (high - low);
+    other.missed = std::max(other.missed, std::sqrt(residual.square().mean()) / std::max(range, 1e-300));
+  }
+  return other;
+}
+
+/// The same sensitivity under a lamp that differs as daylight of 6500 K does from a filament: redder by so much for
+/// every um.
+std::shared_ptr<const SpectralTable> tilted(const SpectralTable& table) {
+  constexpr double kPerUm = 9;
+  auto other = std::make_shared<SpectralTable>(table);
+  for (std::size_t i = 0; i < other->value.size(); ++i)
+    other->value[i] *= std::exp(kPerUm * (other->wavelength_um[i] - other->wavelength_um.front()));
+  return other;
 }
 
 }  // namespace
@@ -107,7 +130,7 @@ void measure_propagation(const Task& task, const Optimum& optimum, LeftOut& left
     }
     constexpr int kNextToLinear = 2;
     left_out.propagation.conservativeResize(Eigen::NoChange, left_out.propagation.cols() + 1);
-    left_out.propagation.rightCols(1) = change_by_values(task, optimum, values, kNextToLinear);
+    left_out.propagation.rightCols(1) = change_by_values(task, optimum, values, kNextToLinear).change;
   }
 }
 
@@ -193,7 +216,7 @@ void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::Vecto
         lit(micrograph, optimum.theta,
             render(scene, plan(scene, by_waves, optimum.theta), optimum.theta, {}, job.options.threads).intensity));
   }
-  const Eigen::VectorXd change = change_by_values(task, optimum, values, 12);
+  const Eigen::VectorXd change = change_by_values(task, optimum, values, 12).change;
   const Shift shift = largest_shift(task, change, sd);
   left_out.change_by_waves = shift.standard_errors;
   if (left_out.change_by_waves < kShiftThatMatters) return;
@@ -205,6 +228,32 @@ void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::Vecto
                   job.parameters[shift.index].name, shift.change,
                   100 * shift.change / optimum.theta[static_cast<std::size_t>(shift.index)], left_out.change_by_waves));
   left_out.by_waves = change;
+}
+
+void foretell_light(const Task& task, const Optimum& optimum, LeftOut& left_out) {
+  const auto in_white_light = [](const Sight& sight) {
+    const auto& light = sight.picture->scene.microscope.channel_light;
+    return light && light->sensitivity;
+  };
+  if (optimum.stopped || task.unknowns.searched.empty() || !optimum.misfit.beyond_noise || by_waves(optimum.frames) ||
+      !std::all_of(task.sights.begin(), task.sights.end(), in_white_light))
+    return;
+  std::vector<Image> values;
+  double missed = 0;
+  for (int g = 0; g < task.frames(); ++g) {
+    Scene scene = task.picture(g).scene;
+    ChannelLight& light = *scene.microscope.channel_light;
+    light.sensitivity = tilted(*light.sensitivity);
+    const RenderPlan chosen = plan(scene, task.job.demand, optimum.theta);
+    values.push_back(lit(task.picture(g), optimum.theta,
+                         render(scene, chosen, optimum.theta, {}, task.job.options.threads).intensity));
+    missed = std::max(missed, missed_of_contrast(task, optimum, g));
+  }
+  const OtherValues other = change_by_values(task, optimum, values, 12);
+  // As in "Nearly the model": by what is left over, times 1.5.
+  constexpr double kFactor = 1.5;
+  if (other.missed > 0 && other.change.allFinite())
+    left_out.by_light = kFactor * std::min(1.0, missed / other.missed) * other.change;
 }
 
 }  // namespace birefit::estimation

@@ -86,6 +86,7 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
     words += ", and what is stated and not known exactly";
   if (covariances.lamp_drift) words += ", and a lamp that drifts";
   if (left_out.by_waves) words += ", and what rays lose of a wave-optical image";
+  if (left_out.by_light) words += ", and what another lamp or camera would change";
   return words;
 }
 
@@ -222,8 +223,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.interval_degrees_of_freedom = interval_freedom(task, optimum, covariances, result);
 
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
-  for (const auto& change : {left_out.by_curved_rays, left_out.by_waves})
-    if (change) covariance += *change * change->transpose();
+  for (const Eigen::VectorXd& change : left_out.changes()) covariance += change * change.transpose();
   result.log_share = log_share(projected_information(*optimum.problem), task.job, task.unknowns);
   result.covariance = covariance;
   result.stated_covariance = stated_covariance(task, covariances);
@@ -240,7 +240,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
   if (!signal) result.identifiable = false;
   std::string misfit;
-  if (covariances.discrepancy() && result.described && task.frames() == 1 && traits_of(task.picture(0).scene).round)
+  const bool nearly = (covariances.discrepancy() && task.frames() == 1) || left_out.by_light;
+  if (nearly && result.described && traits_of(task.picture(0).scene).round)
     misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
   report_stated(task, optimum, covariances, result);
   keep_inputs_of_note(task, result);
