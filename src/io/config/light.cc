@@ -75,8 +75,8 @@ void read_lamp(ConfigReader& reader, const Block& light, Lamp& lamp) {
     const std::string word = reader.choice(light, "lamp", {"A", "D65", "E"}).value_or("E");
     if (word == "D65") lamp.table = std::make_shared<SpectralTable>(illuminant_d65());
     if (word == "A")  // what incandescent lamps are like, not what one of them is
-      lamp.planck_k = reader.constant(light.path_of("lamp.planck_k"), described<Lamp>("planck_k"),
-                                      illuminant_a().temperature_k);
+      lamp.planck_k =
+          reader.constant(light.path_of("lamp.planck_k"), described<Lamp>("planck_k"), illuminant_a().temperature_k);
     return;
   }
   const Block block = reader.block(light, "lamp", {"planck_k", "file"}, true);
@@ -123,6 +123,13 @@ void read_filters(ConfigReader& reader, const Block& light, std::vector<LightFil
     }
     filters.push_back(std::move(filter));
   }
+}
+
+/// r, g or b, by its name or its number; else what is given.
+std::string colour_of(const std::string& channel) {
+  for (std::size_t c = 0; c < kColours.size(); ++c)
+    if (channel == std::to_string(c)) return kColours[c];
+  return channel;
 }
 
 CameraTables camera_by_name(const std::string& name) {
@@ -206,12 +213,9 @@ void choose_channel(ConfigReader& reader, const std::string& channel, const Wher
   Microscope& microscope = scene.microscope;
   if (!microscope.channel_light || !reader.problems.empty()) return;
   if (!reader.camera.empty()) {
-    const auto number = std::find_if(kColours.begin(), kColours.end(), [&](const char* colour) {
-      return channel == colour || channel == std::to_string(colour == kColours[0] ? 0 : colour == kColours[1] ? 1 : 2);
-    });
-    const std::string name = number != kColours.end() ? *number : "";
-    const auto found = reader.camera.find(reader.camera.contains("") ? "" : name);
-    if (found == reader.camera.end() || (channel == "mean" && !reader.camera.contains(""))) {
+    const bool grey = reader.camera.contains("");
+    const auto found = reader.camera.find(grey ? "" : colour_of(channel));
+    if (found == reader.camera.end()) {
       reader.problems.add(where,
                           channel == "mean" ? "the mean of a camera's colours has no sensitivity of its own"
                                             : "it is not said which colour of microscope.camera the picture is",

@@ -178,6 +178,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
                             "the axis of this cell turns about the light: its retardance is not one number",
                             "quantity: intensity");
     }
+    choose_channel(reader, "", settings.where, shared.scene);
     set_view(reader, 1, 1, 0, "the signal", shared.scene);
     if (reader.problems.empty()) resolve_automatic(reader, shared.scene, nullptr, nullptr, "the signal");
     for (std::size_t i = 0; i < signals.size(); ++i) {
