@@ -3,7 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
 
+#include "instrument/channel_light.h"
+#include "instrument/coherence.h"
 #include "instrument/exposure.h"
 
 namespace birefit {
@@ -91,6 +96,17 @@ class DiscImage final : public SampleImage<S> {
     sin_cos(2.0 * load, sin_twice, cos_twice);
     form_ = light.form().in_frame(cos_twice, sin_twice);
     linear_ = light.linear();
+    if (const WavelengthRule* rule = maker.rule()) {
+      std::vector<double> per_um;
+      for (const double nm : rule->wavelength_nm) per_um.push_back(1000 / nm);
+      std::vector<std::vector<double>> rows{rule->weight};
+      rows.insert(rows.end(), rule->slope.begin(), rule->slope.end());
+      coherence_.emplace(std::move(rows), std::move(per_um), kReachUm);
+      um_per_rad_ = value(scene.microscope.wavelength_nm) * (1e-3 / (2 * std::numbers::pi));
+      for (std::size_t n = 0; n < rule->index.size(); ++n)
+        for (std::size_t j = 0; j < value.active().size(); ++j)
+          if (value.active()[j] == rule->index[n]) moved_.push_back({n + 1, j});
+    }
   }
   void light(const PlainOf<S>& column, const PlainOf<S>& row, S* out) const override {
     S x, y;
@@ -106,7 +122,14 @@ class DiscImage final : public SampleImage<S> {
     const CosSinc<S> f = cos_sinc_sq(S(0.25 * d_sq));
     const S half = 0.5 * f.sinc_sq;
     S cos_cos = f.cos_sq * f.cos_sq, sinc_sinc = half * half, cos_sinc = f.cos_sq * half;
-    if (coloured_) {
+    if (coherence_) {
+      // cos d and sin d are the degree of coherence; away from 0, where they are divided by d.
+      const S d = root(S(d_sq + 1e-12)), over = inverse(d);
+      const MeanPhase<S> mean = mean_phase(min_of(S(d * um_per_rad_), S(kReachUm)));
+      sinc_sinc = 0.5 * mean.loss * over * over;
+      cos_sinc = 0.5 * mean.im * over;
+      cos_cos = 1.0 - 0.5 * mean.loss;
+    } else if (coloured_) {
       const S u = (0.5 * spread_ * spread_) * d_sq, contrast = exp(S(-u));
       sinc_sinc = contrast * sinc_sinc + (0.25 * spread_ * spread_) * lost_share(u, contrast);
       cos_sinc = contrast * cos_sinc;
@@ -124,13 +147,38 @@ class DiscImage final : public SampleImage<S> {
   }
 
  private:
+  /// Of a path difference, with the derivatives by the light's numbers.
+  MeanPhase<S> mean_phase(const S& um) const {
+    MeanPhase<S> mean = coherence_->at(0, um);
+    if constexpr (ScalarTraits<S>::derivatives > 0)
+      for (const auto& [row, j] : moved_) {
+        const MeanPhase<PlainOf<S>> slope = coherence_->at(row, plain(um));
+        mean.loss.d[j] = mean.loss.d[j] + slope.loss, mean.im.d[j] = mean.im.d[j] + slope.im;
+      }
+    return mean;
+  }
+  /// Longer ways, next to the forces, are taken as this long: no colour has fringes there.
+  static constexpr double kReachUm = 40;
+
   DiscOptics<S> optics_;
   bool coloured_, linear_;
   S spread_;              ///< standard deviation of the wavelength over the wavelength
   RetarderForm<S> form_;  ///< in the load's frame
+  /// Of light of many wavelengths: rows of its weights and of their derivatives by its numbers.
+  std::optional<Coherence> coherence_;
+  S um_per_rad_;
+  struct Moved {
+    std::size_t row, derivative;
+  };
+  std::vector<Moved> moved_;
 };
 
 }  // namespace
+
+bool disc_sums_wavelengths(const Scene& scene, const RenderPlan&, const Theta&) {
+  const Microscope& m = scene.microscope;
+  return m.channel_light && m.before.empty() && m.behind.empty();
+}
 
 template <class S>
 std::unique_ptr<SampleImage<S>> make_disc_image(const Scene& scene, const RenderPlan&, const Values<S>& value,

@@ -60,6 +60,9 @@ class DiscZone final : public Zone {
   double radius_px_, center_x_px_, center_y_px_, load_cos_, load_sin_;
 };
 
+/// A disc is a retarder whose phase goes with 1/wavelength: what a colour makes of it is one function of its path
+/// difference, unless plates beside it have phases of their own.
+bool disc_sums_wavelengths(const Scene&, const RenderPlan&, const Theta&);
 template <class S>
 std::unique_ptr<SampleImage<S>> make_disc_image(const Scene&, const RenderPlan&, const Values<S>&, const BeamMaker&);
 /// What the list of kinds (samples/kinds.def) holds of it.

@@ -102,6 +102,7 @@ const SampleKind kDisc{.name = "disc",
                        .is = is_sample<StressedDisc>,
                        .plan = plan_disc,
                        .phases_rad = disc_phases,
+                       .sums_wavelengths = disc_sums_wavelengths,
                        .sums_line = true,
                        .traits = disc_traits,
                        .zone = disc_zone};
