@@ -41,9 +41,9 @@ int run(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done; 1 the fit has no answer; 2 the input is wrong; 3 an internal error.\n"
       "birefit COMMAND --help tells more; `birefit new droplet > droplet.yaml` makes a config to start from.");
-  const std::vector<Command> commands = {add_fit_command(app),    add_series_command(app),  add_render_command(app),
-                                         add_jones_command(app),  add_explain_command(app), add_chart_command(app),
-                                         add_stress_command(app), add_audit_command(app),   add_new_command(app),
+  const std::vector<Command> commands = {add_fit_command(app),    add_series_command(app),     add_render_command(app),
+                                         add_jones_command(app),  add_explain_command(app),    add_chart_command(app),
+                                         add_stress_command(app), add_audit_command(app),      add_new_command(app),
                                          add_schema_command(app), add_michel_levy_command(app)};
   try {
     app.parse(argc, argv);
