@@ -62,6 +62,27 @@ assert abs(colours[0, 0] - row[1:4]).max() < 3e-4, (colours[0, 0], row)
 P
 fi
 
+if /usr/bin/python3 -c 'import numpy, PIL' 2> /dev/null; then
+  # The chart is of the polarizers and plates that there are: a full-wave plate askew, an analyser that is not crossed.
+  sed 's/analyzer_deg: 90/analyzer_deg: 75\n  behind: [{full_wave: {azimuth_deg: 20, made_for_nm: 530}}]/' cell.yaml > plate.yaml
+  "$birefit" render plate.yaml --out plate.npy --quiet && "$birefit" michel-levy plate.yaml --out plate --quiet || fail 'plate'
+  # What the sensor saw, a colour a pixel, is fitted as it is.
+  /usr/bin/python3 - "$source" <<'P' || fail 'the chart is not of the plate'
+import sys, numpy, PIL.Image
+table = numpy.genfromtxt("plate/michel_levy.csv", delimiter=",", skip_header=1)
+assert abs(numpy.load("plate.npy")[0, 0] - table[table[:, 0] == 1000][0][1:4]).max() < 3e-4
+code = numpy.array(PIL.Image.open(sys.argv[1] + "/data/colour_droplet/photograph.png")) / 255
+light = numpy.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+raw = numpy.zeros(light.shape[:2])
+for y, x, colour in ((0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 2)):
+    raw[y::2, x::2] = light[y::2, x::2, colour]
+PIL.Image.fromarray(numpy.rint(60000 * raw).astype(numpy.uint16)).save("raw.png")
+P
+  sed 's|image: .*|image: raw.png\n  bayer: rggb|; s/transfer: srgb/transfer: linear/' "$source/fit_configs/colour_droplet.yaml" > raw.yaml
+  "$birefit" fit raw.yaml --out raw > raw.txt 2> raw.err || fail "bayer: $(tail -3 raw.err)"
+  awk '$1 == "sample.material.birefringence" { found = 1; off = $3 - 0.165; inside = $5 > 0 && off * off < 9 * $5 * $5 } END { exit !(found && inside) }' raw.txt || fail "bayer: $(grep -m1 birefringence raw.txt)"
+fi
+
 # What does not go together is said, with its place.
 says() {  # WHAT SED ..
   sed "${@:2}" cell.yaml > wrong.yaml
