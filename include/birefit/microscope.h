@@ -48,6 +48,27 @@ struct Rotator {
 /// What light meets between a polarizer and the sample.
 using PolarizingPart = std::variant<Retarder, Rotator>;
 
+/// Koehler illumination: plane waves that do not interfere, of all directions whose transverse wavevector over k0 lies
+/// within a circle, or between two circles, with equal shares of the light.
+struct Condenser {
+  /// Radii of the circles. inner_na not given: 0, the full circle; below na.
+  ParameterRef na, inner_na;
+  /// Where the circles' middle lies, as a direction in air: from +z, and the azimuth of its plane from +x. Not given:
+  /// 0.
+  ParameterRef tilt_deg, tilt_azimuth_deg;
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("na", self.na, numbers::positive(1.6).in_percent().known_within_share(0.1), "of the condenser");
+    visit.number("inner_na", self.inner_na, numbers::within(0, 1.6).left_out(),
+                 "of a stop in its middle: directions between the two apertures");
+    visit.number("tilt_deg", self.tilt_deg, numbers::within(-80, 80, "deg").left_out(),
+                 "between the middle of its directions and the axis, in air");
+    visit.number("tilt_azimuth_deg", self.tilt_azimuth_deg, numbers::angle().left_out(),
+                 "of the plane in which it is tilted, from +x");
+  }
+};
+
 /// Light, polarizers and lenses, from the lamp to the camera; azimuths from +x, counter-clockwise in the image.
 struct Microscope {
   ParameterRef wavelength_nm;  ///< vacuum; with `channel_light` one of its wavelengths, which pictures do not depend on
@@ -60,7 +81,9 @@ struct Microscope {
   std::vector<PolarizingPart> before, behind;
   /// FWHM of a line that is Gaussian in wavelength; not given: not stated, a single wavelength. Without channel_light.
   ParameterRef bandwidth_nm;
-  ParameterRef condenser_na;  ///< not given: not stated; not modelled: enters the model error
+  /// Not given: light of one direction. Summed over for layers and by wave optics; of other samples and rays it enters
+  /// the model error.
+  std::optional<Condenser> condenser;
   /// Not given: not stated. Waves: the objective's band limit; droplet rays leaving steeper than this are lost.
   ParameterRef objective_na;
   /// focal plane, from the middle of the sample along the light; not given: 0. Ceiling::wave only
@@ -83,7 +106,7 @@ struct Microscope {
                  numbers::within(1, 1e12).physical().left_out(), "flux along over flux across");
     visit.number("objective_na", self.objective_na,
                  numbers::positive(1.6).in_percent().left_out().known_within_share(0.03), "of the objective");
-    visit.number("condenser_na", self.condenser_na, numbers::positive(1.6).in_percent().left_out(), "of the condenser");
+    visit.inside("condenser", self.condenser);
     visit.number("focus_um", self.focus_um, numbers::within(-1000, 1000, "um").left_out().known_within(0.3),
                  "plane in focus, from the mid plane along the light");
     visit.inside("before", self.before);

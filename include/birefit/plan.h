@@ -60,6 +60,8 @@ struct RenderPlan {
   std::shared_ptr<const WavelengthRule> wavelengths;
   /// propagated waves: a plan for each of them, whose grids fit it; else empty
   std::vector<RenderPlan> of_wavelengths;
+  /// > 0: the picture is a sum over directions of the condenser, this many rings of them; 0: of light along the axis
+  int condenser_rings = 0;
   std::shared_ptr<const SampleChoices> own;  ///< the kind's, which nobody else reads; none: its defaults
   /// set: the whole picture at once by wave optics, and nothing of the above but the words
   std::shared_ptr<const WavePlan> wave;

@@ -496,6 +496,10 @@ BIREFIT_INLINE S dot(const Vec3<S>& a, const Vec3<S>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class S>
+BIREFIT_INLINE Vec3<S> cross(const Vec3<S>& a, const Vec3<S>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+template <class S>
 BIREFIT_INLINE Vec3<S> normalized(const Vec3<S>& a) {
   return inverse_root(dot(a, a)) * a;
 }

@@ -13,6 +13,7 @@
 #include "instrument/channel_light.h"
 #include "instrument/exposure.h"
 #include "medium/validity.h"
+#include "render/direction_plan.h"
 #include "render/light_plan.h"
 #include "samples/choices.h"
 #include "samples/kind.h"
@@ -112,7 +113,6 @@ RenderPlan plan_line(const Scene& scene, const Demand& demand, const Theta& thet
   if (demand.ceiling == Ceiling::wave) {
     result = has_series(scene) && demand.method != "split_step" ? kind.waves->plan_series(scene, demand, value, light)
                                                                 : plan_wave(planning);
-    note_illumination(scene, value, largest_phase(scene, value), result);
   } else {
     result = kind.plan(planning);
   }
@@ -159,23 +159,29 @@ RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, con
   check_method(scene, asked);
   Demand demand = asked;
   if (!demand.memo) demand.memo = std::make_shared<Memo>();
+  const FewMeans means = [&](const RenderPlan& trial) {
+    return render_pixels(scene, trial, theta, few_pixels(scene.view), {}, 1).intensity;
+  };
+  const auto with_directions = [&](RenderPlan planned) {
+    const SampleKind& kind = kind_of(scene, observable);
+    const Values<double> value(theta, {}, demand.memo.get());
+    plan_directions(scene, value, kind.directions ? kind.directions(scene, planned) : ManyDirections::never,
+                    largest_phase(scene, value), means, planned);
+    return planned;
+  };
   const std::optional<LightBand> band = light_band(scene.microscope, theta);
-  if (!band) return plan_line(scene, demand, theta, observable);
+  if (!band) return with_directions(plan_line(scene, demand, theta, observable));
   // Where phases are largest, numbers are hardest to hold.
   const Theta planned = band->narrow ? theta : at_wavelength(scene.microscope, theta, band->low_um);
   check_validity(scene, temperatures(scene), at_wavelength(scene.microscope, theta, band->high_um));
   RenderPlan result = plan_line(scene, demand, planned, observable);
   plan_wavelengths(scene, theta, *band, kind_of(scene, observable).sums_line,
-                   {[&](const Theta& at) { return all_phases(scene, demand, at); },
-                    [&](const RenderPlan& trial) {
-                      return render_pixels(scene, trial, theta, few_pixels(scene.view), {}, 1).intensity;
-                    }},
-                   result);
+                   {[&](const Theta& at) { return all_phases(scene, demand, at); }, means}, result);
   if (result.wave && result.wavelengths)
     for (const double nm : result.wavelengths->wavelength_nm)
       result.of_wavelengths.push_back(
           plan_line(scene, demand, at_wavelength(scene.microscope, theta, 1e-3 * nm), observable));
-  return result;
+  return with_directions(std::move(result));
 }
 
 bool outgrown(const RenderPlan& now, const RenderPlan& before) {
@@ -194,6 +200,7 @@ bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
   // A few wavelengths more or less are those of another value, not of another picture.
   const auto wavelengths = [](const RenderPlan& plan) { return plan.wavelengths ? plan.wavelengths->size() : 1; };
   if (10 * wavelengths(now) > 12 * wavelengths(before) + 20) return true;
+  if (now.condenser_rings > before.condenser_rings + 1) return true;
   if (now.method != before.method || (choices(now).disc.empty() && now.steps > before.steps) ||
       now.mesh.size() > before.mesh.size() || has_finer_tables(choices(now), choices(before)) ||
       (had.fringes && !means.fringes) || outgrown(now, before))

@@ -481,28 +481,41 @@ void render_direction(const Scene& scene, const RenderPlan& plan, const BeamMake
     });
 }
 
-/// The sample's picture is a sum over wavelengths of itself.
-bool sample_sums(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
-  const auto sums = kind_of(scene, plan.observable).sums_wavelengths;
-  return plan.wavelengths && sums && sums(scene, plan, theta);
+/// What the sample's own picture sums.
+SumsOfSample sample_sums(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
+  const SampleKind& kind = kind_of(scene, plan.observable);
+  return {plan.wavelengths && kind.sums_wavelengths && kind.sums_wavelengths(scene, plan, theta),
+          plan.condenser_rings > 0 && kind.directions(scene, plan) == ManyDirections::by_sample};
+}
+
+/// The picture in this light, or, null, in the microscope's own.
+void render_in(const Scene& scene, const RenderPlan& plan, const Exposure* exposure, const Theta& theta,
+               const std::vector<int>& active, int threads, Rendering& into) {
+  sum_over_light(scene.microscope, plan, exposure, sample_sums(scene, plan, theta), theta, active, into,
+                 [&](const RenderPlan& own, const Theta& at, const BeamMaker& light, const std::vector<int>& by,
+                     Rendering& one) { render_direction(scene, own, light, at, by, threads, one); });
+}
+/// The same at chosen pixels.
+PixelRendering render_pixels_in(const Scene& scene, const RenderPlan& plan, const Exposure* exposure,
+                                const Theta& theta, const std::vector<std::array<int, 2>>& pixels,
+                                const std::vector<int>& active, int threads) {
+  PixelRendering out;
+  sum_over_light(scene.microscope, plan, exposure, sample_sums(scene, plan, theta), theta, active, out,
+                 [&](const RenderPlan& own, const Theta& at, const BeamMaker& light, const std::vector<int>& by,
+                     PixelRendering& one) { render_direction(scene, own, light, at, pixels, by, threads, one); });
+  return out;
 }
 
 }  // namespace
 
 void render(const Scene& scene, const RenderPlan& plan, const Exposure& exposure, const Theta& theta,
             const std::vector<int>& active, int threads, Rendering& into) {
-  const auto of_line = [&](const RenderPlan& own, const Theta& at, const std::vector<int>& of_scene,
-                           const WavelengthRule* rule, Rendering& line) {
-    sum_over_directions(exposure, line, [&](const BeamMaker& light, Rendering& one) {
-      render_direction(scene, own, light.with(rule), at, of_scene, threads, one);
-    });
-  };
-  sum_over_wavelengths(scene.microscope, plan, theta, active, sample_sums(scene, plan, theta), into, of_line);
+  render_in(scene, plan, &exposure, theta, active, threads, into);
 }
 
 void render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active, int threads,
             Rendering& into) {
-  render(scene, plan, exposure_of(scene.microscope), theta, active, threads, into);
+  render_in(scene, plan, nullptr, theta, active, threads, into);
 }
 
 Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta, const std::vector<int>& active,
@@ -515,33 +528,23 @@ Rendering render(const Scene& scene, const RenderPlan& plan, const Theta& theta,
 PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Exposure& exposure, const Theta& theta,
                              const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
                              int threads) {
-  PixelRendering out;
-  const auto of_line = [&](const RenderPlan& own, const Theta& at, const std::vector<int>& of_scene,
-                           const WavelengthRule* rule, PixelRendering& line) {
-    sum_over_directions(exposure, line, [&](const BeamMaker& light, PixelRendering& one) {
-      render_direction(scene, own, light.with(rule), at, pixels, of_scene, threads, one);
-    });
-  };
-  sum_over_wavelengths(scene.microscope, plan, theta, active, sample_sums(scene, plan, theta), out, of_line);
-  return out;
+  return render_pixels_in(scene, plan, &exposure, theta, pixels, active, threads);
 }
 
 PixelRendering render_pixels(const Scene& scene, const RenderPlan& plan, const Theta& theta,
                              const std::vector<std::array<int, 2>>& pixels, const std::vector<int>& active,
                              int threads) {
-  return render_pixels(scene, plan, exposure_of(scene.microscope), theta, pixels, active, threads);
+  return render_pixels_in(scene, plan, nullptr, theta, pixels, active, threads);
 }
 
 Image render_scalar(const Scene& scene, const RenderPlan& plan, const Theta& theta) {
   if (plan.wave) throw std::logic_error("wave optics has no rays to take one at a time");
   Rendering r;
-  const auto of_line = [&](const RenderPlan& own, const Theta& at, const std::vector<int>&, const WavelengthRule*,
-                           Rendering& line) {
-    sum_over_directions(exposure_of(scene.microscope), line, [&](const BeamMaker& light, Rendering& one) {
-      render_planes<double>(scene, own, light, at, {}, 1, {&one.intensity});
-    });
-  };
-  sum_over_wavelengths(scene.microscope, plan, theta, {}, false, r, of_line);
+  SumsOfSample by_sample = sample_sums(scene, plan, theta);
+  by_sample.wavelengths = false;
+  sum_over_light(scene.microscope, plan, nullptr, by_sample, theta, {}, r,
+                 [&](const RenderPlan& own, const Theta& at, const BeamMaker& light, const std::vector<int>&,
+                     Rendering& one) { render_planes<double>(scene, own, light, at, {}, 1, {&one.intensity}); });
   return std::move(r.intensity);
 }
 

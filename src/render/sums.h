@@ -70,6 +70,36 @@ inline void add_slope(PixelRendering& sum, std::size_t j, double share, const Pi
   sum.derivatives.col(static_cast<Eigen::Index>(j)) += share * part.intensity;
 }
 
+/// of_one(light, active, result) for the condenser's directions, and their sum with its derivatives by the condenser.
+/// `held` as of condenser_slope().
+template <class Result, class OfOne>
+void sum_over_condenser(const Microscope& microscope, const Theta& theta, int rings, const std::vector<int>& active,
+                        bool held, Result& into, const OfOne& of_one) {
+  const Exposure exposure = condenser_exposure(microscope, Values<double>(theta, {}, nullptr), rings);
+  std::vector<int> of_scene;
+  std::vector<std::size_t> place;  // of which `active` they are
+  for (std::size_t j = 0; j < active.size(); ++j)
+    if (!moves_condenser(microscope, active[j], false)) {
+      of_scene.push_back(active[j]);
+      place.push_back(j);
+    }
+  Result mean;
+  sum_over_directions(exposure, mean, [&](const BeamMaker& light, Result& one) { of_one(light, of_scene, one); });
+  start_sum(mean, active.size(), into);
+  add_intensity(into, 1, mean);
+  for (std::size_t i = 0; i < place.size(); ++i) add_derivative(into, place[i], 1, mean, i);
+  for (std::size_t j = 0; j < active.size(); ++j) {
+    if (!moves_condenser(microscope, active[j], held)) continue;
+    const CondenserSlope slope = condenser_slope(microscope, theta, rings, active[j], held);
+    add_slope(into, j, slope.of_mean, mean);
+    Result part;
+    for (std::size_t k = 0; k < slope.on_circles.directions.size(); ++k) {
+      of_one(slope.on_circles.directions[k], {}, part);
+      add_slope(into, j, slope.on_circles.weights[k], part);
+    }
+  }
+}
+
 /// of_one(plan, theta, active, rule, result) for every wavelength of the plan, and their sum by weight; of a line once,
 /// bit for bit. The light's own numbers move the weights and no picture. `by_sample`: once, with the rule that the
 /// sample sums by; else `rule` is null.
@@ -100,6 +130,33 @@ void sum_over_wavelengths(const Microscope& microscope, const RenderPlan& plan, 
       for (std::size_t j = 0; j < active.size(); ++j)
         if (active[j] == rule->index[n]) add_slope(into, j, rule->slope[n][k], part);
   }
+}
+
+/// Which of the two sums a sample's picture is in itself.
+struct SumsOfSample {
+  bool wavelengths, directions;
+};
+
+/// of_one(plan, theta, light, active, result) for every wavelength and direction, and their sum with its derivatives.
+/// exposure: the directions; null: the microscope's own, as planned.
+template <class Result, class OfOne>
+void sum_over_light(const Microscope& microscope, const RenderPlan& plan, const Exposure* exposure,
+                    const SumsOfSample& by_sample, const Theta& theta, const std::vector<int>& active, Result& into,
+                    const OfOne& of_one) {
+  const bool condenser = !exposure && plan.condenser_rings > 0 && !by_sample.directions;
+  const auto of_line = [&](const RenderPlan& own, const Theta& at, const std::vector<int>& of_scene,
+                           const WavelengthRule* rule, Result& line) {
+    const auto of_direction = [&](const BeamMaker& light, const std::vector<int>& by, Result& one) {
+      of_one(own, at, light.with(rule), by, one);
+    };
+    if (condenser)
+      sum_over_condenser(microscope, at, plan.condenser_rings, of_scene, static_cast<bool>(plan.wave), line,
+                         of_direction);
+    else
+      sum_over_directions(exposure ? *exposure : exposure_of(microscope), line,
+                          [&](const BeamMaker& light, Result& one) { of_direction(light, of_scene, one); });
+  };
+  sum_over_wavelengths(microscope, plan, theta, active, by_sample.wavelengths, into, of_line);
 }
 
 }  // namespace birefit

@@ -31,6 +31,13 @@ struct Traits {
   bool isoclinics = false;
 };
 
+/// How the light of a condenser makes a picture.
+enum class ManyDirections {
+  never,     ///< it is not modelled: SampleKind's planner says what that may change
+  summed,    ///< as a sum of pictures, one a direction
+  by_sample  ///< the picture of the axis' direction is that of all of them
+};
+
 struct SampleKind {
   const char* name;
   bool (*is)(const Scene&, const Observable&);
@@ -49,6 +56,8 @@ struct SampleKind {
   /// Whether the picture by this plan is a sum over wavelengths of itself, where that costs less than so many pictures:
   /// made by a BeamMaker with a rule; null: never.
   bool (*sums_wavelengths)(const Scene&, const RenderPlan&, const Theta&) = nullptr;
+  /// Of a picture by this plan; null: never.
+  ManyDirections (*directions)(const Scene&, const RenderPlan&) = nullptr;
   bool sums_line = false;    ///< knows Microscope::bandwidth_nm in closed form
   bool passes_axis = false;  ///< rays run along the optic axis somewhere: no transport in the modes' slow solutions
   /// Whether either mode can run on a ray of its own (Rays::eikonal); null: never.

@@ -29,19 +29,6 @@ void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double
   for (int i = 0; i < bins; ++i) plan.means.samples.push_back(points(i + 0.5));
 }
 
-void note_illumination(const Scene& scene, const Values<double>& value, double largest_phase, RenderPlan& plan) {
-  const double condenser_na = value.get(scene.microscope.condenser_na, 0.0);
-  if (condenser_na > 0) {
-    const double s = largest_phase * condenser_na * condenser_na / 8;  // mean phase shift over the cone, n ~ 1.5
-    const double loss = std::min(0.5, 0.5 * std::abs(s));
-    plan.model_error = std::hypot(plan.model_error, loss);
-    if (loss > 1e-3)
-      plan.warnings.push_back(
-          fmt::format("The condenser's aperture (NA {:g}) is not modelled; it shifts the phase by about {:.2g} rad.",
-                      condenser_na, s));
-  }
-}
-
 double reflectance(double n1, double n2) { return square((n1 - n2) / (n1 + n2)); }
 
 }  // namespace birefit

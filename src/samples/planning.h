@@ -50,8 +50,6 @@ void check_closed_form(const Demand& demand, const std::string& what);
 /// points(r): a pixel side, of pixels whose middles are about r pixels from the centre.
 void sample_by_radius(RenderPlan& plan, double center_x, double center_y, double bins,
                       const std::function<int(double)>& points);
-/// What the condenser changes that no method here models, where the largest retardance is so many rad.
-void note_illumination(const Scene& scene, const Values<double>& value, double largest_phase, RenderPlan& plan);
 double reflectance(double n1, double n2);  ///< at normal incidence
 
 }  // namespace birefit

@@ -9,10 +9,10 @@
 
 #include "birefit/error.h"
 #include "birefit/render.h"
+#include "core/quadrature.h"
 #include "samples/choices.h"
 #include "samples/waves/wave.h"
 #include "study/ball_scene.h"
-#include "transport/quadrature.h"
 #include "wave/radial_series.h"
 
 namespace birefit::study {

@@ -7,9 +7,9 @@
 
 #include <Eigen/Dense>
 
+#include "core/quadrature.h"
 #include "core/threads.h"
 #include "transport/method.h"
-#include "transport/quadrature.h"
 
 namespace birefit {
 namespace {
@@ -300,7 +300,9 @@ void form_image(const WaveGrid& g, const WaveImaging& plan, const WaveLight<S>& 
   const bool tilted = light.kx_per_um != 0 || light.ky_per_um != 0;
   const double k0 = part(light.k0_per_um, 0);
   const bool collected = std::hypot(light.kx_per_um, light.ky_per_um) <= part(m.objective_na, 0) * k0;
-  const Complex<S> direct = conj(m.ax) * light.ex + conj(m.ay) * light.ey;
+  Complex<S> lit_x = light.ex, lit_y = light.ey;
+  if (m.aplanatic) field_to_flux(light, lit_x, lit_y);
+  const Complex<S> direct = conj(m.ax) * lit_x + conj(m.ay) * lit_y;
   const auto direct_part = [&](int f) { return Z(part(direct.re, f), part(direct.im, f)); };
   // Intensity less that of the incident light, which is what remains outside.
   std::vector<Eigen::MatrixXd> intensity(

@@ -7,24 +7,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "transport/quadrature.h"
+#include "core/quadrature.h"
+#include "wave/slopes.h"
 
 namespace birefit {
 namespace {
 
-/// x - plain(x): no value, only derivatives. f(x) is then f + f' change(x) with f and f' plain numbers, much less work
-/// than a chain of duals where f is long; nothing at all for double.
-template <class S>
-S change(const S& x) {
-  if constexpr (ScalarTraits<S>::derivatives == 0)
-    return 0.0;
-  else
-    return x - plain(x);
-}
-template <class S>
-Complex<double> value_of(const Complex<S>& a) {
-  return {plain(a.re), plain(a.im)};
-}
 /// sum += f a + slope plain(a) dx, the product f(x) a with dx = change(x).
 template <class S>
 void add(Complex<S>& sum, double f, double slope, const S& dx, const Complex<S>& a) {
@@ -52,10 +40,6 @@ Complex<S> coefficient(const S& u, const S& v, const S& psi, const S& psi_v, con
   const S n = u * psi_v - v * psi, m = u * eta_v - v * eta;
   const S over = n * inverse(n * n + m * m);
   return {n * over, -(m * over)};
-}
-
-Vec3<double> cross(const Vec3<double>& a, const Vec3<double>& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
 }  // namespace

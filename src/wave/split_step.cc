@@ -65,6 +65,23 @@ struct Crew {
   }
 };
 
+/// p and s component of a transverse field by these factors.
+template <class S>
+void scale_p_and_s(const WaveLight<S>& light, const S& p_factor, const S& s_factor, Complex<S>& x, Complex<S>& y) {
+  const double f = 1 / std::hypot(light.kx_per_um, light.ky_per_um);
+  const S px(f * light.kx_per_um), py(f * light.ky_per_um);
+  const Complex<S> p = p_factor * (px * x + py * y), s = s_factor * (px * y - py * x);
+  x = px * p - py * s;
+  y = py * p + px * s;
+}
+/// (q / n_host)^(1/2).
+template <class S>
+S root_of_cosine(const WaveLight<S>& light) {
+  const S kn = light.k0_per_um * light.n_host;
+  const double k2 = square(light.kx_per_um) + square(light.ky_per_um);
+  return root(S(root(S(kn * kn - k2)) * inverse(kn)));
+}
+
 template <class S>
 class Propagation {
  public:
@@ -114,8 +131,7 @@ class Propagation {
     const S kh = light.k0_per_um * light.n_host;
     tilt2_ = square(light.kx_per_um) + square(light.ky_per_um);
     host_q_ = root(kh * kh - tilt2_) * inverse(light.k0_per_um);
-    // a = Y^(1/2) e, in units of n_host^(1/2): q / n_host for s, its inverse for p.
-    to_flux(incident_, true);
+    field_to_flux(light, incident_[0], incident_[1]);
     host_ = OpticalPoint<S>{
         {S(0.0), S(0.0), S(1.0)}, light.n_host * light.n_host, light.n_host * light.n_host, S(0.0), S(0.0), S(0.0)};
     host_slab_ = slab_point(g_.layers, h_, light.k0_per_um, g_.n_ref, [&](int) { return host_; });
@@ -191,17 +207,6 @@ class Propagation {
     } else {
       return x;
     }
-  }
-  /// The tilted wave's s and p in flux units, or back.
-  void to_flux(Complex<S>* e, bool there) const {
-    if (tilt2_ == 0) return;
-    const double f = 1 / std::sqrt(tilt2_);
-    const S px(f * light_.kx_per_um), py(f * light_.ky_per_um);
-    const S ratio = host_q_ * inverse(light_.n_host), s_up = root(ratio), p_up = inverse(s_up);
-    const Complex<S> p = px * e[0] + py * e[1], s = px * e[1] - py * e[0];
-    const Complex<S> p2 = (there ? p_up : s_up) * p, s2 = (there ? s_up : p_up) * s;
-    e[0] = px * p2 - py * s2;
-    e[1] = py * p2 + px * s2;
   }
   /// Attenuation of the scattered field in one slab.
   std::vector<double> frame(int n) const {
@@ -549,18 +554,34 @@ class Propagation {
 }  // namespace
 
 template <class S>
+void field_to_flux(const WaveLight<S>& light, Complex<S>& x, Complex<S>& y) {
+  if (light.kx_per_um == 0 && light.ky_per_um == 0) return;
+  const S root = root_of_cosine(light);
+  scale_p_and_s(light, inverse(root), root, x, y);
+}
+template <class S>
+void flux_to_field(WaveLight<S>& light) {
+  if (light.kx_per_um == 0 && light.ky_per_um == 0) return;
+  const S root = root_of_cosine(light);
+  Complex<S> x = light.ex, y = light.ey;
+  scale_p_and_s(light, root, inverse(root), x, y);
+  light.ex = x, light.ey = y;
+}
+
+template <class S>
 std::vector<WaveField> propagate(const WaveGrid& grid, const WaveLight<S>& light, const WaveMedium<S>& medium,
                                  int threads) {
   // A phase of work is a few hundred microseconds: more threads than a dozen would wait for each other.
   return Propagation<S>(grid, light, medium).run(std::min(thread_count(threads), 12));
 }
 
-template std::vector<WaveField> propagate<Pack>(const WaveGrid&, const WaveLight<Pack>&, const WaveMedium<Pack>&, int);
-template std::vector<WaveField> propagate<Dual1>(const WaveGrid&, const WaveLight<Dual1>&, const WaveMedium<Dual1>&,
-                                                 int);
-template std::vector<WaveField> propagate<Dual2>(const WaveGrid&, const WaveLight<Dual2>&, const WaveMedium<Dual2>&,
-                                                 int);
-template std::vector<WaveField> propagate<Dual4>(const WaveGrid&, const WaveLight<Dual4>&, const WaveMedium<Dual4>&,
-                                                 int);
+#define BIREFIT_INSTANTIATE(S)                                                                                   \
+  template std::vector<WaveField> propagate<S>(const WaveGrid&, const WaveLight<S>&, const WaveMedium<S>&, int); \
+  template void field_to_flux<S>(const WaveLight<S>&, Complex<S>&, Complex<S>&);                                 \
+  template void flux_to_field<S>(WaveLight<S>&);
+BIREFIT_INSTANTIATE(Pack)
+BIREFIT_INSTANTIATE(Dual1)
+BIREFIT_INSTANTIATE(Dual2)
+BIREFIT_INSTANTIATE(Dual4)
 
 }  // namespace birefit

@@ -45,6 +45,14 @@ struct WaveLight {
   double kx_per_um = 0, ky_per_um = 0;  ///< transverse wavevector
 };
 
+/// The tilted wave's s and p component in flux units, a_s = (q / n_host)^(1/2) e_s and a_p = (n_host / q)^(1/2) e_p,
+/// and back; along z they are the same.
+template <class S>
+void field_to_flux(const WaveLight<S>&, Complex<S>& x, Complex<S>& y);
+/// Its own field, given in flux units, in field units.
+template <class S>
+void flux_to_field(WaveLight<S>&);
+
 /// The scattered flux-normalised field (x, y) in the plane grid.exit_um: a = Y^(1/2) e less the incident wave's, in
 /// units of the incident wave's phase there (with exp(i (kx x + ky y)), where it is tilted) and of n_host^(1/2), so
 /// that a = e for light along z. In the host a_s = (q / n_host)^(1/2) e_s, a_p = (n_host / q)^(1/2) e_p, n_host^2 = q^2

@@ -17,8 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/quadrature.h"
 #include "reference_table.h"
-#include "transport/quadrature.h"
 
 namespace birefit {
 namespace {

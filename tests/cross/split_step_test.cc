@@ -17,10 +17,10 @@
 #include <random>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "core/quadrature.h"
 #include "independent_ball.h"
 #include "independent_imaging.h"
 #include "reference_table.h"
-#include "transport/quadrature.h"
 #include "wave/imaging.h"
 #include "wave/march.h"
 #include "wave/radial_series.h"

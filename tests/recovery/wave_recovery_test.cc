@@ -13,9 +13,9 @@
 #include "birefit/fit.h"
 #include "birefit/render.h"
 #include "birefit/volume.h"
+#include "core/quadrature.h"
 #include "medium/families/ball.h"
 #include "scene_builder.h"
-#include "transport/quadrature.h"
 #include "wave/radial_series.h"
 
 namespace birefit {

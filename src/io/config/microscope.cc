@@ -114,6 +114,19 @@ void read_short_forms(ConfigReader& reader, const Block& block, Microscope& micr
   }
 }
 
+/// The block, or its short form.
+void read_condenser(ConfigReader& reader, const Block& microscope, Microscope& to) {
+  const YamlNode *block = microscope.find("condenser"), *na = microscope.find("condenser_na");
+  if (block && na)
+    reader.problems.add(na->where, "condenser_na is short for condenser: {na: ..}, which is given, too",
+                        "give one of the two");
+  else if (block)
+    read_numbers(reader, reader.block(microscope, "condenser", described_keys<Condenser>(), true),
+                 to.condenser.emplace());
+  else if (na)
+    to.condenser.emplace().na = reader.number(microscope, "condenser_na", described<Condenser>("na"));
+}
+
 /// The value under either of two spellings; both at once is a mistake. `none`: no such polarizer, an empty reference.
 ParameterRef polarizing_element(ConfigReader& reader, const Block& block, const std::string& canonical,
                                 const std::string& variant, bool required) {
@@ -136,8 +149,8 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   const Block block =
       reader.block(root, "microscope",
                    {"light", "polarizer_deg", "analyzer_deg", "polariser_deg", "analyser_deg", "objective_na",
-                    "condenser_na", "focus_um", "imaging", "directions", "quarter_wave", "compensator", "before",
-                    "behind", "polarizer_extinction_ratio", "analyzer_extinction_ratio", "camera"},
+                    "condenser", "condenser_na", "focus_um", "imaging", "directions", "quarter_wave", "compensator",
+                    "before", "behind", "polarizer_extinction_ratio", "analyzer_extinction_ratio", "camera"},
                    true);
   read_light(reader, block, microscope);
   reader.camera = read_camera(reader, block);
@@ -167,9 +180,9 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   microscope.analyzer_deg =
       polarizing_element(reader, block, "analyzer_deg", "analyser_deg", !slab && reader.polarizers);
   for (const auto& [key, ref] :
-       {std::pair("objective_na", &microscope.objective_na), std::pair("condenser_na", &microscope.condenser_na),
-        std::pair("focus_um", &microscope.focus_um)})
+       {std::pair("objective_na", &microscope.objective_na), std::pair("focus_um", &microscope.focus_um)})
     *ref = read_described<Microscope>(reader, block, key);
+  read_condenser(reader, block, microscope);
   microscope.aplanatic = reader.choice(block, "imaging", {"focal_plane", "aplanatic"}).value_or("") == "aplanatic";
 
   microscope.polarizer_extinction_ratio =
@@ -180,6 +193,8 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
   read_parts(reader, block, "behind", microscope.behind);
   read_short_forms(reader, block, microscope);
   if (const YamlNode* directions = block.find("directions")) {
+    if (microscope.condenser)
+      reader.problems.add(directions->where, "directions are given beside a condenser", "give one of the two");
     if (!slab)
       reader.problems.add(directions->where,
                           slab_sample ? "a slab with a view in a cone has a direction for every pixel"

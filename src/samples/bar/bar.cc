@@ -69,11 +69,6 @@ RenderPlan plan_bar(const Planning& planning) {
   RenderPlan plan = planning.start();
   plan.method = "closed_form";
   plan.reasons.push_back("a crystal between electrodes is one retarder per pixel: sin^2 in closed form");
-  const Crystal& crystal = std::get<Crystal>(planning.scene.sample);
-  const Values<double>& value = planning.value;
-  const double across = value(crystal.bias_v) + value.get(crystal.built_in_bias_v, 0);
-  note_illumination(planning.scene, value, std::abs(std::numbers::pi * across / value(crystal.half_wave_voltage_v)),
-                    plan);
   return plan;
 }
 

@@ -81,7 +81,6 @@ RenderPlan plan_disc(const Planning& planning) {
         fmt::format("fringes are finer than a pixel ({:.2g} rad a pixel) near the contacts: a larger contact_radius_um "
                     "leaves these out",
                     fastest));
-  note_illumination(scene, value, largest_phase, plan);
   return plan;
 }
 

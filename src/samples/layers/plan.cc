@@ -187,8 +187,6 @@ void plan_fringe_blocks(const Planning& planning, RenderPlan& plan) {
 /// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
 RenderPlan plan_reflections(const Planning& planning, const PlanarOptics<double>& o,
                             const std::vector<std::pair<double, double>>& directions) {
-  const Scene& scene = planning.scene;
-  const Values<double>& value = planning.value;
   RenderPlan plan = planning.start();
   plan.method = "berreman";
   const Berreman<double> method;
@@ -210,9 +208,6 @@ RenderPlan plan_reflections(const Planning& planning, const PlanarOptics<double>
   plan.reasons.push_back("asked for by physics.ceiling: all reflections, between the two faces too");
   if (plan.numerical_error > plan.demand.intensity_accuracy)
     plan.warnings.push_back(fmt::format("Even {} steps err by {}.", plan.steps, sci(plan.numerical_error)));
-  double largest_phase = 0;
-  for (const auto& [tx, ty] : directions) largest_phase = std::max(largest_phase, std::abs(planar_phase(o, tx, ty)));
-  note_illumination(scene, value, largest_phase, plan);
   return plan;
 }
 
@@ -442,7 +437,6 @@ RenderPlan plan_planar(const Planning& planning) {
         fmt::format("Light reflected between the faces (reflectance {:.2g}) is left out; it ripples the intensity by "
                     "up to about {:.2g}.",
                     r, r));
-  note_illumination(scene, value, largest_phase, plan);
   return plan;
 }
 
@@ -473,6 +467,16 @@ std::vector<ParameterRef> heat_temperatures(const Scene& scene) {
   return {heat->cold_k, heat->hot_k, heat->initial_k ? heat->initial_k : heat->cold_k};
 }
 
+namespace {
+
+/// Seen in a cone every pixel has a direction of its own.
+ManyDirections layers_directions(const Scene& scene, const RenderPlan&) {
+  const bool one = !cone_half_angle(scene) && scene.microscope.directions.size() < 2;
+  return one ? ManyDirections::summed : ManyDirections::never;
+}
+
+}  // namespace
+
 const SampleKind kLayers{.name = "layers",
                          .is = is_layers,
                          .plan = plan_planar,
@@ -480,6 +484,7 @@ const SampleKind kLayers{.name = "layers",
                          .phases_rad = planar_phases,
                          .jones = add_planar_jones,
                          .symmetric = has_cone,
+                         .directions = layers_directions,
                          .traits = layers_traits,
                          .temperatures = heat_temperatures};
 

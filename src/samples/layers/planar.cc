@@ -130,9 +130,8 @@ class PlanarImage final : public SampleImage<S> {
                       choices(plan).fringe_blocks.end()) {
     if (cone_half_angle(scene)) cone_.emplace(scene, value);
     if (!cone_) {
-      const Direction d = maker.in(value).direction;
-      const double t = std::tan(d.theta_deg * std::numbers::pi / 180), a = d.azimuth_deg * std::numbers::pi / 180;
-      constant_ = light_.of(planar_jones(optics_, method_, mesh_, S(t * std::cos(a)), S(t * std::sin(a))));
+      const auto [tx, ty] = maker.in(value).tangents(optics_.n_host);
+      constant_ = light_.of(planar_jones(optics_, method_, mesh_, tx, ty));
     }
     const bool straight = cone_ && cone_->from_front();
     if (straight && centred(scene, cone_->center_x, cone_->center_y) &&

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include "core/quadrature.h"
 #include "samples/kind.h"
 #include "samples/layers/plan.h"
 #include "samples/layers/planar.h"
 #include "transport/one_way.h"
-#include "transport/quadrature.h"
 
 namespace birefit {
 namespace {

@@ -37,6 +37,11 @@ Traits sphere_traits(const Scene& scene) {
   return {.sphere_diameter_um = diameter_um, .round = Traits::Round{diameter_um, scene.microscope.polarizer_deg}};
 }
 
+ManyDirections sphere_directions(const Scene&, const RenderPlan& plan) {
+  if (plan.wave) return ManyDirections::summed;
+  return choices(plan).series_reach_um > 0 ? ManyDirections::by_sample : ManyDirections::never;
+}
+
 }  // namespace
 
 const SampleKind kSphere{.name = "sphere",
@@ -48,6 +53,7 @@ const SampleKind kSphere{.name = "sphere",
                          .jones = add_sphere_jones,
                          .symmetric = always,
                          .sums_wavelengths = droplet_sums_wavelengths,
+                         .directions = sphere_directions,
                          .passes_axis = true,
                          .curved_rays = sphere_has_curved_rays,
                          .waves = &kSphereWaves,

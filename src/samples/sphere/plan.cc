@@ -234,7 +234,6 @@ RenderPlan plan_ball(const Planning& planning) {
   plan.means.samples.push_back(1);  // outside
   measure_points_of(planning, plan);
   note_rays(scene, value, o.sphere, plan);
-  note_illumination(scene, value, largest_phase, plan);
   return plan;
 }
 
@@ -275,7 +274,6 @@ void sample_round(const Scene& scene, const Values<double>& value, const Droplet
   // Outside the droplet one sample is enough.
   plan.means.samples.push_back(1);
   note_rays(scene, value, o, plan);
-  note_illumination(scene, value, largest_phase, plan);
 }
 
 /// Each mode on its own curved ray.

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "core/threads.h"
 #include "instrument/exposure.h"
 #include "samples/choices.h"
 #include "samples/pixels/pixel_mean.h"
@@ -13,6 +16,7 @@
 #include "samples/tables/round_view.h"
 #include "samples/waves/objective.h"
 #include "wave/radial_series.h"
+#include "wave/tilted_series.h"
 
 namespace birefit {
 namespace {
@@ -33,6 +37,18 @@ struct SingleOf<Dual<Pack, N>> {
   }
 };
 
+/// The picture along its radius, of the axis' direction or of the condenser's.
+template <class Single>
+struct SeriesFields {
+  struct Direction {
+    double weight;
+    bool mirrored;  ///< stands for its mirror image by the picture's x, too
+    std::optional<TiltedRadialImage<Single>> image;
+  };
+  std::optional<RadialImage<Single>> axis;
+  std::vector<Direction> directions;
+};
+
 template <class S>
 class SeriesImage final : public SampleImage<S> {
  public:
@@ -46,7 +62,13 @@ class SeriesImage final : public SampleImage<S> {
         pupil_(scene.microscope.aplanatic ? Pupil::aplanatic : Pupil::focal_plane),
         focus_um_(value.get(scene.microscope.focus_um, 0.0)),
         light_(light.in(value).line),
-        view_(scene, value, light_) {
+        view_(scene, value, light_),
+        rings_(plan.condenser_rings) {
+    if (rings_ > 0) {
+      const CondenserDisc<S> disc = condenser_disc(*scene.microscope.condenser, value);
+      const auto single = [](const S& x) { return SingleOf<S>::of(x); };
+      condenser_ = {single(disc.radius), single(disc.inner_radius), {Single(0.0), Single(0.0)}};
+    }
     symmetry_ = round_symmetry(scene, value, light_.line(), false);
     RadialBall<Single> ball;
     const auto one = [](const S& x) { return SingleOf<S>::of(x); };
@@ -59,9 +81,9 @@ class SeriesImage final : public SampleImage<S> {
   }
 
   void tabulate(typename SampleImage<S>::Wanted, int threads) override {
-    const RadialImage<Single> image = radial_image();
+    const SeriesFields<Single> fields = series_fields(threads);
     table_ = RadialTable<S>(panels_, light_.functions(true), threads,
-                            [&](const P& v, S* out) { terms(image, v * P(reach_um_), out); });
+                            [&](const P& v, S* out) { terms(fields, v * P(reach_um_), out); });
   }
 
   Symmetry symmetry() const override { return symmetry_; }
@@ -82,12 +104,12 @@ class SeriesImage final : public SampleImage<S> {
 
   /// Largest difference between the table and the series, over places that are no nodes of it.
   double table_error() const {
-    const RadialImage<Single> image = radial_image();
+    const SeriesFields<Single> fields = series_fields(1);
     double error = 0;
     for (int i = 0; i < 60; ++i) {
       const double turn = (i + 0.5) * 0.6180339887498949, v = turn - std::floor(turn);
       std::array<S, RoundView<S>::kMostTerms> f;
-      terms(image, P(v * reach_um_), f.data());
+      terms(fields, P(v * reach_um_), f.data());
       for (std::size_t t = 0; t < static_cast<std::size_t>(light_.functions(true)); ++t) {
         std::array<P, RoundView<S>::kMostTerms> basis;
         basis.fill(P(0.0));
@@ -100,36 +122,83 @@ class SeriesImage final : public SampleImage<S> {
   }
 
  private:
-  RadialImage<Single> radial_image() const {
-    return RadialImage<Single>(series_, SingleOf<S>::of(na_), SingleOf<S>::of(focus_um_), reach_um_, pupil_);
-  }
-  // In the (radial, azimuthal) frame the Jones matrix is diagonal, (1 + A0) +- A2.
-  void terms(const RadialImage<Single>& image, const P& rho_um, S* f) const {
-    std::array<RadialAmplitudes<Single>, static_cast<std::size_t>(kLanesOf<S>)> fields;
-    for (std::size_t k = 0; k < fields.size(); ++k) fields[k] = image(Single(lane(rho_um, static_cast<int>(k))));
-    const auto lanes = [&](const auto& part) {
-      if constexpr (kLanesOf<S> == 1) {
-        return part(fields[0]);
-      } else {
-        alignas(64) double values[kLanes];
-        const auto gather = [&](const auto& of) {
-          for (std::size_t k = 0; k < fields.size(); ++k) values[k] = of(part(fields[k]));
-          return Pack::load_aligned(values);
-        };
-        if constexpr (ScalarTraits<S>::derivatives > 0) {
-          S r(gather([](const Single& x) { return x.value; }));
-          for (std::size_t j = 0; j < r.d.size(); ++j) r.d[j] = gather([j](const Single& x) { return x.d[j]; });
-          return r;
-        } else {
-          return gather([](const Single& x) { return x; });
-        }
-      }
+  SeriesFields<Single> series_fields(int threads) const {
+    SeriesFields<Single> fields;
+    const Single na = SingleOf<S>::of(na_), focus = SingleOf<S>::of(focus_um_);
+    if (rings_ == 0) {
+      fields.axis.emplace(series_, na, focus, reach_um_, pupil_);
+      return fields;
+    }
+    const auto angle = [&](const Single& aperture) {
+      return std::asin(std::min(1.0, plain(aperture) / plain(series_.n_host)));
     };
-    using Fields = RadialAmplitudes<Single>;
-    const Complex<S> direct(1.0 + lanes([](const Fields&a) { return a.a0.re; }),
-                            lanes([](const Fields&a) { return a.a0.im; })),
-        turned(lanes([](const Fields&a) { return a.a2.re; }), lanes([](const Fields&a) { return a.a2.im; }));
-    light_.terms({direct + turned, {}, {}, direct - turned}, S(1.0), true, f);
+    const ScatteringTable<Single> amplitudes(series_, angle(na) + angle(condenser_.radius) + 1e-6);
+    std::vector<DiscRule::Node> nodes = DiscRule(rings_).nodes;
+    std::erase_if(nodes, [](const DiscRule::Node& n) { return n.sin_azimuth < -1e-9; });  // mirror images are there
+    fields.directions.resize(nodes.size());
+    parallel_for(static_cast<int>(nodes.size()), threads, [&](int i) {
+      const DiscRule::Node& node = nodes[static_cast<std::size_t>(i)];
+      auto& direction = fields.directions[static_cast<std::size_t>(i)];
+      direction.weight = node.weight, direction.mirrored = node.sin_azimuth > 1e-9;
+      direction.image.emplace(series_, amplitudes, DiscRule::kappa(node, condenser_), na, focus, reach_um_, pupil_);
+    });
+    return fields;
+  }
+  /// part(k) of every lane, gathered.
+  template <class Part>
+  static S in_lanes(const Part& part) {
+    if constexpr (kLanesOf<S> == 1) {
+      return part(std::size_t{0});
+    } else {
+      alignas(64) double values[kLanes];
+      const auto gather = [&](const auto& of) {
+        for (std::size_t k = 0; k < kLanes; ++k) values[k] = of(part(k));
+        return Pack::load_aligned(values);
+      };
+      if constexpr (ScalarTraits<S>::derivatives > 0) {
+        S r(gather([](const Single& x) { return x.value; }));
+        for (std::size_t j = 0; j < r.d.size(); ++j) r.d[j] = gather([j](const Single& x) { return x.d[j]; });
+        return r;
+      } else {
+        return gather([](const Single& x) { return x; });
+      }
+    }
+  }
+  void terms(const SeriesFields<Single>& fields, const P& rho_um, S* f) const {
+    constexpr std::size_t kWide = static_cast<std::size_t>(kLanesOf<S>);
+    if (fields.axis) {
+      // In the (radial, azimuthal) frame the Jones matrix is diagonal, (1 + A0) +- A2.
+      std::array<RadialAmplitudes<Single>, kWide> a;
+      for (std::size_t k = 0; k < kWide; ++k) a[k] = (*fields.axis)(Single(lane(rho_um, static_cast<int>(k))));
+      const Complex<S> direct(1.0 + in_lanes([&](std::size_t k) { return a[k].a0.re; }),
+                              in_lanes([&](std::size_t k) { return a[k].a0.im; })),
+          turned(in_lanes([&](std::size_t k) { return a[k].a2.re; }),
+                 in_lanes([&](std::size_t k) { return a[k].a2.im; }));
+      light_.terms({direct + turned, {}, {}, direct - turned}, S(1.0), true, f);
+      return;
+    }
+    // All directions together look the same all around, each by itself does not: its Jones matrix on the x axis, where
+    // the radial direction is x, is as good as any.
+    const int count = light_.functions(true);
+    for (int t = 0; t < count; ++t) f[t] = S(0.0);
+    const auto add = [&](const Mat2<S>& j, double weight) {
+      S of_one[RoundView<S>::kMostTerms];
+      light_.terms(j, S(weight), false, of_one);
+      for (int t = 0; t < count; ++t) f[t] = f[t] + of_one[t];
+    };
+    for (const auto& direction : fields.directions) {
+      std::array<Mat2<Single>, kWide> m;
+      for (std::size_t k = 0; k < kWide; ++k) m[k] = (*direction.image)(lane(rho_um, static_cast<int>(k)));
+      const auto entry = [&](Complex<Single> Mat2<Single>::*which) {
+        return Complex<S>(in_lanes([&](std::size_t k) { return (m[k].*which).re; }),
+                          in_lanes([&](std::size_t k) { return (m[k].*which).im; }));
+      };
+      const Mat2<S> j{entry(&Mat2<Single>::a), entry(&Mat2<Single>::b), entry(&Mat2<Single>::c),
+                      entry(&Mat2<Single>::d)};
+      const Complex<S> none;
+      add(j, direction.weight);
+      if (direction.mirrored) add({j.a, none - j.b, none - j.c, j.d}, direction.weight);
+    }
   }
 
   DropletOptics<S> optics_;
@@ -140,6 +209,8 @@ class SeriesImage final : public SampleImage<S> {
   S focus_um_;
   RoundLight<S> light_;
   RoundView<S> view_;
+  int rings_;
+  CondenserDisc<Single> condenser_;  ///< with rings_ > 0
   Symmetry symmetry_;
   RadialSeries<Single> series_;
   RadialTable<S> table_;
@@ -148,6 +219,8 @@ class SeriesImage final : public SampleImage<S> {
 }  // namespace
 
 bool has_series(const Scene& scene) {
+  // Light from all around a slanted direction makes no round picture.
+  if (scene.microscope.condenser && scene.microscope.condenser->tilt_deg) return false;
   const Droplet& droplet = std::get<Droplet>(scene.sample);
   if (const auto* radial = std::get_if<RadialDirector>(&droplet.director)) return !radial->twist_deg;
   const auto* shell = std::get_if<ShellDirector>(&droplet.director);

@@ -190,11 +190,6 @@ RenderPlan plan_volume(const Planning& planning) {
                   "out. Its gradients would turn the extraordinary "
                   "ray by some {:.2g} degrees (median), which changes the intensity by the order of {:.1g}.",
                   turn * 180 / kPi, plan.model_error));
-  const std::vector<double> retardances = volume_phases_of(scene, value);
-  note_illumination(scene, value,
-                    *std::max_element(retardances.begin(), retardances.end(),
-                                      [](double a, double b) { return std::abs(a) < std::abs(b); }),
-                    plan);
   return plan;
 }
 
@@ -206,6 +201,10 @@ void add_volume_jones(const Scene& scene, const RenderPlan& plan, const Values<d
       table.add(volume_jones(optics, c, r, transport_method<double>(plan.method), layers), 0, {.row = r, .column = c});
 }
 
+ManyDirections volume_directions(const Scene&, const RenderPlan& plan) {
+  return plan.wave ? ManyDirections::summed : ManyDirections::never;
+}
+
 }  // namespace
 
 const SampleKind kVolume{.name = "volume",
@@ -214,6 +213,7 @@ const SampleKind kVolume{.name = "volume",
                          .pilots = volume_pilots,
                          .phases_rad = volume_phases_of,
                          .jones = add_volume_jones,
+                         .directions = volume_directions,
                          .passes_axis = true,
                          .waves = &kVolumeWaves};
 

@@ -178,8 +178,14 @@ RenderPlan plan_wave(const Planning& planning) {
 namespace {
 
 template <class S>
-WaveLight<S> wave_light(const Scene& scene, const Values<S>& value, const Field<S>& field) {
-  return {wavenumber_per_um(scene, value), host_index(scene, value), field.x, field.y};
+WaveLight<S> wave_light(const Scene& scene, const Values<S>& value, const BeamMaker& light, const Field<S>& field) {
+  WaveLight<S> sent{wavenumber_per_um(scene, value), host_index(scene, value), field.x, field.y};
+  // Held while the wavelength changes (condenser_slope).
+  const double k0 = lane(plain(sent.k0_per_um), 0);
+  sent.kx_per_um = k0 * light.kappa()[0], sent.ky_per_um = k0 * light.kappa()[1];
+  // An aplanatic condenser keeps the flux, as the objective does.
+  if (scene.microscope.aplanatic) flux_to_field(sent);
+  return sent;
 }
 
 /// What is left of the light behind the sample, one field for each of those that come in.
@@ -187,8 +193,9 @@ using SentFields = std::vector<std::vector<WaveField>>;
 
 /// The light of one field that comes in and one that is let through, in images of their own; they add up.
 template <class S>
-void picture(const Scene& scene, const Line<S>& line, const WaveGrid& grid, const WaveImaging& imaging,
-             const Values<S>& value, const SentFields& fields, int threads, const std::vector<Image*>& images) {
+void picture(const Scene& scene, const BeamMaker& light, const Line<S>& line, const WaveGrid& grid,
+             const WaveImaging& imaging, const Values<S>& value, const SentFields& fields, int threads,
+             const std::vector<Image*>& images) {
   WaveMicroscope<S> m;
   m.objective_na = value(scene.microscope.objective_na);
   m.aplanatic = scene.microscope.aplanatic;
@@ -204,7 +211,7 @@ void picture(const Scene& scene, const Line<S>& line, const WaveGrid& grid, cons
   for (std::size_t i = 0; i < fields.size(); ++i)
     for (std::size_t o = 0; o < static_cast<std::size_t>(line.out().count); ++o) {
       m.ax = line.out().field[o].x, m.ay = line.out().field[o].y;
-      form_image(grid, imaging, wave_light(scene, value, line.in().field[i]), m, fields[i], threads,
+      form_image(grid, imaging, wave_light(scene, value, light, line.in().field[i]), m, fields[i], threads,
                  whole ? images : parts);
       if (whole) continue;
       const S weight = line.in().weight[i] * line.out().weight[o];
@@ -308,8 +315,8 @@ void render_wave(const Scene& scene, const RenderPlan& chosen, const BeamMaker& 
     const auto medium = wave_medium(scene, value, plan.ramp_um);
     SentFields fields;
     for (std::size_t i = 0; i < static_cast<std::size_t>(line.in().count); ++i)
-      fields.push_back(propagate(plan.grid, wave_light(scene, value, line.in().field[i]), *medium, threads));
-    picture(scene, line, plan.grid, plan.imaging, value, fields, threads, images);
+      fields.push_back(propagate(plan.grid, wave_light(scene, value, light, line.in().field[i]), *medium, threads));
+    picture(scene, light, line, plan.grid, plan.imaging, value, fields, threads, images);
     for (auto& of_one : fields) of_one.resize(1);
     base = std::move(fields);
   };
@@ -319,7 +326,7 @@ void render_wave(const Scene& scene, const RenderPlan& chosen, const BeamMaker& 
     in_chunks(of_light, send);
   in_chunks(of_picture, [&]<class S>(const std::vector<int>& chunk, const std::vector<Image*>& images) {
     const Values<S> value(theta, chunk, memo);
-    picture(scene, light.in(value).line, plan.grid, plan.imaging, value, base, threads, images);
+    picture(scene, light, light.in(value).line, plan.grid, plan.imaging, value, base, threads, images);
   });
 }
 
@@ -372,7 +379,7 @@ Image marched_picture(const Scene& scene, const BeamMaker& light, const Theta& t
   for (std::size_t i = 0; i < waves.size(); ++i)
     fields[i].push_back(flux_field(std::move(marched[i]), g, k0, o.n_host));
   Image image;
-  picture<Pack>(scene, light.in(lanes).line, g, imaging_of(scene, value, g), lanes, fields, threads, {&image});
+  picture<Pack>(scene, light, light.in(lanes).line, g, imaging_of(scene, value, g), lanes, fields, threads, {&image});
   return image;
 }
 

@@ -1,6 +1,6 @@
+#include "core/quadrature.h"
 #include "transport/methods.h"
 #include "transport/modes.h"
-#include "transport/quadrature.h"
 
 namespace birefit {
 namespace {

@@ -8,9 +8,9 @@
 // gains one power of 1/(phase between the modes over the length on which the medium changes) a pass; r' comes from the
 // polynomial through the nodes (collocation in the sense of Levin, Math. Comp. 38, 531 (1982)).
 
+#include "core/quadrature.h"
 #include "transport/methods.h"
 #include "transport/modes.h"
-#include "transport/quadrature.h"
 
 namespace birefit {
 namespace {

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "core/quadrature.h"
 #include "transport/by_lane.h"
 #include "transport/gauss_moments.h"
 #include "transport/modes.h"
-#include "transport/quadrature.h"
 
 namespace birefit {
 namespace {

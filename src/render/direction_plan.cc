@@ -1,0 +1,104 @@
+#include "render/direction_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "birefit/error.h"
+#include "instrument/exposure.h"
+#include "medium/surround.h"
+#include "samples/planning.h"
+#include "samples/waves/wave.h"
+
+namespace birefit {
+namespace {
+
+constexpr int kMostRings = 80;
+
+int directions_of(int rings) { return static_cast<int>(DiscRule(rings).nodes.size()); }
+
+/// The whole condenser lies within the medium's wavevectors and, of waves or not, what is seen within the objective's.
+void check_disc(const Scene& scene, const Values<double>& value, const CondenserDisc<double>& disc) {
+  const double host = host_index(scene, value), reach = disc.radius + std::hypot(disc.middle[0], disc.middle[1]);
+  if (reach >= host)
+    throw UserError(Where{},
+                    fmt::format("the condenser's light reaches a numerical aperture of {:.3g}, and the medium around "
+                                "the sample (index {:.4g}) has none from its index on",
+                                reach, host),
+                    "check microscope.condenser, or state sample.surround");
+  if (disc.inner_radius >= disc.radius)
+    throw UserError(
+        Where{},
+        fmt::format("the condenser's inner_na ({:.3g}) is not below its na ({:.3g})", disc.inner_radius, disc.radius),
+        "microscope.condenser: directions lie between the two");
+}
+
+void note_what_is_left_out(double na, double largest_phase, RenderPlan& plan) {
+  const double shift = largest_phase * na * na / 8;  // mean phase shift over the cone, n ~ 1.5
+  const double loss = std::min(0.5, 0.5 * std::abs(shift));
+  plan.model_error = std::hypot(plan.model_error, loss);
+  if (loss > 1e-3)
+    plan.warnings.push_back(fmt::format(
+        "The condenser's aperture (NA {:g}) is not modelled; it shifts the phase by about {:.2g} rad.", na, shift));
+}
+
+}  // namespace
+
+void plan_directions(const Scene& scene, const Values<double>& value, ManyDirections how, double largest_phase,
+                     const FewMeans& means, RenderPlan& plan) {
+  if (!scene.microscope.condenser) return;
+  if (how == ManyDirections::never)
+    return note_what_is_left_out(value(scene.microscope.condenser->na), largest_phase, plan);
+  const CondenserDisc<double> disc = condenser_disc(*scene.microscope.condenser, value);
+  check_disc(scene, value, disc);
+  const auto rings = [&](int n) {
+    RenderPlan trial = plan;
+    trial.condenser_rings = n;
+    return means(trial);
+  };
+  const double allowed = plan.demand.intensity_accuracy;
+  if (plan.wave) {
+    // A whole picture a direction: as many rings as the phase asks for that a direction at the rim gains over half the
+    // sample's depth, measured on droplets of 3 to 20 um (tests/cross/condenser_test.cc).
+    const double gained = 0.5 * wavenumber_per_um(scene, value) * disc.radius * disc.radius * plan.wave->radius_um;
+    plan.condenser_rings = 2 + static_cast<int>(std::lround(0.5 * gained));
+    plan.cost_seconds *= directions_of(plan.condenser_rings);
+    plan.reasons.push_back(fmt::format("the condenser (NA {:.3g}) is a sum over {} directions", disc.radius,
+                                       directions_of(plan.condenser_rings)));
+    return;
+  }
+  const Eigen::VectorXd axis = rings(0);
+  Eigen::VectorXd now = rings(1);
+  const double changed = (now - axis).cwiseAbs().maxCoeff();
+  if (changed <= allowed) {
+    plan.numerical_error += changed;
+    plan.reasons.push_back(
+        fmt::format("the condenser (NA {:.3g}) changes the intensity by {}: light along the axis stands for all of it",
+                    disc.radius, sci(changed)));
+    return;
+  }
+  // Two finer sums must agree with the one that is taken: of fringes between the faces one may by chance.
+  double left = changed;
+  int n = 1;
+  for (int more; n < kMostRings; n += more) {
+    more = 1 + n / 4;
+    const Eigen::VectorXd finer = rings(n + more);
+    left = (finer - now).cwiseAbs().maxCoeff();
+    if (left <= 0.5 * allowed) left = std::max(left, (rings(n + 2 * more + 1) - now).cwiseAbs().maxCoeff());
+    if (left <= 0.5 * allowed) break;
+    now = finer;
+  }
+  plan.condenser_rings = n;
+  plan.numerical_error += left;
+  plan.cost_seconds *= directions_of(n);
+  plan.reasons.push_back(
+      fmt::format("the condenser (NA {:.3g}) changes the intensity by {}: a sum over {} directions, good to {}",
+                  disc.radius, sci(changed), directions_of(n), sci(left)));
+  if (left > allowed)
+    plan.warnings.push_back(fmt::format(
+        "Light of the condenser (NA {:.3g}) changes so fast with its direction that {} of them are good to {} only.",
+        disc.radius, directions_of(n), sci(left)));
+}
+
+}  // namespace birefit
