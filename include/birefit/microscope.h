@@ -17,20 +17,25 @@ struct Direction {
   double azimuth_deg = 0;  ///< of the plane of incidence, from +x
 };
 
+/// Uniaxial crystals that plates are cut from (indices: src/instrument/plate_crystal.h).
+enum class PlateCrystal { none, quartz, magnesium_fluoride, calcite };
+
 /// A lossless plate between a polarizer and the sample: the field along its slow axis is behind the other by the phase.
 struct Retarder {
   static constexpr const char* kKey = "retarder";
-  /// Either of phase (at the light's wavelength) and retardance (the same at all wavelengths), and the azimuth of the
-  /// slow axis from +x.
+  /// Either of phase (at the light's wavelength) and retardance, and the azimuth of the slow axis from +x.
   ParameterRef phase_deg, retardance_nm, azimuth_deg;
   double turned_deg = 0;  ///< added to the azimuth: of a plate that is mounted at an angle to a polarizer
+  /// The retardance is that at `at_nm` and goes with the crystal's birefringence; none: the same at all wavelengths.
+  PlateCrystal crystal = PlateCrystal::none;
+  double at_nm = 589.3;
 
   template <class Self, class Visit>
   static void describe(Self& self, Visit&& visit) {
     visit.number("phase_deg", self.phase_deg, numbers::angle().left_out().known_within(3),
                  "at the light's wavelength; or");
     visit.number("retardance_nm", self.retardance_nm, numbers::within(-1e5, 1e5, "nm").left_out().known_within(5),
-                 "which is the same at all wavelengths");
+                 "the same at all wavelengths, or a crystal's at one");
     visit.number("azimuth_deg", self.azimuth_deg, numbers::dial(), "of the slow axis, from +x");
   }
 };
@@ -45,8 +50,22 @@ struct Rotator {
                  "by which it turns the polarization, counter-clockwise");
   }
 };
+/// A plate whose optic axis is its normal, tilted in the light (Berek's compensator): none of the faces' losses.
+struct TiltedPlate {
+  static constexpr const char* kKey = "berek";
+  /// The tilt turns the normal from the light towards the azimuth, from +x.
+  ParameterRef thickness_um, tilt_deg, azimuth_deg;
+  PlateCrystal crystal = PlateCrystal::magnesium_fluoride;
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("thickness_um", self.thickness_um, numbers::length_um(1e5), "of the plate");
+    visit.number("tilt_deg", self.tilt_deg, numbers::within(-80, 80, "deg"), "of its normal against the light, in air");
+    visit.number("azimuth_deg", self.azimuth_deg, numbers::dial(), "of the plane in which it is tilted, from +x");
+  }
+};
 /// What light meets between a polarizer and the sample.
-using PolarizingPart = std::variant<Retarder, Rotator>;
+using PolarizingPart = std::variant<Retarder, Rotator, TiltedPlate>;
 
 /// Koehler illumination: plane waves that do not interfere, of all directions whose transverse wavevector over k0 lies
 /// within a circle, or between two circles, with equal shares of the light.

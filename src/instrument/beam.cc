@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <numbers>
 
+#include "instrument/plate_crystal.h"
+
 namespace birefit {
 namespace {
+
+constexpr double kUmPerNm = 1e-3;
 
 template <class S>
 Field<S> along(const S& azimuth_rad) {
@@ -35,17 +39,35 @@ Side<S> polarizer(ParameterRef azimuth_deg, ParameterRef extinction_ratio, const
 
 template <class S>
 S phase_of(const Retarder& retarder, const S& wavelength_nm, const Values<S>& value) {
-  return retarder.phase_deg ? value.radians(retarder.phase_deg)
-                            : 2 * std::numbers::pi * value(retarder.retardance_nm) / wavelength_nm;
+  if (retarder.phase_deg) return value.radians(retarder.phase_deg);
+  const S phase = 2 * std::numbers::pi * value(retarder.retardance_nm) / wavelength_nm;
+  if (retarder.crystal == PlateCrystal::none) return phase;
+  return phase * relative_birefringence(retarder.crystal, S(kUmPerNm * wavelength_nm), kUmPerNm * retarder.at_nm);
+}
+/// The field along the azimuth is behind the other by the phase.
+template <class S>
+Su2<S> plate_matrix(const S& phase, const S& azimuth) {
+  S s, c, along, across;
+  sin_cos(S(0.5 * phase), s, c);
+  sin_cos(S(2.0 * azimuth), across, along);
+  return {c, s * across, S(0.0), s * along};
 }
 template <class S>
 Su2<S> matrix_of(const Retarder& retarder, const S& wavelength_nm, const Values<S>& value) {
-  const S phase = phase_of(retarder, wavelength_nm, value);
-  const S twice = 2.0 * (value.radians(retarder.azimuth_deg) + retarder.turned_deg * (std::numbers::pi / 180));
-  S s, c, along, across;
-  sin_cos(S(0.5 * phase), s, c);
-  sin_cos(twice, across, along);
-  return {c, s * across, S(0.0), s * along};
+  return plate_matrix(phase_of(retarder, wavelength_nm, value),
+                      S(value.radians(retarder.azimuth_deg) + retarder.turned_deg * (std::numbers::pi / 180)));
+}
+
+template <class S>
+S phase_of(const TiltedPlate& plate, const S& wavelength_nm, const Values<S>& value) {
+  S sine, cosine;
+  sin_cos(value.radians(plate.tilt_deg), sine, cosine);
+  const S um = kUmPerNm * wavelength_nm;
+  return 2 * std::numbers::pi * value(plate.thickness_um) * tilted_retardance(plate.crystal, um, sine) / um;
+}
+template <class S>
+Su2<S> matrix_of(const TiltedPlate& plate, const S& wavelength_nm, const Values<S>& value) {
+  return plate_matrix(phase_of(plate, wavelength_nm, value), value.radians(plate.azimuth_deg));
 }
 
 template <class S>
@@ -90,7 +112,7 @@ Line<S>::Line(const Microscope& microscope, const Values<S>& value)
       out_(polarizer(microscope.analyzer_deg, microscope.analyzer_extinction_ratio, value)) {
   const S all = 1.0 / (in_.weight[0] + in_.weight[1]);
   for (S& weight : in_.weight) weight = weight * all;
-  const auto is_retarder = [](const PolarizingPart& part) { return std::holds_alternative<Retarder>(part); };
+  const auto is_retarder = [](const PolarizingPart& part) { return !std::holds_alternative<Rotator>(part); };
   linear_ = in_.count == 1 && out_.count == 1 &&
             std::none_of(microscope.before.begin(), microscope.before.end(), is_retarder) &&
             std::none_of(microscope.behind.begin(), microscope.behind.end(), is_retarder);

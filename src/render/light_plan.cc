@@ -15,22 +15,31 @@ namespace {
 /// Standard deviations from the middle of a Gaussian line between the ends of its band.
 constexpr double kEndsOfLine = 3.09;
 
-/// More wavelengths until the means over a few pixels change no more: echoes between the faces of a layer go by longer
-/// ways than its retardance.
+/// Twice as many wavelengths until the means over a few pixels change no more, twice: echoes between the faces of a
+/// layer go by longer ways than its retardance, and of two rules that are too coarse for them one may agree with the
+/// other by chance. Pictures with echoes are of one pixel's work.
 void settle_on_means(const Scene& scene, const Theta& theta, const LightProbe& probe, RenderPlan& plan) {
+  constexpr int kMost = 4000;
+  const double allowed = 0.25 * plan.demand.intensity_accuracy;
+  // Gauss nodes grow dear with their number, and beyond some dozens equal steps are as good (methods.md, "Spectrum").
+  constexpr int kMostGauss = 60;
+  const auto rule = [&](int n) {
+    return wavelength_rule(scene.microscope, theta, n > kMostGauss ? 0 : plan.wavelengths->reach_um, n);
+  };
+  std::shared_ptr<const WavelengthRule> settled = plan.wavelengths;
   Eigen::VectorXd before = probe.means(plan);
-  for (;;) {
-    const int n = static_cast<int>(plan.wavelengths->size()), more = n + n / 2 + 3;
-    constexpr int kMost = 400;
-    if (more > kMost) return;
+  double change = 0;
+  for (int n = 2 * static_cast<int>(plan.wavelengths->size()) + 1, agree = 0; n <= kMost && agree < 2; n = 2 * n + 1) {
     RenderPlan finer = plan;
-    finer.wavelengths = wavelength_rule(scene.microscope, theta, plan.wavelengths->reach_um, more);
+    finer.wavelengths = rule(n);
     const Eigen::VectorXd now = probe.means(finer);
-    const double change = (now - before).cwiseAbs().maxCoeff();
-    if (change <= plan.demand.intensity_accuracy) return;
-    plan.wavelengths = finer.wavelengths;
+    change = (now - before).cwiseAbs().maxCoeff();
+    agree = change <= allowed ? agree + 1 : 0;
+    if (agree < 2) settled = finer.wavelengths;
     before = now;
   }
+  plan.wavelengths = settled;
+  if (change > allowed) plan.numerical_error += change;
 }
 
 }  // namespace

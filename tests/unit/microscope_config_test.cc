@@ -71,6 +71,30 @@ TEST_F(MicroscopeConfig, ListsOfPartsInTheOrderOfTheLight) {
   EXPECT_EQ(value(config, red.retardance_nm), 530);
 }
 
+TEST_F(MicroscopeConfig, PlatesOfCrystals) {
+  const auto config = load(
+      ", before: [{quarter_wave: {azimuth_deg: 55, made_for_nm: 550, crystal: quartz}},"
+      " {retarder: {retardance_nm: 900, azimuth_deg: 3, crystal: calcite, at_nm: 600}}],"
+      " behind: [{berek: {thickness_um: 1400, tilt_deg: {value: 3, fit: [-10, 10]}, azimuth_deg: 45}}]");
+  const Microscope& m = config.scene.microscope;
+  const Retarder& quarter = std::get<Retarder>(m.before.at(0));
+  EXPECT_EQ(quarter.crystal, PlateCrystal::quartz);
+  EXPECT_EQ(quarter.at_nm, 550);
+  EXPECT_EQ(value(config, quarter.retardance_nm), 137.5);
+  EXPECT_EQ(std::get<Retarder>(m.before.at(1)).at_nm, 600);
+  EXPECT_EQ(std::get<TiltedPlate>(m.behind.at(0)).crystal, PlateCrystal::magnesium_fluoride);
+  EXPECT_TRUE(config.job.parameters.find("microscope.behind[1].berek.tilt_deg"));
+}
+
+TEST_F(MicroscopeConfig, ACondenserAndItsShortForm) {
+  const auto config = load(", condenser: {na: 0.3, inner_na: 0.1, tilt_deg: 4}");
+  ASSERT_TRUE(config.scene.microscope.condenser);
+  EXPECT_EQ(value(config, config.scene.microscope.condenser->inner_na), 0.1);
+  const auto by_short_form = load(", condenser_na: 0.2");
+  EXPECT_EQ(value(by_short_form, by_short_form.scene.microscope.condenser->na), 0.2);
+  EXPECT_FALSE(load("").scene.microscope.condenser);
+}
+
 TEST_F(MicroscopeConfig, ShortFormsAreParts) {
   const auto circular = load(", quarter_wave: true");
   ASSERT_EQ(circular.scene.microscope.before.size(), 1u);
@@ -97,6 +121,11 @@ TEST_F(MicroscopeConfig, MistakesHaveTheirPlaceAndAHint) {
     EXPECT_NE(said.find("config.yaml:7:"), std::string::npos) << said;
   };
   says(", behind: {retarder: {phase_deg: 3, azimuth_deg: 1}}", "must be a list of parts");
+  says(", condenser: {na: 0.3}, condenser_na: 0.3", "is short for condenser");
+  says(", condenser: {inner_na: 0.3}", "condenser");
+  says(", before: [{quarter_wave: {azimuth_deg: 1, crystal: quartz}}]", "made for one wavelength");
+  says(", before: [{retarder: {retardance_nm: 100, azimuth_deg: 1, at_nm: 500}}]", "the same at all wavelengths");
+  says(", before: [{retarder: {phase_deg: 100, azimuth_deg: 1, crystal: calcite}}]", "a phase is given");
   says(", behind: [{retarder: {phase_deg: 3, azimuth_deg: 1}, rotator: {angle_deg: 1}}]",
        "must hold one part, found 2");
   says(", before: [{rotater: {angle_deg: 1}}]", "did you mean rotator?");

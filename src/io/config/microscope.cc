@@ -21,11 +21,25 @@ std::vector<std::string> part_words() {
   return words;
 }
 
+const std::vector<std::string> kCrystals = {"quartz", "magnesium_fluoride", "calcite"};
+/// The crystal a plate says it is of; `otherwise` where it says none.
+PlateCrystal read_crystal(ConfigReader& reader, const Block& block, PlateCrystal otherwise) {
+  const auto name = reader.choice(block, "crystal", kCrystals);
+  if (!name) return otherwise;
+  return *name == "quartz"    ? PlateCrystal::quartz
+         : *name == "calcite" ? PlateCrystal::calcite
+                              : PlateCrystal::magnesium_fluoride;
+}
+
 /// A plate of so many wavelengths: of the light's own where it is not said which, or of one that it is made for.
 Retarder read_wave_plate(ConfigReader& reader, const Block& block, double waves) {
   Retarder plate;
   plate.azimuth_deg = read_described<Retarder>(reader, block, "azimuth_deg");
+  plate.crystal = read_crystal(reader, block, PlateCrystal::none);
+  if (const YamlNode* crystal = block.find("crystal"); crystal && !block.find("made_for_nm"))
+    reader.problems.add(crystal->where, "a wave plate of a crystal is made for one wavelength", "add made_for_nm: 550");
   if (const auto wavelength = reader.plain(block, "made_for_nm", numbers::within(100, 20000, "nm"))) {
+    plate.at_nm = *wavelength;
     plate.retardance_nm =
         reader.constant(block.path_of("retardance_nm"), described<Retarder>("retardance_nm"), waves * *wavelength);
   } else {
@@ -40,9 +54,21 @@ PolarizingPart read_part(ConfigReader& reader, const Block& item, const std::str
   each_kind<PolarizingPart>([&]<class Part>(const Part*) {
     if (key != Part::kKey) return;
     Part read;
-    const Block block = reader.block(item, key, described_keys<Part>(), true);
+    std::vector<std::string> keys = described_keys<Part>();
+    if constexpr (requires { read.crystal; }) keys.push_back("crystal");
+    if constexpr (requires { read.at_nm; }) keys.push_back("at_nm");
+    const Block block = reader.block(item, key, keys, true);
     read_numbers(reader, block, read);
+    if constexpr (requires { read.crystal; }) read.crystal = read_crystal(reader, block, read.crystal);
     if constexpr (std::is_same_v<Part, Retarder>) {
+      for (const char* of_retardance : {"crystal", "at_nm"})
+        if (const YamlNode* node = block.find(of_retardance); node && read.phase_deg)
+          reader.problems.add(node->where, std::string(of_retardance) + " is of a retardance, and a phase is given",
+                              "give retardance_nm in place of phase_deg");
+      if (const YamlNode* at = block.find("at_nm"); at && read.crystal == PlateCrystal::none)
+        reader.problems.add(at->where, "at_nm is given, and the retardance is the same at all wavelengths",
+                            "add crystal: quartz (or magnesium_fluoride, calcite), or leave at_nm out");
+      read.at_nm = reader.plain(block, "at_nm", numbers::within(200, 2000, "nm")).value_or(read.at_nm);
       const YamlNode* phase = block.find("phase_deg");
       if (phase && read.retardance_nm)
         reader.problems.add(phase->where, "phase_deg is given beside retardance_nm", "give one of the two");
@@ -75,8 +101,8 @@ void read_parts(ConfigReader& reader, const Block& microscope, const std::string
     }
     const std::string& kind = item.node->entries[0].key;
     if (const auto plate = kWavePlates.find(kind); plate != kWavePlates.end())
-      to.emplace_back(
-          read_wave_plate(reader, reader.block(item, kind, {"azimuth_deg", "made_for_nm"}, true), plate->second));
+      to.emplace_back(read_wave_plate(reader, reader.block(item, kind, {"azimuth_deg", "made_for_nm", "crystal"}, true),
+                                      plate->second));
     else if (const std::vector<std::string> words = part_words();
              std::find(words.begin(), words.end(), kind) != words.end())
       to.push_back(read_part(reader, item, kind));

@@ -119,9 +119,14 @@ std::vector<Image> exposed(const FitJob& whole, const Disturbance* departure, Ex
   std::vector<Image> frames;
   double brightest = 0;
   for (const Sight& sight : sights) {
-    const Scene& scene = sight.picture->scene;
     Image light;
-    for (const auto& [weight, theta] : mixed) {
+    Scene scene = sight.picture->scene;
+    for (const auto& [weight, as_mixed] : mixed) {
+      Theta theta = as_mixed;
+      if (departure && departure->added) {
+        scene = sight.picture->scene;
+        departure->added(exposure, scene, theta);
+      }
       const Image part = render(scene, plan(scene, demand, theta, sight.observable), theta, {}, 1).intensity;
       if (light.empty()) light = Image(part.width(), part.height());
       for (std::size_t i = 0; i < light.size(); ++i) light.values()[i] += weight * part.values()[i];

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
 #include <string_view>
 #include <utility>
 
+#include "birefit/render.h"
 #include "fit/problem/task.h"
 #include "samples/kind.h"
 #include "study/audit/picture.h"
@@ -89,6 +91,69 @@ void add_mixed(const FitJob& job, std::vector<Disturbance>& all) {
       return std::vector<std::pair<double, Theta>>{{1, theta}, {e.size, with(theta, analyzers, 90)}};
     };
     all.push_back(d);
+  }
+}
+
+/// A number that no table has.
+ParameterRef new_number(Theta& theta, double value) {
+  theta.push_back(value);
+  return {static_cast<int>(theta.size()) - 1};
+}
+
+/// Light from more directions and of other wavelengths than is stated, and indices that go with the wavelength.
+void add_instrument(const FitJob& job, std::vector<Disturbance>& all) {
+  const auto each = [&](const auto& holds) {
+    bool all_hold = true;
+    for_each_scene(job.measurements, [&](const Scene& scene) { all_hold = all_hold && holds(scene); });
+    return all_hold;
+  };
+  const auto condenser_shows = [&](const Scene& scene) {
+    if (scene.microscope.condenser || !scene.microscope.directions.empty()) return false;
+    Scene lit = scene;
+    Theta theta = job.parameters.values();
+    lit.microscope.condenser.emplace().na = new_number(theta, 0.2);
+    return plan(lit, job.demand, theta).condenser_rings > 0;
+  };
+  if (each(condenser_shows)) {
+    Disturbance d{"condenser", "light from a cone of this numerical aperture", "", {0.03, 0.1, 0.2}};
+    d.added = [](Exposure& e, Scene& scene, Theta& theta) {
+      scene.microscope.condenser.emplace().na = new_number(theta, e.size);
+    };
+    all.push_back(d);
+  }
+  if (each([](const Scene& scene) { return !scene.microscope.channel_light && !scene.microscope.bandwidth_nm; })) {
+    Disturbance d{"colour channel", "even light of so many wavelengths for one, full width", "nm", {20, 50, 90}};
+    d.added = [](Exposure& e, Scene& scene, Theta& theta) {
+      if (std::holds_alternative<Crystal>(scene.sample)) return;  // its half-wave voltage is of one wavelength
+      scene.microscope.bandwidth_nm = new_number(theta, e.size);
+    };
+    all.push_back(d);
+  }
+  if (each([](const Scene& scene) { return scene.microscope.channel_light.has_value(); })) {
+    Disturbance d{"lamp", "bluer or redder than stated, in reciprocal temperature", "mired", {5, 25, 150}};
+    d.added = [](Exposure& e, Scene& scene, Theta&) {
+      // The ratio of two black bodies, by Wien's law.
+      auto tint = std::make_shared<SpectralTable>();
+      constexpr double kSecondRadiation = 14387.768775, kMired = 1e-6;  // um K, 1/K
+      for (double um = 0.3; um < 1.2; um += 0.005) {
+        tint->wavelength_um.push_back(um);
+        tint->value.push_back(std::exp(-e.sign * e.size * kMired * kSecondRadiation * (1 / um - 1 / 0.55)));
+      }
+      LightFilter filter;
+      filter.table = std::move(tint);
+      scene.microscope.channel_light->filters.push_back(std::move(filter));
+    };
+    all.push_back(d);
+    if (each([](const Scene& scene) {
+          const auto* constant = std::get_if<ConstantIndices>(&scene.material);
+          return constant && !constant->resonance_nm;
+        })) {
+      Disturbance dispersion{"dispersion", "a birefringence with a resonance at", "nm", {120, 180, 240}};
+      dispersion.added = [](Exposure& e, Scene& scene, Theta& theta) {
+        std::get<ConstantIndices>(scene.material).resonance_nm = new_number(theta, e.size);
+      };
+      all.push_back(dispersion);
+    }
   }
 }
 
@@ -193,6 +258,14 @@ void add_camera(bool even, std::vector<Disturbance>& all) {
     image = compressed(image, static_cast<int>(e.size));
     for (double& v : image.values()) v = levels.dark + levels.range * (v - kBlack) / (kWhite - kBlack);
   });
+  Disturbance demosaiced{
+      "demosaiced", "known at every fourth pixel, between them interpolated, by so much", "%", {0.25, 0.5, 1}};
+  demosaiced.codes = [](Exposure& e, const Levels&, Image& image) {
+    const Image between = every_fourth(image);
+    for (std::size_t i = 0; i < image.size(); ++i)
+      image.values()[i] += e.size * (between.values()[i] - image.values()[i]);
+  };
+  all.push_back(demosaiced);
   Disturbance correlated{"correlated noise", "over a Gaussian of", "px", {0.7, 1.5, 4}};
   correlated.noise = [](Exposure& e, Image& noise) {
     const auto rms = [](const Image& image) {
@@ -238,6 +311,7 @@ std::vector<Disturbance> disturbances(const FitJob& job) {
     spheres = spheres && traits.sphere_diameter_um && scene.view.pixel_size_um;
   }
   add_mixed(job, all);
+  add_instrument(job, all);
   if (pictures) add_light(all);
   if (pictures && spheres) add_neighbour(all);
   add_camera(!pictures, all);

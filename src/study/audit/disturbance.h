@@ -33,6 +33,8 @@ struct Disturbance {
   /// Each may be empty. Values of the table that the pictures are made with; light, of no unit; values, before or after
   /// the noise.
   std::function<void(Exposure&, Theta&)> scene;
+  /// What else is there: a scene's own copy, and values behind those of the table for its new numbers.
+  std::function<void(Exposure&, Scene&, Theta&)> added;
   std::function<void(Exposure&, const Scene&, const Theta&, Image& light)> light;
   std::function<void(Exposure&, const Levels&, Image&values)> values, codes;
   std::function<void(Exposure&, Image& noise)> noise;

@@ -108,6 +108,18 @@ Image compressed(const Image& codes, int quality) {
   return out;
 }
 
+Image every_fourth(const Image& image) {
+  Image out(image.width(), image.height());
+  const int right = (image.width() - 1) / 2 * 2, down = (image.height() - 1) / 2 * 2;
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) {
+      const int x0 = std::min(x / 2 * 2, right), y0 = std::min(y / 2 * 2, down), x1 = std::min(x0 + 2 * (x % 2), right),
+                y1 = std::min(y0 + 2 * (y % 2), down);
+      out(x, y) = 0.25 * (image(x0, y0) + image(x1, y0) + image(x0, y1) + image(x1, y1));
+    }
+  return out;
+}
+
 double level_of_border(const Image& image) {
   std::vector<double> values;
   for (int x = 0; x < image.width(); ++x) values.push_back(image(x, 0)), values.push_back(image(x, image.height() - 1));

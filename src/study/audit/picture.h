@@ -15,6 +15,8 @@ Image shifted(const Image& image, double by_x, double by_y, double beyond);
 /// As JPEG stores it: cosines of blocks of 8 x 8, rounded to the steps of the standard's table of brightness (ITU T.81,
 /// annex K) at a quality from 1 to 100. Values from 0 to 255.
 Image compressed(const Image& codes, int quality);
+/// As a colour camera shows its red: known at even columns and rows, linear between them.
+Image every_fourth(const Image& image);
 /// Median of the pixels along the four sides.
 double level_of_border(const Image& image);
 
