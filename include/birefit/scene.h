@@ -67,10 +67,23 @@ struct View {
   }
 };
 
+/// Imaginary parts of the indices: a wave of extraordinary polarization falls off as exp(-2 k0 k_e depth) in intensity,
+/// an ordinary one by k_o (pleochroism, dichroism). The same at all wavelengths. Of cells and plates.
+struct Absorption {
+  ParameterRef ordinary, extraordinary;
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("ordinary", self.ordinary, numbers::within(0, 1).or_else(0), "imaginary part of n_o");
+    visit.number("extraordinary", self.extraordinary, numbers::within(0, 1).or_else(0), "imaginary part of n_e");
+  }
+};
+
 /// Everything that decides what a picture looks like but the values of its parameters.
 struct Scene {
   Sample sample;
   Material material;
+  std::optional<Absorption> absorption;           ///< not given: none
   ParameterRef surround_index;                    ///< of the isotropic medium around the sample
   std::optional<Dispersion> surround_dispersion;  ///< instead of surround_index
   Microscope microscope;
@@ -80,6 +93,7 @@ struct Scene {
   static void describe(Self& self, Visit&& visit) {
     visit.inside("sample", self.sample);
     visit.inside("sample.material", self.material);
+    visit.inside("sample.material.absorption", self.absorption);
     visit.number("sample.surround.index", self.surround_index, numbers::tabulated_index().left_out(),
                  "of what is around the sample");
     visit.inside("sample.surround.file", self.surround_dispersion);

@@ -75,8 +75,10 @@ struct ReferenceCheck {
   Problems problems;
 
   void operator()(const ParameterRef& ref, const NumberSpec& spec, const KeyPath& path) {
-    // Heated samples bring temperatures of their own.
-    const bool may_be_left_out = spec.optional || spec.fallback || std::string_view(path.key) == "temperature_k";
+    // Heated samples bring temperatures of their own; a polarizer that is not there has no azimuth.
+    const std::string_view key(path.key);
+    const bool may_be_left_out =
+        spec.optional || spec.fallback || key == "temperature_k" || key == "polarizer_deg" || key == "analyzer_deg";
     if (!ref && !may_be_left_out)
       problems.add(Where{}, path.text() + " is an empty reference: the scene has no such number",
                    "add a parameter to the table and put its reference there");

@@ -111,6 +111,11 @@ TEST_F(MicroscopeConfig, NoneIsNoPolarizer) {
   EXPECT_FALSE(unpolarized.scene.microscope.polarizer_deg);
   EXPECT_TRUE(unpolarized.scene.microscope.analyzer_deg);
   EXPECT_FALSE(load("", "polarizer_deg: 10, analyser_deg: none").scene.microscope.analyzer_deg);
+  for (const char* polarizers : {"polarizer_deg: none, analyzer_deg: 100", "polarizer_deg: 10, analyzer_deg: none",
+                                 "polarizer_deg: none, analyzer_deg: none"}) {
+    const auto config = load("", polarizers);
+    EXPECT_NO_THROW(plan(config.scene, config.job.demand, config.job.parameters.values())) << polarizers;
+  }
 }
 
 TEST_F(MicroscopeConfig, MistakesHaveTheirPlaceAndAHint) {

@@ -266,6 +266,7 @@ Eigen::VectorXd LeastSquares::shift_by(const Eigen::VectorXd& intensity_change,
 LeastSquares::Beside LeastSquares::beside(Eigen::MatrixXd columns) const {
   const Eigen::Index n = unknowns_.size(), k = columns.cols();
   Beside sums{Eigen::MatrixXd::Zero(k, k), Eigen::MatrixXd::Zero(n, k), Eigen::VectorXd::Zero(k)};
+  if (k == 0) return sums;  // a matrix without columns has no rows to take a part of
   for (const Frame& frame : frames_) {
     auto part = columns.middleRows(frame.begin, frame.count);
     to_values(frame, part, {}, thread_count(job_.options.threads));

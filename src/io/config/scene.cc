@@ -348,7 +348,7 @@ void check_within(ConfigReader& reader, ParameterRef ref, double lower, double u
 }
 
 Material read_material(ConfigReader& reader, const Block& sample, const Sample& kind) {
-  std::vector<std::string> keys = {"ordinary", "birefringence", "resonance_nm", "name", "temperature_k"};
+  std::vector<std::string> keys = {"ordinary", "birefringence", "resonance_nm", "name", "temperature_k", "absorption"};
   keys.insert(keys.end(), law_material_keys().begin(), law_material_keys().end());
   const Block block = reader.block(sample, "material", keys, true);
   if (is_law_material(block)) return read_law_material(reader, block, kind);
@@ -390,6 +390,19 @@ Material read_material(ConfigReader& reader, const Block& sample, const Sample& 
   return material;
 }
 
+/// Of the samples whose transport knows it.
+void read_absorption(ConfigReader& reader, const YamlNode* material, Scene& scene) {
+  const YamlNode* absorption = material && material->is_map() ? material->find("absorption") : nullptr;
+  if (!absorption) return;
+  if (!std::holds_alternative<Cell>(scene.sample) && !std::holds_alternative<Plate>(scene.sample)) {
+    reader.problems.add(absorption->where, "absorption is of cells and plates",
+                        "a slab has it in its profile (k_o, k_e); droplets and sampled fields are transparent");
+    return;
+  }
+  const Block block = reader.block_of(*absorption, "sample.material.absorption", described_keys<Absorption>());
+  if (block.node) read_numbers(reader, block, scene.absorption.emplace());
+}
+
 void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
   std::vector<std::string> keys = kSampleKinds;
   keys.insert(keys.end(), {"material", "surround"});
@@ -414,6 +427,7 @@ void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
                                             : "its half-wave voltage says it all");
   } else {
     scene.material = read_material(reader, block, scene.sample);
+    read_absorption(reader, block.find("material"), scene);
   }
   if (*kind == "volume" && !block.find("surround")) return;  // rays have no use for it
   if (*kind == "crystal" || *kind == "disc") {

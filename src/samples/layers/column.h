@@ -65,9 +65,48 @@ struct CellMedium {
   }
 };
 
-/// Turned by the sample's rotation in the picture.
+/// Another column whose indices have imaginary parts.
 template <class S>
-std::unique_ptr<Column<S>> make_planar_column(const Scene& scene, const Values<S>& value) {
+class AbsorbingColumn final : public Column<S> {
+ public:
+  AbsorbingColumn(std::unique_ptr<Column<S>> column, const S& k_o, const S& k_e)
+      : column_(std::move(column)), k_o_(k_o), k_e_(k_e) {
+    this->absorbing = true;
+    this->planar = column_->planar;
+    this->breaks = column_->breaks;
+    this->jumps = column_->jumps;
+  }
+  void sample(std::span<const double> u, OpticalPoint<S>* out) const override {
+    column_->sample(u, out);
+    for (std::size_t i = 0; i < u.size(); ++i) absorb(out[i]);
+  }
+  void sample_with_slope(std::span<const double> u, OpticalPoint<Slope<S>>* out) const override {
+    column_->sample_with_slope(u, out);
+    for (std::size_t i = 0; i < u.size(); ++i) absorb(out[i]);
+  }
+  void sample_taylor(double u, int order, OpticalPoint<Series<S>>* out) const override {
+    column_->sample_taylor(u, order, out);
+    if constexpr (kHasSeries<S>) absorb(*out);
+  }
+
+ private:
+  /// (n + i k)^2
+  template <class T>
+  void absorb(OpticalPoint<T>& p) const {
+    const auto one = [](T& re, T& im, const S& k) {
+      im = T(S(2.0 * k)) * sqrt(re);
+      re = re - T(S(k * k));
+    };
+    one(p.ordinary, p.ordinary_im, k_o_);
+    one(p.extraordinary, p.extraordinary_im, k_e_);
+  }
+  std::unique_ptr<Column<S>> column_;
+  S k_o_, k_e_;
+};
+
+/// Turned by the sample's rotation in the picture; without absorption.
+template <class S>
+std::unique_ptr<Column<S>> transparent_planar_column(const Scene& scene, const Values<S>& value) {
   const Sample& sample = scene.sample;
   const S rotation_rad = value.radians(scene.view.rotation_deg), wavelength = wavelength_um(scene, value);
   if (const auto* slab = std::get_if<Slab>(&sample)) {
@@ -101,6 +140,15 @@ std::unique_ptr<Column<S>> make_planar_column(const Scene& scene, const Values<S
                             true);
   if (heat) return column_of_law<S>(HeatedLaw<S>{axis, profile, thickness}, true);
   return column_of_law<S>(UniformLaw<S>{axis, eo, ee, thickness}, true);
+}
+
+/// The same as the scene has it.
+template <class S>
+std::unique_ptr<Column<S>> make_planar_column(const Scene& scene, const Values<S>& value) {
+  std::unique_ptr<Column<S>> column = transparent_planar_column(scene, value);
+  if (!scene.absorption) return column;
+  return std::make_unique<AbsorbingColumn<S>>(std::move(column), value(scene.absorption->ordinary),
+                                              value(scene.absorption->extraordinary));
 }
 
 }  // namespace birefit
