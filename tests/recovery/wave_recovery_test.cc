@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <complex>
 #include <cstdio>
 #include <numbers>
 #include <random>
@@ -420,6 +422,101 @@ TEST(LongBipolarWaveRecovery, TruthIsInsideTheInterval) { check_bipolar(false, p
 // A surface that lies anywhere between nodes makes the box's scale 0.1 to 0.4 % too large, more than a radial twin's
 // surface does.
 TEST(LongBipolarWaveRecovery, TruthIsInsideTheIntervalOfASampledOne) { check_bipolar(true, problems_or(30), 0.8); }
+
+/// A radial droplet under a condenser, by the series' scattering matrix and two sums over wavevectors, one direction
+/// after the other: light of 1 unit at most, means over pixels of three Gauss points a side.
+std::vector<double> lit_by_a_condenser(double radius, double n_o, double n_e, double host, double objective_na,
+                                       double condenser_na, int size, double px, double cx, double cy) {
+  using Z = std::complex<double>;
+  const double k0 = 2 * std::numbers::pi / 0.59;
+  const RadialSeries<double> series = radial_series(RadialBall<double>{{{radius, n_o, n_e}}, host, k0});
+  std::vector<double> node, weight, a, wa, ring, share;
+  legendre_nodes(3, node, weight);
+  legendre_nodes(40, a, wa);
+  legendre_nodes(5, ring, share);
+  constexpr int kAround = 12;
+  constexpr double kQuarter = 0.5 * std::numbers::pi;
+  std::vector<double> x, y;
+  for (int p = 0; p < size; ++p)
+    for (const double at : node) x.push_back((p + 0.5 * at - cx) * px), y.push_back((cy - p - 0.5 * at) * px);
+  std::vector<double> light(static_cast<std::size_t>(size * size));
+  for (std::size_t r = 0; r < ring.size(); ++r)
+    for (int j = 0; j < kAround; ++j) {
+      const double azimuth = 2 * std::numbers::pi * (j + 0.3) / kAround,
+                   kappa = condenser_na * std::sqrt(0.5 * (1 + ring[r]));
+      const std::array<double, 2> in{kappa * std::cos(azimuth), kappa * std::sin(azimuth)};
+      // kappa_x = NA sin u, kappa_y = NA cos u sin v; polarizer along x, analyser along y.
+      std::vector<std::vector<Z>> along_y(a.size(), std::vector<Z>(y.size()));
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        const double kx = objective_na * std::sin(kQuarter * a[i]), cosine = std::cos(kQuarter * a[i]);
+        for (std::size_t v = 0; v < a.size(); ++v) {
+          const double ky = objective_na * cosine * std::sin(kQuarter * a[v]),
+                       area = square(objective_na * cosine * kQuarter * k0 / (2 * std::numbers::pi)) *
+                              std::cos(kQuarter * a[v]) * wa[i] * wa[v];
+          const Mat2<double> f = scattered_spectrum(series, in, {kx, ky}, 0);
+          for (std::size_t q = 0; q < y.size(); ++q)
+            along_y[i][q] += area * Z(f.c.re, f.c.im) * std::polar(1.0, k0 * ky * y[q]);
+        }
+      }
+      for (std::size_t q = 0; q < y.size(); ++q)
+        for (std::size_t p = 0; p < x.size(); ++p) {
+          Z field = 0;
+          for (std::size_t i = 0; i < a.size(); ++i)
+            field += along_y[i][q] * std::polar(1.0, k0 * objective_na * std::sin(kQuarter * a[i]) * x[p]);
+          light[(q / 3) * static_cast<std::size_t>(size) + p / 3] +=
+              0.5 * share[r] / kAround * 0.25 * weight[p % 3] * weight[q % 3] * std::norm(field);
+        }
+    }
+  return light;
+}
+
+// The aperture of the condenser is found from the picture; left out, it spoils the birefringence, and the fit says so.
+TEST(CondenserRecovery, ADropletsPicture) {
+  constexpr double kNa = 0.2, kBirefringence = 0.16, kHost = 1.5, kOrdinary = 1.52;
+  constexpr int kSize = 24;
+  const double px = 0.3, cx = 11.8, cy = 11.3, diameter = 5;
+  const std::vector<double> exact =
+      lit_by_a_condenser(0.5 * diameter, kOrdinary, kOrdinary + kBirefringence, kHost, 0.5, kNa, kSize, px, cx, cy);
+  std::mt19937_64 random(5);
+  const double sd = 0.005 * *std::max_element(exact.begin(), exact.end()) * 1000;
+  std::vector<double> counts;
+  for (const double v : exact) counts.push_back(1000 * v + std::normal_distribution<double>(0, sd)(random));
+  const auto fitted = [&](bool known) {
+    TableBuilder b;
+    Scene s;
+    s.sample = Droplet{b.fitted("diameter_um", 4.9, 4.5, 5.5), RadialDirector{}};
+    s.material = ConstantIndices{b.fixed("ordinary", kOrdinary), b.fitted("birefringence", 0.15, 0.1, 0.24)};
+    s.surround_index = b.fixed("surround", kHost);
+    s.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
+    s.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+    s.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+    s.microscope.objective_na = b.fixed("objective_na", 0.5);
+    if (known) s.microscope.condenser.emplace().na = b.fitted("condenser_na", 0.12, 0.02, 0.4);
+    s.view.width = s.view.height = kSize;
+    s.view.pixel_size_um = b.fixed("pixel_size_um", px);
+    s.view.center_x_px = b.fitted("center_x", 11.5, 10, 13), s.view.center_y_px = b.fitted("center_y", 11.5, 10, 13);
+    FitJob job;
+    job.demand = {.ceiling = Ceiling::wave};
+    job.demand.intensity_accuracy = 1e-3;
+    const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 5);
+    job.measurements.push_back(micrograph_of("droplet", s, counts, gain, offset, {sd, 0}));
+    job.parameters = b.table;
+    return fit(job);
+  };
+  const FitResult with = fitted(true);
+  ASSERT_TRUE(with.has_answer()) << with.grade();
+  for (const auto& [name, truth] :
+       {std::pair{"condenser_na", kNa}, {"birefringence", kBirefringence}, {"diameter_um", diameter}}) {
+    const ParameterEstimate* p = find_estimate(with, name);
+    EXPECT_LT(std::abs(p->value - truth), 3.5 * p->stderr_) << name << " " << p->value << " +- " << p->stderr_;
+  }
+  EXPECT_LT(find_estimate(with, "condenser_na")->stderr_, 0.1 * kNa);
+  const FitResult without = fitted(false);
+  if (without.has_answer()) {
+    EXPECT_NE(without.grade(), "answer");
+    EXPECT_TRUE(holds(without, "birefringence", kBirefringence));
+  }
+}
 
 }  // namespace
 }  // namespace birefit

@@ -33,6 +33,14 @@ refuse include/birefit/stray.h '// a header of no module'
 # what must be said of the tree
 says() { { "$check" "$tree" || true; } | grep -q "$1" || { echo "not said: $1"; exit 1; }; }
 
+# Two types of one name, unless their namespaces differ.
+printf 'namespace birefit {\nstruct Band {\n};\n}\n' >"$tree/src/medium/a.h"
+printf 'namespace birefit::study {\nstruct Band {\n};\n}\n' >"$tree/src/medium/b.h"
+"$check" "$tree" >/dev/null
+printf 'namespace birefit {\nclass Band final : public Other {\n};\n}\n' >"$tree/src/medium/b.h"
+says 'birefit::Band is defined in src/medium/a.h, too'
+rm "$tree"/src/medium/*
+
 # Circles of files, each named once; a file may include its own header.
 echo '#include "medium/b.h"' >"$tree/src/medium/a.h"
 echo '#include "medium/a.h"' >"$tree/src/medium/a.cc"

@@ -293,6 +293,32 @@ TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
             std::string::npos);
 }
 
+// A camera's own curve, here light = code^2, by a table: values are proportional to light, whatever its unit.
+TEST_F(Config, LinearisesByACurve) {
+  const Image codes = counts(100, 1);
+  save("a.tif", codes);
+  save("b.tif", counts(200, 2));
+  std::string curve = "code,light\n";
+  for (int code = 0; code <= 400; code += 10)
+    curve += std::to_string(code) + "," + std::to_string(3 * code * code) + "\n";
+  write("curve.csv", curve);
+  const std::string with = replaced(kCrystal, "[2, 4, 30, 28]}", "[2, 4, 30, 28], transfer: {file: curve.csv}}");
+  const auto config = load(with, ConfigUse::fit);
+  const Image& light = picture(config.job, 0).values;
+  ASSERT_EQ(light.width(), 28);
+  const auto square_of = [&](int x, int y) { return codes(x + 2, y + 4) * codes(x + 2, y + 4); };
+  const double scale = light(0, 0) / square_of(0, 0);
+  for (int y = 0; y < light.height(); ++y)
+    for (int x = 0; x < light.width(); ++x)
+      EXPECT_NEAR(light(x, y) / square_of(x, y), scale, 1e-3 * scale) << x << " " << y;
+  EXPECT_EQ(config.inputs.size(), 3u);
+  write("curve.csv", "code,light\n0,0\n100,5\n200,4\n");
+  EXPECT_NE(mistakes(with, ConfigUse::fit).find("curve.csv:4: neither code nor light may fall"), std::string::npos)
+      << mistakes(with, ConfigUse::fit);
+  write("curve.csv", "counts,light\n0,0\n100,5\n200,9\n");
+  EXPECT_NE(mistakes(with, ConfigUse::fit).find("two columns, code and light"), std::string::npos);
+}
+
 TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));

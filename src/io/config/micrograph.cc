@@ -6,6 +6,7 @@
 
 #include "io/config/described.h"
 #include "io/config/rings.h"
+#include "io/files/table.h"
 
 namespace birefit {
 namespace {
@@ -153,6 +154,35 @@ ParameterRef read_pixel_size(ConfigReader& reader, const Block& block, const Sce
   return reader.constant(block.path_of(key), spec, 0.5 * (*x + *y));
 }
 
+/// {file: curve.csv}: columns code and light, both growing from row to row.
+Transfer read_curve(ConfigReader& reader, const Block& block) {
+  Transfer transfer;
+  const std::optional<std::string> name = reader.text(block, "file");
+  if (!name) return transfer;
+  const std::string file = reader.resolve(*name).string();
+  try {
+    const PlacedTable table = load_placed_table(file, block.find("file")->where);
+    if (table.table.columns != std::vector<std::string>{"code", "light"})
+      throw UserError({file, table.header_line},
+                      "is no curve of a camera: its columns are " + list_words(table.table.columns),
+                      "two columns, code and light: what the file holds, and how much light that was");
+    for (std::size_t i = 0; i < table.table.rows.size(); ++i) {
+      const std::vector<double>& row = table.table.rows[i];
+      if (i > 0 && !(row[0] > transfer.code.back() && row[1] > transfer.light.back()))
+        throw UserError({file, table.lines[i]}, "neither code nor light may fall or stay from row to row",
+                        "sort the rows by code; where the camera is saturated the curve ends");
+      transfer.code.push_back(row[0]), transfer.light.push_back(row[1]);
+    }
+    if (transfer.code.size() < 3)
+      throw UserError({file}, "a curve needs three rows at least", "a straight line is transfer: linear");
+    transfer.kind = Transfer::Kind::table;
+    reader.warnings.insert(reader.warnings.end(), table.notes.begin(), table.notes.end());
+  } catch (const UserError& error) {
+    reader.problems.add(error);
+  }
+  return transfer;
+}
+
 }  // namespace
 
 std::optional<PixelRect> read_roi(ConfigReader& reader, const Block& block, Where& where) {
@@ -205,12 +235,17 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   settings.pixel_size_um = read_pixel_size(reader, block, scene);
   if (const YamlNode* transfer = block.find("transfer")) {
     if (transfer->is_map()) {
-      const Block gamma = reader.block(block, "transfer", {"gamma"}, true);
-      NumberSpec range;
-      range.lower = 0.1;
-      range.upper = 10;
-      if (!gamma.find("gamma")) reader.missing(gamma, "gamma");
-      settings.transfer = {Transfer::Kind::gamma, reader.plain(gamma, "gamma", range).value_or(1)};
+      const Block curve = reader.block(block, "transfer", {"gamma", "file"}, true);
+      if (const YamlNode* file = curve.find("file")) {
+        if (curve.find("gamma")) reader.problems.add(file->where, "file is given beside gamma", "give one of the two");
+        settings.transfer = read_curve(reader, curve);
+      } else {
+        NumberSpec range;
+        range.lower = 0.1;
+        range.upper = 10;
+        if (!curve.find("gamma")) reader.missing(curve, "gamma or file");
+        settings.transfer = {Transfer::Kind::gamma, reader.plain(curve, "gamma", range).value_or(1)};
+      }
     } else if (reader.choice(block, "transfer", {"linear", "srgb"}).value_or("linear") == "srgb") {
       settings.transfer.kind = Transfer::Kind::srgb;
     }

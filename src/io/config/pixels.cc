@@ -12,6 +12,7 @@
 #include "core/robust.h"
 #include "core/sub_grid.h"
 #include "io/libraries/table.h"
+#include "medium/materials/dispersion.h"
 
 namespace birefit {
 namespace {
@@ -25,10 +26,24 @@ constexpr double kPileUpRatio = 4;
 /// More than half of the pixels at the top is a bright flat image rather than a clipped one.
 constexpr double kPileUpMostly = 0.5;
 
+/// Through every entry, growing; beyond the ends straight on.
+double light_of(const Transfer& t, double code) {
+  const std::vector<double>&x = t.code, &y = t.light;
+  if (code >= x.front() && code <= x.back()) return table_index(x, y, code);
+  const std::size_t i = code < x.front() ? 0 : x.size() - 2;
+  return y[i] + (code - x[i]) * (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+}
+
 }  // namespace
 
 void linearise(Image& values, const Transfer& transfer, double top_code) {
   if (transfer.kind == Transfer::Kind::linear) return;
+  if (transfer.kind == Transfer::Kind::table) {
+    // The top code stays where it is, or, where there is none, the table's last.
+    const double last = top_code > 0 ? top_code : transfer.code.back(), scale = last / light_of(transfer, last);
+    for (double& value : values.values()) value = scale * light_of(transfer, value);
+    return;
+  }
   const double top = top_code > 0 ? top_code : 1;
   for (double& value : values.values()) {
     const double code = value / top;

@@ -11,8 +11,9 @@ namespace birefit {
 
 /// How codes follow light: `transfer:` of a micrograph.
 struct Transfer {
-  enum class Kind { linear, srgb, gamma } kind = Kind::linear;
+  enum class Kind { linear, srgb, gamma, table } kind = Kind::linear;
   double gamma = 1;
+  std::vector<double> code = {}, light = {};  ///< of a table: as many, both growing, three or more
 };
 
 /// Codes to values proportional to light, on the scale of the codes (the top code stays where it is).

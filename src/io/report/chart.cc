@@ -130,7 +130,7 @@ std::string draw_panel(const Panel& panel, const AxisScale& x, const std::vector
   const std::vector<AxisTick> y_ticks = ticks_of_y(panel, y, look, y_power);
 
   std::string out;
-  for (const Band& band : panel.bands)
+  for (const ChartBand& band : panel.bands)
     out += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{}\" height=\"{:.1f}\" fill=\"{}\"/>", left,
                        std::max(y(band.high), top), right - left,
                        std::min(y(band.low), bottom) - std::max(y(band.high), top), band.colour);

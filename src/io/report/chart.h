@@ -19,7 +19,7 @@ struct Marker {
 };
 
 /// A shaded horizontal strip behind the data.
-struct Band {
+struct ChartBand {
   double low = 0, high = 0;
   std::string colour;
 };
@@ -31,7 +31,7 @@ struct Panel {
   std::optional<std::pair<double, double>> y_range;  ///< else from the series
   std::vector<Series> series;
   std::vector<Marker> markers;
-  std::vector<Band> bands;
+  std::vector<ChartBand> bands;
 };
 
 struct Chart {
