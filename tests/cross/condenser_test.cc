@@ -276,6 +276,29 @@ TEST(CondenserLight, HasDerivatives) {
   }
 }
 
+// The transport is chosen for the steepest light, too: cells that twist about the axis, nearly along it, show along
+// it nothing of what slanted light meets. Against many steps.
+TEST(CondenserLight, StepsHoldForEveryDirection) {
+  for (const auto& [twist_deg, pretilt_deg] : {std::pair{240.0, 25.0}, {400.0, 80.0}, {1000.0, 88.0}}) {
+    CondenserScene s(550, 1.52, 1.74, 1.5);
+    Cell cell;
+    cell.thickness_um = s.fixed("thickness_um", 9);
+    TwistedDirector director;
+    director.twist_deg = s.fixed("twist_deg", twist_deg), director.azimuth_deg = s.fixed("azimuth_deg", 12);
+    director.pretilt_deg = s.fixed("pretilt_deg", pretilt_deg);
+    cell.director = director;
+    s.scene.sample = cell;
+    s.condenser(0.6);
+    const RenderPlan chosen = s.planned();
+    RenderPlan fine = chosen;
+    fine.method = "magnus6", fine.mesh.clear(), fine.steps = 400;
+    const Theta theta = s.table.values();
+    EXPECT_NEAR(render(s.scene, chosen, theta, {}, 1).intensity(0, 0),
+                render(s.scene, fine, theta, {}, 1).intensity(0, 0), s.demand.intensity_accuracy)
+        << twist_deg << " by " << chosen.method << " in " << chosen.steps;
+  }
+}
+
 // C24: an empty field between parallel polarizers is 1 for every direction.
 TEST(CondenserLight, EmptyFieldsAreBright) {
   for (const bool aplanatic : {false, true})

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "instrument/exposure.h"
 #include "medium/counting_column.h"
 #include "samples/layers/cone_view.h"
 #include "samples/layers/plan.h"
@@ -55,6 +56,19 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
     }
   } else {
     t.push_back({0.0, 0.0});
+    if (scene.microscope.condenser) {
+      // The steepest light of the condenser, on no line with another; what the medium around does not have is refused
+      // elsewhere (render/direction_plan.cc).
+      const CondenserDisc<double> disc = condenser_disc(*scene.microscope.condenser, value);
+      const double host = host_index(scene, value);
+      for (int i = 0; i < 5; ++i) {
+        const double a = 2 * kPi * (i + 0.3) / 5, x = disc.middle[0] + disc.radius * std::cos(a),
+                     y = disc.middle[1] + disc.radius * std::sin(a), square = x * x + y * y;
+        if (square >= host * host) continue;
+        const double over = 1 / std::sqrt(host * host - square);
+        t.push_back({x * over, y * over});
+      }
+    }
   }
   return t;
 }
