@@ -593,5 +593,20 @@ TEST_F(ImageFile, WritingThroughALinkKeepsTheLink) {
   EXPECT_EQ(content(path("target.txt")), "new");
 }
 
+// Found by tools/fuzz: a damaged header whose size OpenImageIO believes.
+TEST_F(ImageFile, AHeaderThatNoMemoryHoldsIsRefused) {
+  const std::vector<unsigned char> bytes = {
+      71,  73,  70,  56,  72,  78,  73,  147, 68,  82,  85,  77,  80,  89,  1,   0,   118, 0,   123, 39,  100, 101, 115,
+      99,  114, 39,  58,  32,  39,  187, 136, 166, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132,
+      132, 132, 133, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132,
+      132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 132, 63,  235, 200, 165, 215, 140, 211, 159};
+  try {
+    load_image({write_bytes("a.gif", std::string(bytes.begin(), bytes.end())), {}, "", {"c.yaml", 3, 1}});
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no memory holds"));
+  }
+}
+
 }  // namespace
 }  // namespace birefit

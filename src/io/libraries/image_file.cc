@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <new>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -554,6 +555,8 @@ LoadedImage load_image(const ImageRequest& request) {
     return load_checked(request, signature);
   } catch (const std::bad_alloc&) {
     refuse(request, "does not fit into memory", "crop it to the object, or bin it");
+  } catch (const std::length_error&) {  // of a library that believes a header
+    refuse_damaged(request, signature, " (it states a size that no memory holds)");
   }
 }
 
