@@ -18,7 +18,7 @@ constexpr int kMostRings = 80;
 
 int directions_of(int rings) { return static_cast<int>(DiscRule(rings).nodes.size()); }
 
-/// The whole condenser lies within the medium's wavevectors and, of waves or not, what is seen within the objective's.
+/// The whole condenser lies within the medium's wavevectors, and its circles are in order.
 void check_disc(const Scene& scene, const Values<double>& value, const CondenserDisc<double>& disc) {
   const double host = host_index(scene, value), reach = disc.radius + std::hypot(disc.middle[0], disc.middle[1]);
   if (reach >= host)
@@ -36,7 +36,8 @@ void check_disc(const Scene& scene, const Values<double>& value, const Condenser
 
 void note_what_is_left_out(const Scene& scene, double na, double largest_phase, RenderPlan& plan) {
   // Layers: the mean phase shift over the cone, n about 1.5. Pictures of droplets change by more, because light of
-  // every direction throws them elsewhere: by 0.8 NA of their RMS (radial ones of 9 to 20 um, methods.md).
+  // every direction throws them elsewhere: by about 0.8 NA of their RMS through an objective of 0.4
+  // (tests/data/instrument/condenser_droplet.csv, beside its own columns on the axis).
   const double shift = largest_phase * na * na / 8;
   const bool sphere = traits_of(scene).sphere_diameter_um.index >= 0;
   const double loss = std::min(0.5, std::max(0.5 * std::abs(shift), sphere ? 0.4 * na : 0.0));
@@ -64,7 +65,7 @@ void plan_directions(const Scene& scene, const Values<double>& value, ManyDirect
   const double allowed = plan.demand.intensity_accuracy;
   if (plan.wave) {
     // A whole picture a direction: as many rings as the phase asks for that a direction at the rim gains over half the
-    // sample's depth, measured on droplets of 3 to 20 um (tests/cross/condenser_test.cc).
+    // sample's depth. Held by one droplet of 4 um against the series (tests/cross/condenser_test.cc); not in the error.
     const double gained = 0.5 * wavenumber_per_um(scene, value) * disc.radius * disc.radius * plan.wave->radius_um;
     plan.condenser_rings = 2 + static_cast<int>(std::lround(0.5 * gained));
     plan.cost_seconds *= directions_of(plan.condenser_rings);
@@ -72,6 +73,13 @@ void plan_directions(const Scene& scene, const Values<double>& value, ManyDirect
                                        directions_of(plan.condenser_rings)));
     return;
   }
+  // A layer turns no light aside: what comes in beyond the objective's aperture is not seen, and is counted here.
+  if (how == ManyDirections::summed && scene.microscope.objective_na)
+    if (const double na = value(scene.microscope.objective_na); disc.radius > na)
+      plan.warnings.push_back(fmt::format(
+          "The condenser (NA {:.3g}) is wider than the objective (NA {:.3g}), which sees no light beyond its own "
+          "aperture: state the objective's for the condenser.",
+          disc.radius, na));
   const Eigen::VectorXd axis = rings(0);
   Eigen::VectorXd now = rings(1);
   const double changed = (now - axis).cwiseAbs().maxCoeff();

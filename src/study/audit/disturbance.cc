@@ -121,10 +121,12 @@ void add_instrument(const FitJob& job, std::vector<Disturbance>& all) {
     };
     all.push_back(d);
   }
-  if (each([](const Scene& scene) { return !scene.microscope.channel_light && !scene.microscope.bandwidth_nm; })) {
+  if (each([](const Scene& scene) {
+        return !scene.microscope.channel_light && !scene.microscope.bandwidth_nm &&
+               !std::holds_alternative<Crystal>(scene.sample);  // its half-wave voltage is of one wavelength
+      })) {
     Disturbance d{"colour channel", "even light of so many wavelengths for one, full width", "nm", {20, 50, 90}};
     d.added = [](Exposure& e, Scene& scene, Theta& theta) {
-      if (std::holds_alternative<Crystal>(scene.sample)) return;  // its half-wave voltage is of one wavelength
       scene.microscope.bandwidth_nm = new_number(theta, e.size);
     };
     all.push_back(d);
