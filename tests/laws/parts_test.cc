@@ -321,8 +321,19 @@ TEST_F(Parts, DerivativesByWhatPartsHave) {
     const Retarder first = retarder(kind, draw(-170, 170), draw(0, 180)),
                    second = retarder(kind, draw(-170, 170), draw(0, 180));
     const Rotator rotator{kind.number("angle", draw(-60, 60))};
-    m.before = {first, rotator}, m.behind = {second};
-    const std::vector<int> active{m.polarizer_deg.index,
+    Retarder quartz;
+    quartz.retardance_nm = kind.number("retardance", draw(50, 900)), quartz.azimuth_deg = azimuth(kind, draw(0, 180));
+    quartz.crystal = PlateCrystal::quartz;
+    TiltedPlate berek;
+    berek.thickness_um = kind.number("plate", 70), berek.tilt_deg = kind.number("tilt", draw(5, 20));
+    berek.azimuth_deg = azimuth(kind, draw(0, 180)), berek.crystal = PlateCrystal::calcite;
+    m.before = {first, rotator, berek}, m.behind = {second, quartz};
+    const std::vector<int> active{berek.thickness_um.index,
+                                  berek.tilt_deg.index,
+                                  berek.azimuth_deg.index,
+                                  quartz.retardance_nm.index,
+                                  quartz.azimuth_deg.index,
+                                  m.polarizer_deg.index,
                                   m.analyzer_deg.index,
                                   m.polarizer_extinction_ratio.index,
                                   m.analyzer_extinction_ratio.index,
