@@ -19,6 +19,8 @@ namespace {
 
 /// Of a grid, or places spread over the box of all axes: pictures of cells without a field cost microseconds.
 constexpr std::size_t kMostPlaces = 3000, kMostPlacesOfCells = 6000;
+/// Of places spread over the box, for every start that is wanted of them: who asks for one start states good ones.
+constexpr std::size_t kPlacesOfAStart = 250;
 constexpr int kMostPointsPerAxis = 400;
 /// Fewer points than this could step over the valley of a parameter that also moves an edge.
 constexpr int kFewestPointsOfFringes = 7, kFewestPoints = 3;
@@ -388,9 +390,10 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
   if (product > 0) task.say("scanning for the fringe order");
   Places starts;
   Survey survey(problem, task, axes, start, result);
+  const std::size_t wanted = static_cast<std::size_t>(candidates);
   if (product > 0)
     starts = product <= most ? survey.minima_of_grid(cheap ? kBesideMinima : 0)
-                             : survey.best_of_box(most, 4 * kMostBatches * static_cast<std::size_t>(candidates));
+                             : survey.best_of_box(std::min(most, kPlacesOfAStart * wanted), 4 * kMostBatches * wanted);
   const Effort effort = effort_of(problem, result.points, candidates);
   const SameMinimum near_by = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
     return !axes.empty() && near(axes, a, b);
