@@ -24,8 +24,8 @@ DiscRule::DiscRule(int rings) {
     }
 }
 
-Exposure condenser_exposure(const Microscope& microscope, const Values<double>& value, int rings) {
-  const CondenserDisc<double> disc = condenser_disc(*microscope.condenser, value);
+Exposure condenser_exposure(const Microscope& microscope, const Values<double>& value, int rings, bool waves) {
+  const CondenserDisc<double> disc = condenser_disc(microscope, value, waves);
   Exposure exposure;
   for (const DiscRule::Node& node : DiscRule(rings).nodes) {
     exposure.directions.emplace_back(microscope, Direction{}, DiscRule::kappa(node, disc));
@@ -34,20 +34,21 @@ Exposure condenser_exposure(const Microscope& microscope, const Values<double>& 
   return exposure;
 }
 
-bool moves_condenser(const Microscope& microscope, int index, bool held) {
-  if (!microscope.condenser) return false;
+MovesCondenser moves_condenser(const Microscope& microscope, int index, bool waves) {
+  if (!microscope.condenser) return MovesCondenser::no;
   const Condenser& c = *microscope.condenser;
   const auto is = [&](const ParameterRef& ref) { return ref && ref.index == index; };
-  return is(c.na) || is(c.inner_na) || is(c.tilt_deg) || is(c.tilt_azimuth_deg) ||
-         (held && is(microscope.wavelength_nm));
+  if (is(c.na) || is(c.inner_na) || is(c.tilt_deg) || is(c.tilt_azimuth_deg)) return MovesCondenser::alone;
+  const bool beside = is(waves ? microscope.wavelength_nm : microscope.objective_na);
+  return beside ? MovesCondenser::partly : MovesCondenser::no;
 }
 
-CondenserSlope condenser_slope(const Microscope& microscope, const Theta& theta, int rings, int index, bool held) {
+CondenserSlope condenser_slope(const Microscope& microscope, const Theta& theta, int rings, int index, bool waves) {
   const Values<Dual<double, 1>> value(theta, {index}, nullptr);
-  const CondenserDisc<Dual<double, 1>> disc = condenser_disc(*microscope.condenser, value);
+  const CondenserDisc<Dual<double, 1>> disc = condenser_disc(microscope, value, waves);
   double radius_by = disc.radius.d[0], inner_by = disc.inner_radius.d[0],
          middle_by[2] = {disc.middle[0].d[0], disc.middle[1].d[0]};
-  if (held && microscope.wavelength_nm.index == index) {
+  if (waves && microscope.wavelength_nm.index == index) {
     const double by = -1 / microscope.wavelength_nm.in(theta);  // all wavevectors shrink together
     radius_by += by * disc.radius.value, inner_by += by * disc.inner_radius.value;
     for (std::size_t a = 0; a < 2; ++a) middle_by[a] += by * disc.middle[a].value;

@@ -77,14 +77,19 @@ struct CondenserDisc {
   S radius, inner_radius;
   std::array<S, 2> middle;
 };
-/// Of a microscope that has one.
+/// Of a microscope that has one. `waves`: all of its light; the pupil decides what of it is seen. Else of layers, which
+/// turn no light aside: where both lie about the axis, the part that the objective's aperture takes in.
 template <class S>
-CondenserDisc<S> condenser_disc(const Condenser& condenser, const Values<S>& value) {
+CondenserDisc<S> condenser_disc(const Microscope& microscope, const Values<S>& value, bool waves) {
+  const Condenser& condenser = *microscope.condenser;
   const S tilt = value.radians(condenser.tilt_deg), azimuth = value.radians(condenser.tilt_azimuth_deg);
   S sine, unused, across, along;
   sin_cos(tilt, sine, unused);
   sin_cos(azimuth, across, along);
-  return {value(condenser.na), value.get(condenser.inner_na, 0.0), {sine * along, sine * across}};
+  CondenserDisc<S> disc{value(condenser.na), value.get(condenser.inner_na, 0.0), {sine * along, sine * across}};
+  if (!waves && microscope.objective_na)
+    disc.radius = select(plain(sine) == 0, min_of(disc.radius, value(microscope.objective_na)), disc.radius);
+  return disc;
 }
 
 /// Places in the unit circle and their weights, which sum to 1: `rings` Gauss radii by the radius squared, each of
@@ -105,8 +110,8 @@ struct DiscRule {
     return {disc.middle[0] + n.cos_azimuth * r, disc.middle[1] + n.sin_azimuth * r};
   }
 };
-/// The condenser's directions at these values.
-Exposure condenser_exposure(const Microscope&, const Values<double>&, int rings);
+/// The condenser's directions at these values; `waves` as of condenser_disc().
+Exposure condenser_exposure(const Microscope&, const Values<double>&, int rings, bool waves);
 
 /// What the picture of a condenser changes by with its circles, from the light of the directions on them: the
 /// derivative of the mean by parameter `index` is the sum of weight times the picture of each direction, plus `of_mean`
@@ -115,10 +120,11 @@ struct CondenserSlope {
   Exposure on_circles;
   double of_mean = 0;
 };
-/// `held`: of a picture whose transverse wavevectors, not their ratio to k0, stay as they are when the wavelength
-/// changes: the derivative by the wavelength that this leaves out.
-CondenserSlope condenser_slope(const Microscope&, const Theta&, int rings, int index, bool held);
-/// Whether a derivative by it is (partly) condenser_slope's.
-bool moves_condenser(const Microscope&, int index, bool held);
+/// `waves` as of condenser_disc(); of a propagated picture the transverse wavevectors, not their ratio to k0, stay as
+/// they are when the wavelength changes: the derivative by the wavelength that this leaves out, too.
+CondenserSlope condenser_slope(const Microscope&, const Theta&, int rings, int index, bool waves);
+/// How a derivative by it is condenser_slope's: not at all, beside the pictures' own, or altogether.
+enum class MovesCondenser { no, partly, alone };
+MovesCondenser moves_condenser(const Microscope&, int index, bool waves);
 
 }  // namespace birefit

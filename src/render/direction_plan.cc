@@ -34,6 +34,22 @@ void check_disc(const Scene& scene, const Values<double>& value, const Condenser
         "microscope.condenser: directions lie between the two");
 }
 
+/// What layers under a condenser show is what both lenses take in.
+void note_objective(double na, const CondenserDisc<double>& disc, RenderPlan& plan) {
+  const double off_axis = std::hypot(disc.middle[0], disc.middle[1]);
+  if (disc.inner_radius >= na || off_axis - disc.radius >= na)
+    throw UserError(Where{},
+                    fmt::format("the objective (NA {:.3g}) takes in none of the condenser's light, and a layer turns "
+                                "none aside",
+                                na),
+                    "check microscope.objective_na and microscope.condenser");
+  if (off_axis > 0 && off_axis + disc.radius > na)
+    plan.warnings.push_back(
+        fmt::format("The tilted condenser reaches a numerical aperture of {:.3g}, the objective {:.3g}: what lies "
+                    "beyond is counted here, and not seen.",
+                    off_axis + disc.radius, na));
+}
+
 void note_what_is_left_out(const Scene& scene, double na, double largest_phase, RenderPlan& plan) {
   // Layers: the mean phase shift over the cone, n about 1.5. Pictures of droplets change by more, because light of
   // every direction throws them elsewhere: by about 0.8 NA of their RMS through an objective of 0.4
@@ -55,8 +71,10 @@ void plan_directions(const Scene& scene, const Values<double>& value, ManyDirect
   if (!scene.microscope.condenser) return;
   if (how == ManyDirections::never)
     return note_what_is_left_out(scene, value(scene.microscope.condenser->na), largest_phase, plan);
-  const CondenserDisc<double> disc = condenser_disc(*scene.microscope.condenser, value);
-  check_disc(scene, value, disc);
+  // All of it must exist in the medium, whatever the objective takes in.
+  check_disc(scene, value, condenser_disc(scene.microscope, value, true));
+  const bool layers = how == ManyDirections::summed && !plan.wave;
+  const CondenserDisc<double> disc = condenser_disc(scene.microscope, value, !layers);
   const auto rings = [&](int n) {
     RenderPlan trial = plan;
     trial.condenser_rings = n;
@@ -73,13 +91,7 @@ void plan_directions(const Scene& scene, const Values<double>& value, ManyDirect
                                        directions_of(plan.condenser_rings)));
     return;
   }
-  // A layer turns no light aside: what comes in beyond the objective's aperture is not seen, and is counted here.
-  if (how == ManyDirections::summed && scene.microscope.objective_na)
-    if (const double na = value(scene.microscope.objective_na); disc.radius > na)
-      plan.warnings.push_back(fmt::format(
-          "The condenser (NA {:.3g}) is wider than the objective (NA {:.3g}), which sees no light beyond its own "
-          "aperture: state the objective's for the condenser.",
-          disc.radius, na));
+  if (layers && scene.microscope.objective_na) note_objective(value(scene.microscope.objective_na), disc, plan);
   const Eigen::VectorXd axis = rings(0);
   Eigen::VectorXd now = rings(1);
   const double changed = (now - axis).cwiseAbs().maxCoeff();

@@ -71,15 +71,15 @@ inline void add_slope(PixelRendering& sum, std::size_t j, double share, const Pi
 }
 
 /// of_one(light, active, result) for the condenser's directions, and their sum with its derivatives by the condenser.
-/// `held` as of condenser_slope().
+/// `waves` as of condenser_disc().
 template <class Result, class OfOne>
 void sum_over_condenser(const Microscope& microscope, const Theta& theta, int rings, const std::vector<int>& active,
-                        bool held, Result& into, const OfOne& of_one) {
-  const Exposure exposure = condenser_exposure(microscope, Values<double>(theta, {}, nullptr), rings);
+                        bool waves, Result& into, const OfOne& of_one) {
+  const Exposure exposure = condenser_exposure(microscope, Values<double>(theta, {}, nullptr), rings, waves);
   std::vector<int> of_scene;
   std::vector<std::size_t> place;  // of which `active` they are
   for (std::size_t j = 0; j < active.size(); ++j)
-    if (!moves_condenser(microscope, active[j], false)) {
+    if (moves_condenser(microscope, active[j], waves) != MovesCondenser::alone) {
       of_scene.push_back(active[j]);
       place.push_back(j);
     }
@@ -89,8 +89,8 @@ void sum_over_condenser(const Microscope& microscope, const Theta& theta, int ri
   add_intensity(into, 1, mean);
   for (std::size_t i = 0; i < place.size(); ++i) add_derivative(into, place[i], 1, mean, i);
   for (std::size_t j = 0; j < active.size(); ++j) {
-    if (!moves_condenser(microscope, active[j], held)) continue;
-    const CondenserSlope slope = condenser_slope(microscope, theta, rings, active[j], held);
+    if (moves_condenser(microscope, active[j], waves) == MovesCondenser::no) continue;
+    const CondenserSlope slope = condenser_slope(microscope, theta, rings, active[j], waves);
     add_slope(into, j, slope.of_mean, mean);
     Result part;
     for (std::size_t k = 0; k < slope.on_circles.directions.size(); ++k) {

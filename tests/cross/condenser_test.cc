@@ -278,6 +278,30 @@ TEST(CondenserLight, HasDerivatives) {
 
 // The transport is chosen for the steepest light, too: cells that twist about the axis, nearly along it, show along
 // it nothing of what slanted light meets. Against many steps.
+TEST(CondenserLight, LayersShowWhatBothLensesTakeIn) {
+  CondenserScene wide(590, 1.52, 1.68, 1.5), same(590, 1.52, 1.68, 1.5);
+  wide.plate(8, 50, 30), same.plate(8, 50, 30);
+  wide.demand.intensity_accuracy = same.demand.intensity_accuracy = 1e-7;
+  Condenser& condenser = wide.condenser(0.6);
+  wide.scene.microscope.objective_na = wide.fixed("objective_na", 0.3);
+  const ParameterRef as_wide = same.condenser(0.3).na;
+  const Theta theta = wide.table.values(), theta_same = same.table.values();
+  const RenderPlan chosen = plan(wide.scene, wide.demand, theta),
+                   chosen_same = plan(same.scene, same.demand, theta_same);
+  EXPECT_TRUE(chosen.warnings.empty());
+  const Rendering seen =
+      render(wide.scene, chosen, theta, {wide.scene.microscope.objective_na.index, condenser.na.index}, 1);
+  const Rendering as_one = render(same.scene, chosen_same, theta_same, {as_wide.index}, 1);
+  EXPECT_DOUBLE_EQ(seen.intensity(0, 0), as_one.intensity(0, 0));
+  EXPECT_NEAR(seen.derivatives[0](0, 0), as_one.derivatives[0](0, 0), 1e-14);  // a mean and its slope, rounded
+  EXPECT_NE(seen.derivatives[0](0, 0), 0);
+  EXPECT_EQ(seen.derivatives[1](0, 0), 0);
+
+  // A dark field: an annulus beyond the objective.
+  condenser.inner_na = wide.fixed("inner_na", 0.4);
+  EXPECT_THROW(plan(wide.scene, wide.demand, wide.table.values()), UserError);
+}
+
 TEST(CondenserLight, StepsHoldForEveryDirection) {
   for (const auto& [twist_deg, pretilt_deg] : {std::pair{240.0, 25.0}, {400.0, 80.0}, {1000.0, 88.0}}) {
     CondenserScene s(550, 1.52, 1.74, 1.5);

@@ -89,6 +89,52 @@ std::shared_ptr<const SpectralTable> tilted(const SpectralTable& table) {
   return other;
 }
 
+/// The same pixels fitted by straight and by curved rays from where the straight ones' optimum is.
+struct CurvedRays {
+  Eigen::VectorXd change;  ///< of all unknowns, from straight rays to curved ones
+  double ratio = 0;        ///< of the objective by curved rays to that by straight ones
+  double worse = 0;        ///< by so much, all pixels counted
+};
+CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& optimum, std::size_t most_pixels,
+                    int steps) {
+  std::vector<RenderPlan> plans, straight_plans;
+  std::vector<PixelSet> sets;
+  // Of large images a part tells it, fitted both ways: what its noise does to a fit, it does to both.
+  std::size_t all = 0, used = 0;
+  for (const Frame& frame : optimum.frames) all += frame.pixels.size();
+  const bool part = all > most_pixels;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
+    plans.push_back(curved_task.planned(g, optimum.theta));
+    straight_plans.push_back(frame.plan);
+    const Pixels pixels =
+        part ? subsample(frame.pixels, std::max<std::size_t>(50, most_pixels * frame.pixels.size() / all))
+             : frame.pixels;
+    used += pixels.size();
+    sets.push_back(pixel_set(task.picture(g), frame.sigma, pixels));
+  }
+  SolveOptions few = few_steps(task, steps);
+  double straight_objective = optimum.problem->objective();
+  // To a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search for more
+  // would follow.
+  few.function_tolerance = 0.1 / std::max(straight_objective, 1.0);
+  Theta straight = optimum.theta;
+  if (part) {
+    LeastSquares problem(task, std::move(straight_plans), sets);
+    problem.set_misfit(optimum.problem->misfit());
+    Eigen::VectorXd searched = optimum.searched;
+    problem.solve(searched, few);
+    straight_objective = problem.objective();
+    straight = problem.theta();
+  }
+  LeastSquares problem(curved_task, std::move(plans), std::move(sets));
+  problem.set_misfit(optimum.problem->misfit());
+  Eigen::VectorXd searched = optimum.searched;
+  problem.solve(searched, few);
+  return {change_of_unknowns(task, straight, problem.theta()), problem.objective() / straight_objective,
+          (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used)};
+}
+
 }  // namespace
 
 void measure_propagation(const Task& task, const Optimum& optimum, LeftOut& left_out) {
@@ -143,47 +189,18 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
   FitJob curved = task.job;
   curved.demand.rays = Rays::eikonal;
   const Task curved_task(curved);
-  std::vector<RenderPlan> plans, straight_plans;
-  std::vector<PixelSet> sets;
-  // Of large images a part tells it, fitted both ways: what its noise does to a fit, it does to both.
-  constexpr std::size_t kPixels = 1 << 17;
-  std::size_t all = 0, used = 0;
+  const double reduced = std::max(1.0, optimum.reduced_chi_square(task));
+  // Few pixels tell that curved rays do not describe the image at all; by how much they would shift what they describe
+  // as well takes all of them.
+  constexpr double kWorse = 9, kTimesWorse = 20;
+  constexpr std::size_t kFewPixels = 1 << 12, kPixels = 1 << 17;
+  constexpr int kFewSteps = 3, kSteps = 12;
+  std::size_t all = 0;
   for (const Frame& frame : optimum.frames) all += frame.pixels.size();
-  const bool part = all > kPixels;
-  for (int g = 0; g < task.frames(); ++g) {
-    const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
-    plans.push_back(curved_task.planned(g, optimum.theta));
-    straight_plans.push_back(frame.plan);
-    const Pixels pixels =
-        part ? subsample(frame.pixels, std::max<std::size_t>(50, kPixels * frame.pixels.size() / all)) : frame.pixels;
-    used += pixels.size();
-    sets.push_back(pixel_set(task.picture(g), frame.sigma, pixels));
-  }
-  SolveOptions few = few_steps(task, 12);
-  double straight_objective = optimum.problem->objective();
-  // To a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search for more
-  // would follow.
-  few.function_tolerance = 0.1 / std::max(straight_objective, 1.0);
-  Theta straight = optimum.theta;
-  if (part) {
-    LeastSquares problem(task, std::move(straight_plans), sets);
-    problem.set_misfit(optimum.problem->misfit());
-    Eigen::VectorXd searched = optimum.searched;
-    problem.solve(searched, few);
-    straight_objective = problem.objective();
-    straight = problem.theta();
-  }
-  LeastSquares problem(curved_task, std::move(plans), std::move(sets));
-  problem.set_misfit(optimum.problem->misfit());
-  Eigen::VectorXd searched = optimum.searched;
-  problem.solve(searched, few);
-  const Eigen::VectorXd change = change_of_unknowns(task, straight, problem.theta());
-  const Shift shift = largest_shift(task, change, sd);
-  const double ratio = problem.objective() / straight_objective,
-               reduced = std::max(1.0, optimum.reduced_chi_square(task));
-  const double worse =
-      (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used);
-  left_out.change_by_curved_rays = worse < 9 * reduced ? shift.standard_errors : 0;
+  if (all > 2 * kFewPixels && compared(task, curved_task, optimum, kFewPixels, kFewSteps).ratio > kTimesWorse) return;
+  const CurvedRays rays = compared(task, curved_task, optimum, kPixels, kSteps);
+  const Shift shift = largest_shift(task, rays.change, sd);
+  left_out.change_by_curved_rays = rays.worse < kWorse * reduced ? shift.standard_errors : 0;
   if (left_out.change_by_curved_rays < 1) return;
   const double value = optimum.theta[static_cast<std::size_t>(shift.index)];
   left_out.warnings.push_back(
@@ -191,8 +208,8 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
                   "({:+.2g} %, {:.3g} standard errors), with a chi-square {:.3g} times this one. "
                   "The error bars contain this as the error of the model.",
                   task.job.parameters[shift.index].name, value + shift.change, 100 * shift.change / value,
-                  left_out.change_by_curved_rays, ratio));
-  left_out.by_curved_rays = change;
+                  left_out.change_by_curved_rays, rays.ratio));
+  left_out.by_curved_rays = rays.change;
 }
 
 void foretell_waves(const Task& task, const Optimum& optimum, const Eigen::VectorXd& sd, LeftOut& left_out) {

@@ -59,7 +59,7 @@ std::vector<std::pair<double, double>> pilot_directions(const Scene& scene, cons
     if (scene.microscope.condenser) {
       // The steepest light of the condenser, on no line with another; what the medium around does not have is refused
       // elsewhere (render/direction_plan.cc).
-      const CondenserDisc<double> disc = condenser_disc(*scene.microscope.condenser, value);
+      const CondenserDisc<double> disc = condenser_disc(scene.microscope, value, false);
       const double host = host_index(scene, value);
       for (int i = 0; i < 5; ++i) {
         const double a = 2 * kPi * (i + 0.3) / 5, x = disc.middle[0] + disc.radius * std::cos(a),

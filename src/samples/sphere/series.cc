@@ -65,7 +65,7 @@ class SeriesImage final : public SampleImage<S> {
         view_(scene, value, light_),
         rings_(plan.condenser_rings) {
     if (rings_ > 0) {
-      const CondenserDisc<S> disc = condenser_disc(*scene.microscope.condenser, value);
+      const CondenserDisc<S> disc = condenser_disc(scene.microscope, value, true);
       const auto single = [](const S& x) { return SingleOf<S>::of(x); };
       condenser_ = {single(disc.radius), single(disc.inner_radius), {Single(0.0), Single(0.0)}};
     }
