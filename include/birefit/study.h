@@ -64,8 +64,23 @@ std::vector<WavePoint> measure_waves(bool quick, const std::function<void(const 
 /// `quick`: fewer efforts and no frames (seconds instead of a minute). `say` is told what is being measured.
 MethodChart measure_chart(bool quick, const std::function<void(const std::string&)>& say = {});
 
+/// A picture in white light (illuminant E, the CIE's observer of 1931) by one way to sum over the wavelengths; errors
+/// are the worst of all pixels and of X, Y and Z, as fractions of white, against as many wavelengths as spectra and
+/// fringes have detail. Of "echoes ..": a line of light through a layer, by [S4]'s M double reflections.
+struct SpectrumPoint {
+  std::string scene;
+  std::string rule;     ///< "Gauss", "even in 1/wavelength", "even in wavelength", "planned", "closed form", "M"
+  std::string effort;   ///< "n=12" wavelengths, "20 nm" apart, "1e-4" asked for, "M=1"
+  int wavelengths = 0;  ///< 0: of a closed form
+  double seconds = 0;   ///< a pixel, all three colours
+  double error = 0, delta_e = 0;  ///< delta_e: CIEDE2000 against E's white, of the pixel where it is largest
+};
+/// Every rule on a plate, two twisted cells and a droplet, and the echoes; arguments as of measure_chart().
+std::vector<SpectrumPoint> measure_spectra(bool quick, const std::function<void(const std::string&)>& say = {});
+
 /// One method asked for 1e-6 (wei_norman: 1e-3) at one place of a sweep into a trap; in the sweeps of polarizers a
-/// planned picture asked for 1e-4; in the sweeps that begin with "wave_" the picture of a sphere by wave optics.
+/// planned picture asked for 1e-4, in those that begin with "light_" one in light that is no line; in the sweeps that
+/// begin with "wave_" the picture of a sphere by wave optics.
 struct StressPoint {
   std::string sweep;
   double value = 0;

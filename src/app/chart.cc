@@ -281,6 +281,78 @@ Sheet waves_sheet(const std::vector<WavePoint>& points) {
   return sheet;
 }
 
+std::string spectra_csv(const std::vector<SpectrumPoint>& points) {
+  std::string text = "scene,rule,effort,wavelengths,seconds_per_pixel,error,delta_e\n";
+  for (const SpectrumPoint& p : points)
+    text += fmt::format("\"{}\",{},{},{},{},{},{}\n", p.scene, p.rule, p.effort, p.wavelengths, csv_number(p.seconds),
+                        csv_number(p.error), csv_number(p.delta_e));
+  return text;
+}
+
+constexpr const char* kRules[] = {"Gauss", "even in 1/wavelength", "even in wavelength", "planned", "closed form"};
+constexpr const char* kRuleColours[] = {"#0072B2", "#56B4E9", "#D55E00", "#000000", "#009E73"};
+
+/// "1.43/40 nm" of "echoes in 1.43, 40 nm".
+std::string short_name(std::string echoes) {
+  echoes.erase(0, std::string_view("echoes in ").size());
+  return echoes.replace(echoes.find(", "), 2, "/");
+}
+
+/// A pixel's time against its error, a panel for every sample, and what [S4]'s double reflections leave out.
+Sheet spectra_sheet(const std::vector<SpectrumPoint>& points) {
+  Sheet sheet;
+  sheet.title =
+      "white light: time of a pixel against the error of its colour; echoes: error against double reflections";
+  sheet.columns = 3;
+  for (std::size_t r = 0; r < std::size(kRules); ++r)
+    sheet.legend.push_back(line_with_dots(kRules[r], kRuleColours[r]));
+  std::vector<std::string> scenes, echoes;
+  for (const SpectrumPoint& p : points)
+    if (std::vector<std::string>& list = p.rule == "M" ? echoes : scenes; list.empty() || list.back() != p.scene)
+      list.push_back(p.scene);
+  constexpr double kLeast = 1e-11;
+  for (const std::string& scene : scenes) {
+    Panel panel;
+    panel.y_label = "\u00b5s a pixel, three colours";
+    panel.height = 260;
+    panel.log_y = true;
+    for (std::size_t r = 0; r < std::size(kRules); ++r) {
+      Series series = line_with_dots("", kRuleColours[r]);
+      for (const SpectrumPoint& p : points)
+        if (p.scene == scene && p.rule == kRules[r])
+          series.x.push_back(std::max(p.error, kLeast)), series.y.push_back(1e6 * p.seconds);
+      if (!series.x.empty()) panel.series.push_back(std::move(series));
+    }
+    Chart chart;
+    chart.title = chart.heading = scene;
+    chart.x_label = "worst error of X, Y, Z (share of white)";
+    chart.log_x = true;
+    chart.x_range = {0.5 * kLeast, 1};
+    chart.width = 400;
+    chart.panels = {std::move(panel)};
+    sheet.charts.push_back(std::move(chart));
+  }
+  Panel panel;
+  panel.y_label = "error of the intensity";
+  panel.height = 260;
+  panel.log_y = true;
+  panel.y_range = {1e-13, 1};
+  for (std::size_t k = 0; k < echoes.size(); ++k) {
+    Series series = line_with_dots(short_name(echoes[k]), kColours[4 + k % 6]);
+    for (const SpectrumPoint& p : points)
+      if (p.scene == echoes[k])
+        series.x.push_back(static_cast<double>(series.x.size())), series.y.push_back(std::max(p.error, 1e-13));
+    panel.series.push_back(std::move(series));
+  }
+  Chart chart;
+  chart.title = chart.heading = "a layer in media 1.43 and 1, lines of light";
+  chart.x_label = "double reflections that are kept";
+  chart.width = 400;
+  chart.panels = {std::move(panel)};
+  sheet.charts.push_back(std::move(chart));
+  return sheet;
+}
+
 int run_chart(const Arguments& arguments) {
   const std::filesystem::path out = arguments.out;
   make_folder(arguments.out);
@@ -293,6 +365,11 @@ int run_chart(const Arguments& arguments) {
   if (!chart.frames.empty()) write_file((out / "frames.csv").string(), frames_csv(chart));
   write_file(out / "chart.svg", svg_file(rays_sheet(chart)));
   if (!chart.frames.empty()) write_file(out / "frames.svg", svg_file(frames_sheet(chart)));
+  const std::vector<SpectrumPoint> spectra = measure_spectra(arguments.quick, [&](const std::string& what) {
+    if (!arguments.quiet) std::cerr << "measuring " << what << "\n";
+  });
+  write_file((out / "spectra.csv").string(), spectra_csv(spectra));
+  write_file(out / "spectra.svg", svg_file(spectra_sheet(spectra)));
   const std::vector<WavePoint> waves = measure_waves(arguments.quick, [&](const std::string& what) {
     if (!arguments.quiet) std::cerr << "measuring " << what << "\n";
   });
@@ -310,8 +387,8 @@ Command add_chart_command(CLI::App& app) {
       "chart", "speed against accuracy of every transport method, measured here: tables and pictures");
   command
       ->add_option("--out", arguments->out,
-                   "folder for chart.csv, scenes.csv, frames.csv, waves.csv, summary.md (the tables that methods.md "
-                   "quotes) and the SVGs")
+                   "folder for chart.csv, scenes.csv, frames.csv, spectra.csv, waves.csv, summary.md (the tables that "
+                   "methods.md quotes) and the SVGs")
       ->capture_default_str();
   command->add_flag("--quick", arguments->quick, "fewer efforts, no frames");
   command->add_flag("-q,--quiet", arguments->quiet, "say nothing");

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -14,6 +16,8 @@ namespace {
 
 /// Standard deviations from the middle of a Gaussian line between the ends of its band.
 constexpr double kEndsOfLine = 3.09;
+/// Gauss nodes grow dear with their number, and beyond some dozens equal steps are as good (methods.md, "Spectrum").
+constexpr int kMostGauss = 60;
 
 /// Twice as many wavelengths until the means over a few pixels change no more, twice: echoes between the faces of a
 /// layer go by longer ways than its retardance, and of two rules that are too coarse for them one may agree with the
@@ -21,8 +25,6 @@ constexpr double kEndsOfLine = 3.09;
 void settle_on_means(const Scene& scene, const Theta& theta, const LightProbe& probe, RenderPlan& plan) {
   constexpr int kMost = 4000;
   const double allowed = 0.25 * plan.demand.intensity_accuracy;
-  // Gauss nodes grow dear with their number, and beyond some dozens equal steps are as good (methods.md, "Spectrum").
-  constexpr int kMostGauss = 60;
   const auto rule = [&](int n) {
     return wavelength_rule(scene.microscope, theta, n > kMostGauss ? 0 : plan.wavelengths->reach_um, n);
   };
@@ -40,6 +42,50 @@ void settle_on_means(const Scene& scene, const Theta& theta, const LightProbe& p
   }
   plan.wavelengths = settled;
   if (change > allowed) plan.numerical_error += change;
+}
+
+/// A phase that goes evenly with 1/wavelength between the band's ends, as far as it does there.
+struct EvenPhase {
+  double low_um, high_um, at_low, at_high;
+  double operator()(double um) const {
+    return at_low + (at_high - at_low) * (1 / um - 1 / low_um) / (1 / high_um - 1 / low_um);
+  }
+};
+
+/// What the rule makes of fringes as fast as the scene's, and slower ones, against every detail of the light: the
+/// largest error.
+double error_of_fringes(const SpectralSum& fine, const WavelengthRule& rule, const EvenPhase& phase) {
+  const auto mean = [&](double share, const auto& wavelength_um, const std::vector<double>& weight, double unit) {
+    std::complex<double> sum;
+    for (std::size_t k = 0; k < weight.size(); ++k)
+      sum += weight[k] * std::polar(1.0, share * phase(unit * wavelength_um[k]));
+    return sum;
+  };
+  double worst = 0;
+  for (const double share : {1.0, 0.8, 0.6, 0.4, 0.2})
+    worst = std::max(worst, std::abs(mean(share, rule.wavelength_nm, rule.weight, 1e-3) -
+                                     mean(share, fine.wavelength_um, fine.weight.front(), 1)));
+  return worst;
+}
+
+/// The rule of n wavelengths, or of more, the first that holds fringes as fast as the scene's: the counts that n is
+/// planned by are of lamps and cameras, whose nodes lie closest where a Gaussian filter's lie farthest apart.
+void settle_on_fringes(const Microscope& m, const Theta& theta, double finest_um, int n, bool even,
+                       const EvenPhase& phase, double allowed, RenderPlan& plan) {
+  // Equal steps err by the kinks of tables, too: Gauss nodes follow where those ask for more than dozens.
+  constexpr int kMost = 1500, kMostOfKinks = 200;
+  const SpectralSum fine = channel_of(m, theta).fine(finest_um);
+  double left = std::numeric_limits<double>::infinity();
+  const auto look_at = [&](double reach_um, int count) {
+    const auto rule = wavelength_rule(m, theta, reach_um, count);
+    if (const double error = error_of_fringes(fine, *rule, phase); !plan.wavelengths || error < left)
+      plan.wavelengths = rule, left = error;
+  };
+  for (; left > allowed && n < kMost; n += 1 + n / 4) {
+    if (even || n > kMostGauss) look_at(0, n);
+    if (!even && left > allowed && n <= kMostOfKinks) look_at(finest_um, n);
+  }
+  plan.numerical_error += std::max(left, allowed);
 }
 
 }  // namespace
@@ -79,22 +125,21 @@ void plan_wavelengths(const Scene& scene, const Theta& theta, const LightBand& b
   }
   // Polynomials as high as the nodes need are integrated by a sum as fine as the fringes are.
   constexpr double kReachUm = 20;
-  double reach_um = std::max(kReachUm, 1.5 * short_end * band.low_um / (2 * std::numbers::pi));
+  const double finest_um = std::max(kReachUm, 1.5 * short_end * band.low_um / (2 * std::numbers::pi));
   const double share = 0.5 * plan.demand.intensity_accuracy;  // of the error, for the sum
   int nodes = gauss_nodes(cycles, share);
+  bool even = false;
   if (band.narrow) {
     // The nodes of a Gaussian lie the farther apart the fewer they are, and equal steps do with fewer where many
     // fringes are to be lost: over the line's foot of 17 deviations, wider in 1/wavelength by 1.4 at most, as near as
     // the fringes and a tail of 1e-5 ask.
     constexpr double kFewDeviations = 6, kFoot = 17 * 1.4, kTail = 0.76;
-    const bool even = deviation > kFewDeviations;
+    even = deviation > kFewDeviations;
     nodes = even ? static_cast<int>(std::ceil(kFoot * (deviation / (2 * std::numbers::pi) + kTail)))
                  : line_nodes(deviation) + 3;
-    if (even) reach_um = 0;
   }
-  plan.wavelengths = wavelength_rule(m, theta, reach_um, nodes);
+  settle_on_fringes(m, theta, finest_um, nodes, even, {band.low_um, band.high_um, short_end, long_end}, share, plan);
   if (plan.demand.ceiling == Ceiling::reflections) settle_on_means(scene, theta, probe, plan);
-  plan.numerical_error += share;
   plan.cost_seconds *= static_cast<double>(plan.wavelengths->size());
   plan.reasons.push_back(fmt::format(
       "the light reaches from {:.0f} to {:.0f} nm, over which the largest retardance goes through {:.2g} fringes: the "

@@ -1,7 +1,6 @@
 #include "birefit/study.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +9,7 @@
 #include "birefit/render.h"
 #include "study/frames.h"
 #include "study/rays.h"
+#include "study/timing.h"
 #include "transport/methods.h"
 #include "transport/methods/ode_operator.h"
 #include "transport/methods/ode_scalar.h"
@@ -42,29 +42,6 @@ M first_lane(const Mat2<Dual1>& m, bool derivative) {
                       : Complex<double>{lane(c.re.value, 0), lane(c.im.value, 0)};
   };
   return {z(m.a), z(m.b), z(m.c), z(m.d)};
-}
-
-/// Seconds of one call: the best of a few timings that each last long enough for the clock.
-template <class Work>
-double seconds_of(const Work& work) {
-  using Clock = std::chrono::steady_clock;
-  double best = std::numeric_limits<double>::infinity();
-  int calls = 1;
-  for (int timing = 0; timing < 5; ++timing) {
-    for (;;) {
-      const auto start = Clock::now();
-      for (int i = 0; i < calls; ++i) work();
-      const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-      if (seconds < 1e-3) {
-        calls *= 4;
-        continue;
-      }
-      best = std::min(best, seconds / calls);
-      if (seconds > 0.2) return best;  // slow enough for one timing
-      break;
-    }
-  }
-  return best;
 }
 
 template <class S>

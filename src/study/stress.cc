@@ -10,6 +10,7 @@
 #include "birefit/study.h"
 #include "study/answer.h"
 #include "study/rays.h"
+#include "study/spectra.h"
 #include "study/stress_waves.h"
 #include "transport/methods.h"
 #include "transport/methods/wei_norman.h"
@@ -326,6 +327,8 @@ std::vector<StressPoint> measure_stress(bool quick, const std::function<void(con
   }
   if (say) say("polarizers along the modes");
   measure_pictures(quick, points);
+  if (say) say("light that is no line");
+  measure_light_traps(quick, points);
   measure_wave_traps(quick, say, points);
   return points;
 }
