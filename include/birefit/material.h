@@ -145,7 +145,25 @@ struct LawIndices {
   }
 };
 
+/// Form birefringence: parts far smaller than a wavelength, isotropic in themselves, in a medium of another index. The
+/// axis is the layers' normal, or along the rods. Layers: n_o^2 = f n1^2 + (1 - f) n2^2, 1/n_e^2 = f/n1^2 +
+/// (1 - f)/n2^2; rods of round section: n_e^2 = f n1^2 + (1 - f) n2^2, n_o^2 = n2^2 ((1 + f) n1^2 + (1 - f) n2^2) /
+/// ((1 - f) n1^2 + (1 + f) n2^2). Wiener (1912), in Born & Wolf, Principles of Optics, 15.5.2.
+struct FormIndices {
+  /// What the parts are.
+  enum class Structure { layers, rods };
+  Structure structure = Structure::layers;
+  ParameterRef fraction, inside, between;
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("fraction", self.fraction, numbers::within(0, 1), "f, of the volume, that the parts take up");
+    visit.number("inside", self.inside, numbers::tabulated_index(), "n1, index of the layers or rods");
+    visit.number("between", self.between, numbers::tabulated_index(), "n2, index of what is between them");
+  }
+};
+
 /// What the anisotropic part of a sample is made of.
-using Material = std::variant<ConstantIndices, E44Steinberg2020, LawIndices>;
+using Material = std::variant<ConstantIndices, E44Steinberg2020, LawIndices, FormIndices>;
 
 }  // namespace birefit

@@ -61,6 +61,15 @@ NematicLaw<S> nematic_law(const LawIndices& law, const V& value, const S& wavele
           value.get(law.haller->mean_slope_per_k, 0.0)};
 }
 
+/// Source: FormIndices.
+template <class S, class V>
+Indices<S> form_indices(const FormIndices& form, const V& value) {
+  const S f = value(form.fraction), n1 = value(form.inside), n2 = value(form.between), e1 = n1 * n1, e2 = n2 * n2;
+  const S along = f * e1 + (1.0 - f) * e2;
+  if (form.structure == FormIndices::Structure::layers) return {sqrt(along), inverse(sqrt(f / e1 + (1.0 - f) / e2))};
+  return {n2 * sqrt(((1.0 + f) * e1 + (1.0 - f) * e2) / ((1.0 - f) * e1 + (1.0 + f) * e2)), sqrt(along)};
+}
+
 /// `value(ref)` gives a parameter as S, `value.radians(ref)` an angle, `value.get(ref, fallback)` an optional one.
 template <class S, class V>
 Indices<S> material_indices(const Material& material, const V& value, const S& wavelength_um) {
@@ -72,6 +81,7 @@ Indices<S> material_indices(const Material& material, const V& value, const S& w
     }
     return indices_at_reference<S>(*law, value, wavelength_um);
   }
+  if (const auto* form = std::get_if<FormIndices>(&material)) return form_indices<S>(*form, value);
   if (const auto* constant = std::get_if<ConstantIndices>(&material)) {
     const S n_o = value(constant->ordinary);
     if (!constant->resonance_nm) return {n_o, n_o + value(constant->birefringence)};

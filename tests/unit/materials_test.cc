@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -249,6 +250,62 @@ TEST_F(Materials, ScenesMadeInCodeAreCheckedByThePlanner) {
   Theta red = theta;
   red[static_cast<std::size_t>(config.scene.microscope.wavelength_nm.index)] = 700;
   EXPECT_THROW(plan(config.scene, config.job.demand, red), UserError);
+}
+
+/// Form birefringence by its own struct, of f, n1 and n2.
+Indices<double> form(FormIndices::Structure structure, double f, double n1, double n2) {
+  ParameterTable table;
+  FormIndices form{structure, table.add_constant("fraction", f), table.add_constant("inside", n1),
+                   table.add_constant("between", n2)};
+  return material_indices<double>(form, Lookup{table}, 0.55);
+}
+
+// Light through thin layers one after another: to first order in their thickness the fields that are continuous go by
+// the means of eps and of 1/eps, which is what the two waves of the layers' medium must go by.
+TEST_F(Materials, LayersAreTheirStack) {
+  using Structure = FormIndices::Structure;
+  for (const auto& [f, n1, n2] : {std::array{0.3, 1.6, 1.33}, {0.7, 1.0, 2.0}, {0.05, 3.0, 1.5}}) {
+    const Indices<double> n = form(Structure::layers, f, n1, n2);
+    const double mean = f * n1 * n1 + (1 - f) * n2 * n2, mean_inverse = f / (n1 * n1) + (1 - f) / (n2 * n2);
+    for (const double kappa : {0.0, 0.4, 0.9}) {
+      // q^2 of s and p in the stack, and in a crystal with its axis along the normal.
+      EXPECT_NEAR(mean - kappa * kappa, n.ordinary * n.ordinary - kappa * kappa, 1e-12);
+      EXPECT_NEAR(mean * (1 - kappa * kappa * mean_inverse),
+                  n.ordinary * n.ordinary * (1 - std::pow(kappa / n.extraordinary, 2)), 1e-12);
+    }
+    EXPECT_LT(n.extraordinary, n.ordinary);
+  }
+}
+
+// Keller's theorem (J. Math. Phys. 5, 548 (1964)): exchanging rods and medium in place turns the permittivity across
+// them into eps1 eps2 over itself. Along them it is the mean. A few rods polarize one by one (Clausius and Mossotti).
+TEST_F(Materials, RodsAreTheirOwnDual) {
+  using Structure = FormIndices::Structure;
+  for (const auto& [f, n1, n2] : {std::array{0.3, 1.6, 1.33}, {0.7, 1.0, 2.0}, {0.5, 3.0, 1.5}}) {
+    const Indices<double> n = form(Structure::rods, f, n1, n2), exchanged = form(Structure::rods, f, n2, n1);
+    EXPECT_NEAR(n.ordinary * exchanged.ordinary, n1 * n2, 1e-12);
+    EXPECT_NEAR(n.extraordinary * n.extraordinary, f * n1 * n1 + (1 - f) * n2 * n2, 1e-12);
+    EXPECT_GT(n.extraordinary, n.ordinary);
+  }
+  constexpr double kFew = 1e-5, kN1 = 1.8, kN2 = 1.33, kE1 = kN1 * kN1, kE2 = kN2 * kN2;
+  const Indices<double> few = form(Structure::rods, kFew, kN1, kN2);
+  EXPECT_NEAR(few.ordinary * few.ordinary, kE2 + 2 * kFew * kE2 * (kE1 - kE2) / (kE1 + kE2), 10 * kFew * kFew);
+  for (const Structure structure : {Structure::layers, Structure::rods})
+    for (const double f : {0.0, 1.0}) {
+      const Indices<double> one = form(structure, f, kN1, kN2);
+      EXPECT_NEAR(one.ordinary, f == 0 ? kN2 : kN1, 1e-12);
+      EXPECT_NEAR(one.extraordinary, f == 0 ? kN2 : kN1, 1e-12);
+    }
+}
+
+TEST_F(Materials, FormBirefringenceIsReadAndNothingBesideIt) {
+  EXPECT_EQ(mistakes("{structure: rods, fraction: 0.4, inside: 1.6, between: 1.33}", 550), "");
+  EXPECT_NE(mistakes("{structure: rods, fraction: 0.4, inside: 1.6}", 550).find("between"), std::string::npos);
+  EXPECT_NE(mistakes("{structure: plates, fraction: 0.4, inside: 1.6, between: 1.3}", 550).find("layers"),
+            std::string::npos);
+  EXPECT_NE(mistakes("{structure: layers, fraction: 0.4, inside: 1.6, between: 1.3, birefringence: 0.1}", 550)
+                .find("birefringence is given beside structure"),
+            std::string::npos);
 }
 
 TEST_F(Materials, EveryMistakeHasItsPlace) {

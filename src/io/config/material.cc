@@ -175,6 +175,28 @@ const std::vector<std::string>& law_material_keys() {
   return keys;
 }
 
+const std::vector<std::string>& form_material_keys() {
+  static const std::vector<std::string> keys = [] {
+    std::vector<std::string> all = described_keys<FormIndices>();
+    all.insert(all.begin(), "structure");
+    return all;
+  }();
+  return keys;
+}
+
+Material read_form_material(ConfigReader& reader, const Block& block) {
+  const auto& own = form_material_keys();
+  for (const YamlEntry& entry : block.node->entries)
+    if (std::find(own.begin(), own.end(), entry.key) == own.end() && entry.key != "absorption")
+      reader.problems.add(entry.where, entry.key + " is given beside structure",
+                          "form birefringence follows from fraction, inside and between alone");
+  FormIndices form;
+  if (reader.choice(block, "structure", {"layers", "rods"}).value_or("") == "rods")
+    form.structure = FormIndices::Structure::rods;
+  read_numbers(reader, block, form);
+  return form;
+}
+
 bool is_law_material(const Block& material) {
   const auto& keys = law_material_keys();
   const YamlNode* name = material.find("name");

@@ -350,7 +350,9 @@ void check_within(ConfigReader& reader, ParameterRef ref, double lower, double u
 Material read_material(ConfigReader& reader, const Block& sample, const Sample& kind) {
   std::vector<std::string> keys = {"ordinary", "birefringence", "resonance_nm", "name", "temperature_k", "absorption"};
   keys.insert(keys.end(), law_material_keys().begin(), law_material_keys().end());
+  keys.insert(keys.end(), form_material_keys().begin(), form_material_keys().end());
   const Block block = reader.block(sample, "material", keys, true);
+  if (block.find("structure")) return read_form_material(reader, block);
   if (is_law_material(block)) return read_law_material(reader, block, kind);
   const Plate* plate = std::get_if<Plate>(&kind);
   const HeatStep* heat = plate ? std::get_if<HeatStep>(&plate->heat) : nullptr;
