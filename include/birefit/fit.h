@@ -48,6 +48,12 @@ struct SampleBranch {
   std::vector<int> idle;        ///< parameters that this branch does not have
 };
 
+/// A quantity that follows from numbers of a job and that nothing is rendered with: `report:` of a config.
+struct Derived {
+  std::string name, unit;
+  Tie tie;
+};
+
 /// What is fitted to what: all that fit() needs, no files.
 struct FitJob {
   ParameterTable parameters;
@@ -55,6 +61,7 @@ struct FitJob {
   Demand demand;  ///< how their scenes are computed; `options` may leave ceiling and rays to the fit
   std::vector<SampleBranch> branches;  ///< more than one: each is fitted, the best is reported
   std::optional<JointPrior> prior;
+  std::vector<Derived> derived;  ///< to be worked out of the answer, with errors
   FitOptions options;
   std::vector<std::string> warnings;  ///< gathered while reading the input
   /// Sentences' parts: what is known of the pictures that makes any answer one with misfit (FitResult::misfit).
@@ -77,6 +84,20 @@ struct ParameterEstimate {
   /// "" or, at a physical limit, "upper" / "lower": the one-sided 95 % limit is in limit_value.
   std::string limit;
   double limit_value = 0;
+};
+
+/// What a fit says of a number that follows from others: one of FitJob::derived, or an entry of the table that is tied.
+struct DerivedEstimate {
+  std::string name, unit, expression;
+  bool tied = false;  ///< an entry of the table, by its name
+  /// Its expression is outside of what it may be (`expected`), and it was held at the end: no answer.
+  bool held = false;
+  double expected = 0;
+  /// Standard error to first order, with what parameters and stated numbers have in common; NaN where one of the
+  /// parameters is not known.
+  double value = 0, stderr_ = 0;
+  double interval95_low = 0, interval95_high = 0;
+  Eigen::VectorXd by;  ///< d(value)/d(parameters), in the order of FitResult::names
 };
 
 /// Odds of another minimum, or branch, above which the answer is called ambiguous.
@@ -242,6 +263,7 @@ struct FitResult {
   /// sentences. Empty: a plain answer.
   std::vector<std::string> misfit;
   std::vector<ParameterEstimate> parameters;  ///< free ones in table order: searched first, then linear
+  std::vector<DerivedEstimate> derived;       ///< tied entries, then FitJob::derived
   std::vector<std::string> names;             ///< order of correlation and covariance
   Eigen::MatrixXd covariance, correlation;    ///< parameters' own units
   Eigen::MatrixXd stated_covariance;  ///< the part of it by what is stated: in common to all fits that state the same

@@ -3,8 +3,11 @@
 // plain vector theta. Whether an entry is free is a property of the fit, never of the scene.
 
 #include <limits>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -12,6 +15,8 @@
 #include "birefit/error.h"
 
 namespace birefit {
+
+class Expression;  // birefit/expression.h
 
 /// How well a number is known that is stated and not fitted: a standard deviation of so much and such a share of the
 /// value; exact where both are 0.
@@ -68,6 +73,18 @@ struct ParameterRef {
   ParameterRef seen(double by, double more) const { return {index, by * times, by * plus + more}; }
 };
 
+/// A number that follows from others: an expression, its units settled, and the entries that its names stand for.
+struct Tie {
+  std::shared_ptr<const Expression> law;
+  std::vector<int> of;  ///< table indices, in the order of the expression's names
+};
+
+/// d(number)/d(table[index]).
+struct TieSlope {
+  int index = -1;
+  double by = 0;
+};
+
 /// The numbers of a job, each known by its index, which stays as others are added, and by its name.
 class ParameterTable {
  public:
@@ -87,11 +104,37 @@ class ParameterTable {
   /// The same, to read.
   const Parameter& operator[](int index) const { return parameters_.at(index); }
   ParameterRef find(const std::string& name) const;  ///< empty when absent
-  /// Parameter::value of every entry: what a render starts from.
+  /// Parameter::value of every entry, what is tied worked out: what a render starts from.
   Theta values() const;
+
+  /// From now on the entry follows from others, which may be tied themselves, before it. It is not free, and its
+  /// `lower` and `upper` are what it may be. Scenes know nothing of ties: they read what follow() has written.
+  void tie(int index, Tie tie);
+  /// The tied entries, each behind those that it follows from.
+  std::vector<int> tied() const;
+  /// What the entry follows from; null where it is not tied.
+  const Tie* tie_of(int index) const;
+  /// Works out what is tied, from the rest of `theta`. Where the expression leaves what an entry may be, the entry
+  /// stays at that end; where it is no number, at Parameter::value.
+  void follow(Theta& theta) const;
+  /// The expression's own value at `theta`, wherever it is.
+  double value_of(const Tie& tie, const Theta& theta) const;
+  /// A tied entry whose expression is outside of what it may be, or no number.
+  bool is_held(int index, const Theta& theta) const;
+  /// Derivatives of an entry by all that are not tied and move it, exact: of a tied one by the chain rule, none where
+  /// it is held; of any other, 1 by itself.
+  std::vector<TieSlope> slopes(int index, const Theta& theta) const;
+  /// The same of a number that is no entry.
+  std::vector<TieSlope> slopes(const Tie& tie, const Theta& theta) const;
+  /// The entries that are not tied and that this one follows from, ascending; of one that is not tied itself.
+  std::vector<int> roots(int index) const;
+  /// Least and largest value of an entry as far as its bounds, or those of what it follows from, go: at their corners.
+  std::pair<double, double> reach(int index) const;
 
  private:
   std::vector<Parameter> parameters_;
+  std::vector<std::pair<int, Tie>> ties_;
+  std::map<int, std::size_t> tie_at_;  ///< of which entry, where in ties_
 };
 
 /// A joint Gaussian prior from an earlier fit (docs/configuration.md, `prior:`).

@@ -84,5 +84,11 @@ double ripple_period(const Scene& scene, const Demand& demand, const Theta& thet
 /// Largest change of retardance phase (rad) anywhere in the image per unit of theta[index]; 0 when the parameter forms
 /// no fringes. The coarse scan steps by less than a radian of it. Of `demand` only the memo is used.
 double fringe_phase_per_unit(const Scene& scene, const Demand& demand, const Theta& theta, int index);
+/// The same of an entry of a table together with all that is tied to it: no more than the sum of what each does.
+double fringe_phase_per_unit(const Scene& scene, const Demand& demand, const ParameterTable& table, const Theta& theta,
+                             int index);
+/// ripple_period() of an entry that moves the diameter by itself or through a tie.
+double ripple_period(const Scene& scene, const Demand& demand, const ParameterTable& table, const Theta& theta,
+                     int index);
 
 }  // namespace birefit

@@ -13,6 +13,7 @@
 #include "app/commands.h"
 #include "app/watch.h"
 #include "app/work.h"
+#include "birefit/expression.h"
 #include "birefit/forecast.h"
 #include "birefit/io.h"
 #include "core/printable.h"
@@ -55,6 +56,24 @@ double seconds_an_image(const Config& config, const RenderPlan& chosen, const Th
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
+/// What is tied and what is to be reported, with their values at the start.
+void say_what_follows(const FitJob& job, const Theta& theta) {
+  bool any = false;
+  const auto say = [&](const char* what, const std::string& name, const Tie& tie, double value,
+                       const std::string& unit) {
+    std::cout << fmt::format("{}{} = {} = {:g} {}\n", any ? "           " : what, name, printable(tie.law->text()),
+                             value, unit);
+    any = true;
+  };
+  for (const int index : job.parameters.tied())
+    if (const std::string& name = job.parameters[index].name; name.find("].row[") == std::string::npos)
+      say("Tied       ", name, *job.parameters.tie_of(index), theta[static_cast<std::size_t>(index)],
+          job.parameters[index].unit);
+  any = false;
+  for (const Derived& derived : job.derived)
+    say("Reported   ", derived.name, derived.tie, job.parameters.value_of(derived.tie, theta), derived.unit);
+}
+
 int explain(const Arguments& arguments, const Config& config, double memory) {
   const ParameterTable& table = config.job.parameters;
   const Theta theta = table.values();
@@ -83,7 +102,8 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
                           json_number(shot.stderr_));
     for (int i = 0; i < table.size(); ++i) {
       if (!table[i].free) continue;
-      const double phase = table[i].linear ? 0 : fringe_phase_per_unit(config.scene, config.job.demand, theta, i);
+      const double phase =
+          table[i].linear ? 0 : fringe_phase_per_unit(config.scene, config.job.demand, table, theta, i);
       free += fmt::format(
           "{}\n    {{\"name\": {}, \"unit\": {}, \"start\": {}, \"linear\": {}, \"fringe_rad_per_unit\": {}}}",
           free.empty() ? "" : ",", quoted(table[i].name), quoted(table[i].unit), table[i].value, table[i].linear,
@@ -131,7 +151,7 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
       continue;
     }
     std::cout << fmt::format(" from {:g} {}", parameter.value, parameter.unit);
-    const double phase = fringe_phase_per_unit(config.scene, config.job.demand, theta, i);
+    const double phase = fringe_phase_per_unit(config.scene, config.job.demand, table, theta, i);
     const double span = parameter.upper - parameter.lower;
     if (phase * span > 1)
       std::cout << fmt::format(", forms fringes: {:.3g} rad between its bounds, scanned before the solver",
@@ -139,6 +159,7 @@ int explain(const Arguments& arguments, const Config& config, double memory) {
     std::cout << "\n";
   }
   if (!any) std::cout << "Fitted     nothing\n";
+  say_what_follows(config.job, theta);
   if (picture && fitted && !quick) std::cout << "Expected   not computed: it would take more than a minute\n";
   if (expected) {
     std::cout << fmt::format("Expected   at the start values, noise {}:\n", expected->noise);

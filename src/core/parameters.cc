@@ -26,6 +26,7 @@ ParameterRef ParameterTable::find(const std::string& name) const {
 Theta ParameterTable::values() const {
   Theta theta(parameters_.size());
   for (std::size_t i = 0; i < theta.size(); ++i) theta[i] = parameters_[i].value;
+  follow(theta);
   return theta;
 }
 

@@ -51,8 +51,10 @@ Mask possible_pixels(const FitJob& job, const Picture& picture, const Theta& the
   std::vector<Theta> places{theta};
   for (const Zone::Mover& mover : zone_of(picture.scene, theta)->movers()) {
     const Parameter& parameter = job.parameters[mover.parameter];
-    const double width = parameter.upper - parameter.lower;
-    if (!parameter.free || !std::isfinite(width)) continue;
+    // Of a tied one, as far as what it follows from may go.
+    const auto [low, high] = job.parameters.reach(mover.parameter.index);
+    const double width = parameter.free ? parameter.upper - parameter.lower : high - low;
+    if (!std::isfinite(width) || !(width > 0)) continue;
     const int steps =
         mover.step > 0
             ? static_cast<int>(std::ceil((mover.period > 0 ? std::min(width, mover.period) : width) / mover.step))
@@ -61,7 +63,8 @@ Mask possible_pixels(const FitJob& job, const Picture& picture, const Theta& the
     for (const Theta& place : places)
       for (int i = 0; i <= steps; ++i) {
         more.push_back(place);
-        more.back()[static_cast<std::size_t>(mover.parameter.index)] = parameter.lower + width * i / std::max(1, steps);
+        more.back()[static_cast<std::size_t>(mover.parameter.index)] =
+            (parameter.free ? parameter.lower : low) + width * i / std::max(1, steps);
       }
     places = std::move(more);
   }

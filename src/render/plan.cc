@@ -12,6 +12,7 @@
 #include "birefit/render.h"
 #include "instrument/channel_light.h"
 #include "instrument/exposure.h"
+#include "medium/references.h"
 #include "medium/validity.h"
 #include "render/direction_plan.h"
 #include "render/light_plan.h"
@@ -257,6 +258,37 @@ double fringe_phase_per_unit(const Scene& scene, const Demand& demand, const The
   for (std::size_t k = 0; k < a.size(); ++k) largest_change = std::max(largest_change, std::abs(a[k] - b[k]));
   const double slope = largest_change / (2 * h);
   return slope > 1e-9 ? slope : 0;
+}
+
+namespace {
+
+/// What of a scene an entry of a table moves, and how fast: itself, and what is tied to it.
+std::vector<TieSlope> moved_by(const Scene& scene, const ParameterTable& table, const Theta& theta, int index) {
+  std::vector<TieSlope> moved{{index, 1}};
+  for_each_ref(scene, [&](const ParameterRef& ref) {
+    if (!ref || !table.tie_of(ref.index)) return;
+    for (const TieSlope& slope : table.slopes(ref.index, theta))
+      if (slope.index == index && slope.by != 0) moved.push_back({ref.index, slope.by});
+  });
+  return moved;
+}
+
+}  // namespace
+
+double fringe_phase_per_unit(const Scene& scene, const Demand& demand, const ParameterTable& table, const Theta& theta,
+                             int index) {
+  double sum = 0;
+  for (const TieSlope& moved : moved_by(scene, table, theta, index))
+    sum += std::abs(moved.by) * fringe_phase_per_unit(scene, demand, theta, moved.index);
+  return sum;
+}
+
+double ripple_period(const Scene& scene, const Demand& demand, const ParameterTable& table, const Theta& theta,
+                     int index) {
+  for (const TieSlope& moved : moved_by(scene, table, theta, index))
+    if (const double period = ripple_period(scene, demand, theta, moved.index); period > 0)
+      return period / std::abs(moved.by);
+  return 0;
 }
 
 }  // namespace birefit

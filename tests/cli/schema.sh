@@ -12,12 +12,12 @@ python3 -c 'import yaml' 2> /dev/null || { echo 'no python3-yaml here: not valid
 for kind in $("$birefit" new | awk '/^  [a-z]/ { print $1 }'); do "$birefit" new "$kind" > "new_$kind.yaml"; done
 cp "$source"/fit_configs/*.yaml .
 python3 - << 'PYTHON'
-import glob, json, sys, yaml
+import glob, json, re, sys, yaml
 
 schema = json.load(open('schema.json'))
 known = {'$schema', 'title', 'description', 'default', 'type', 'properties', 'additionalProperties', 'items', 'anyOf',
          'enum', 'const', 'minimum', 'maximum', 'exclusiveMinimum', 'exclusiveMaximum', 'minItems', 'maxItems',
-         'minProperties', 'maxProperties'}
+         'minProperties', 'maxProperties', 'pattern'}
 types = {'object': dict, 'array': list, 'string': str, 'number': (int, float), 'integer': int, 'boolean': bool}
 
 
@@ -30,6 +30,8 @@ def mistakes(value, s, place=''):
         if not any(isinstance(value, types[t]) for t in wanted) or (isinstance(value, bool) and 'boolean' not in wanted):
             return [place]
     if 'const' in s and value != s['const'] or 'enum' in s and value not in s['enum']:
+        found.append(place)
+    if isinstance(value, str) and not re.search(s.get('pattern', ''), value):
         found.append(place)
     if isinstance(value, (int, float)):
         if value < s.get('minimum', value) or value > s.get('maximum', value):
@@ -60,7 +62,6 @@ class Loader(yaml.SafeLoader):
     """Numbers as YAML 1.2 has them: 1e-4 is one."""
 
 
-import re
 Loader.add_implicit_resolver('tag:yaml.org,2002:float',
                              re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$'), list('-+0123456789.'))
 failures = 0
@@ -75,7 +76,8 @@ good = yaml.load(open('e12_droplet.yaml'), Loader)
 for place, value in [(('sampel',), 1), (('micrograph', 'pixelsize'), 1), (('sample', 'droplet', 'diameter_um'), -3),
                      (('microscope', 'light', 'wavelength_nm'), '590 nm'),
                      (('sample', 'droplet', 'diameter_um'), {'value': 9, 'fitt': [8, 10]}),
-                     (('sample', 'droplet', 'director'), {'radial': {}, 'axial': {}})]:
+                     (('sample', 'droplet', 'director'), {'radial': {}, 'axial': {}}),
+                     (('sample', 'droplet', 'diameter_um'), '9.3'), (('report',), ['a'])]:
     bad = json.loads(json.dumps(good))
     block = bad
     for key in place[:-1]:

@@ -249,11 +249,12 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   collect_warnings(task, optimum, result);
   compare_strips(task, optimum, result);
   if (task.unknowns.size() == 0)
-    result.warnings.push_back("No parameter is marked `fit`: the image was only compared.");
+    result.warnings.emplace_back("No parameter is marked `fit`: the image was only compared.");
   result.evaluations = optimum.evaluations + optimum.problem->evaluations();
   // Since then, too: profiles and warnings may be half done.
   if (task.interrupted()) result.interrupted = true, result.converged = false;
   result.departures = departures_of(task, result);
+  report_derived(task, covariances, result);
   leave_nuisances(task, result);
   judge_misfit(task, optimum, covariances, result);
   result.verdict = (misfit.empty() ? "" : misfit + " ") + verdict(result, signal);

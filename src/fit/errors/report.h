@@ -54,6 +54,9 @@ void keep_inputs_of_note(const Task& task, FitResult& result);
 Eigen::MatrixXd stated_covariance(const Task& task, const Covariances& covariances);
 /// result.stated, from those that were paid for and those that were fitted, and result.inputs by them.
 void report_stated(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result);
+/// result.derived: what is tied, and FitJob::derived. A tied number that is held at an end of what it may be is no
+/// answer.
+void report_derived(const Task& task, const Covariances& covariances, FitResult& result);
 /// Takes nuisances out of parameters, covariance and all that goes by their order: they are in result.stated.
 void leave_nuisances(const Task& task, FitResult& result);
 /// Fills result.misfit: why an answer is one with misfit.

@@ -122,6 +122,8 @@ void leave_nuisances(const Task& task, FitResult& result) {
   result.correlation = Eigen::MatrixXd(result.correlation(kept, kept));
   result.stated_covariance = Eigen::MatrixXd(result.stated_covariance(kept, kept));
   for (InputEffect& input : result.inputs) keep(input.shift);
+  for (DerivedEstimate& derived : result.derived)
+    if (derived.by.size() == task.unknowns.size()) derived.by = Eigen::VectorXd(derived.by(kept));
   std::vector<int> searched;
   for (const int j : kept)
     if (j < static_cast<int>(task.unknowns.searched.size())) searched.push_back(j);

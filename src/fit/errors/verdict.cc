@@ -196,6 +196,12 @@ void say_state(const FitResult& result, bool signal, bool rows, Sentences& sente
 }
 
 void say_bounds(const FitResult& result, Sentences& sentences) {
+  for (const DerivedEstimate& d : result.derived)
+    if (d.held)
+      sentences.push_back(fmt::format(
+          "{} = {} is {:.6g} at the best values, which it cannot be: it was held at {:.6g}{}, and narrower bounds of "
+          "what it follows from are needed.",
+          d.name, d.expression, d.expected, d.value, d.unit.empty() ? "" : " " + d.unit));
   for (const ParameterEstimate& estimate : result.parameters) {
     if (!estimate.at_bound && estimate.limit.empty()) continue;
     const std::string name = short_name(estimate.name), unit = unit_suffix(estimate);

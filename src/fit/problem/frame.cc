@@ -20,6 +20,7 @@ Theta start_of(const FitJob& job) {
     if (const ParameterRef ref = job.parameters.find(job.prior->names[i]); ref && job.parameters[ref].free)
       theta[static_cast<std::size_t>(ref.index)] = std::clamp(job.prior->mean[static_cast<Eigen::Index>(i)],
                                                               job.parameters[ref].lower, job.parameters[ref].upper);
+  job.parameters.follow(theta);
   return theta;
 }
 

@@ -67,7 +67,11 @@ LeastSquares::LeastSquares(const Task& task, std::vector<RenderPlan> plans, std:
       frame.terms.push_back(std::move(term));
     }
     std::set<int> read;
-    for_each_ref(picture.scene, [&](const ParameterRef& ref) { read.insert(position(unknowns_.searched, ref.index)); });
+    for_each_ref(picture.scene, [&](const ParameterRef& ref) {
+      if (!ref || !frame.direct.insert(ref.index).second) return;
+      for (const int root : job_.parameters.roots(ref.index)) read.insert(position(unknowns_.searched, root));
+      if (job_.parameters.tie_of(ref.index)) frame.tied.push_back(ref.index);
+    });
     frame.read.assign(read.lower_bound(0), read.end());
     for (Eigen::Index begin = 0; begin < frame.count; begin += kTileRows)
       tiles_.push_back({static_cast<int>(g), begin, std::min(kTileRows, frame.count - begin)});
@@ -175,8 +179,7 @@ void LeastSquares::set_priors() {
 
 /// Intensity of a frame's used pixels and its derivatives by table entries.
 void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, int threads,
-                               Eigen::Ref<Eigen::VectorXd> intensity,
-                               const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative) {
+                               Eigen::Ref<Eigen::VectorXd> intensity, const ColumnOf& derivative) {
   Frame& frame = frames_[g];
   const Scene& scene = task_.picture(static_cast<int>(g)).scene;
   const std::vector<std::array<int, 2>>& pixels = frame.set.pixels;
@@ -199,6 +202,38 @@ void LeastSquares::render_used(std::size_t g, const std::vector<int>& active, in
   }
 }
 
+/// The same by entries that are not tied, with what they do through those that are: scenes know nothing of ties.
+void LeastSquares::render_tied(std::size_t g, const std::vector<int>& wanted, int threads,
+                               Eigen::Ref<Eigen::VectorXd> intensity, const ColumnOf& derivative) {
+  const Frame& frame = frames_[g];
+  if (frame.tied.empty()) return render_used(g, wanted, threads, intensity, derivative);
+  struct Link {
+    std::size_t wanted, tied;
+    double slope;
+  };
+  std::vector<int> active;
+  std::vector<std::size_t> own;  // of the active ones that are wanted themselves, which
+  for (std::size_t j = 0; j < wanted.size(); ++j)
+    if (frame.direct.contains(wanted[j])) active.push_back(wanted[j]), own.push_back(j);
+  std::vector<Link> links;
+  for (const int tied : frame.tied) {
+    const std::size_t before = links.size();
+    for (const TieSlope& slope : job_.parameters.slopes(tied, theta_))
+      if (const int at = position(wanted, slope.index); at >= 0)
+        links.push_back({static_cast<std::size_t>(at), active.size() - own.size(), slope.by});
+    if (links.size() > before) active.push_back(tied);
+  }
+  Eigen::MatrixXd by_tied(frame.count, static_cast<Eigen::Index>(active.size() - own.size()));
+  render_used(g, active, threads, intensity, [&](std::size_t k) -> Eigen::Ref<Eigen::VectorXd> {
+    if (k < own.size()) return derivative(own[k]);
+    return by_tied.col(static_cast<Eigen::Index>(k - own.size()));
+  });
+  for (std::size_t j = 0; j < wanted.size(); ++j)
+    if (!frame.direct.contains(wanted[j])) derivative(j).setZero();
+  for (const Link& link : links)
+    derivative(link.wanted) += link.slope * by_tied.col(static_cast<Eigen::Index>(link.tied));
+}
+
 /// body(frame, threads). A core a frame pays as soon as there are several a core, and for frames of a few pixels
 /// nothing else does. Waves take memory by the gigabyte: one at a time.
 template <class Body>
@@ -219,7 +254,7 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
     for (int j = 0; j < searched_size(); ++j)
       if (std::find(frame.read.begin(), frame.read.end(), j) == frame.read.end())
         searched_columns_.col(j).segment(frame.begin, frame.count).setZero();
-  render_used(g, active, threads, intensity,
+  render_tied(g, active, threads, intensity,
               [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
   frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
   frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
@@ -241,7 +276,7 @@ Eigen::MatrixXd LeastSquares::intensity_by(const std::vector<int>& table_indices
   for_frames([&](std::size_t g, int threads) {
     const Frame& frame = frames_[g];
     Eigen::VectorXd intensity(frame.count);
-    render_used(g, table_indices, threads, intensity, [&](std::size_t j) {
+    render_tied(g, table_indices, threads, intensity, [&](std::size_t j) {
       return columns.col(static_cast<Eigen::Index>(j)).segment(frame.begin, frame.count);
     });
   });
@@ -318,6 +353,7 @@ void LeastSquares::add_products(const Frame& frame, int threads, const Columns& 
 void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   const Eigen::Index p = searched.size();
   for (Eigen::Index j = 0; j < p; ++j) theta_[unknowns_.searched[j]] = searched[j];
+  job_.parameters.follow(theta_);
   has_derivatives_ = false;
   if (derivatives) searched_columns_.resize(residual_.size(), p);
   ++evaluations_;

@@ -8,6 +8,7 @@
 #include <exception>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -134,16 +135,20 @@ class LeastSquares {
     double inverse_sigma_norm = 0;
     double shared = 0;  ///< PixelSet::shared_sd over the noise of the mean
     Eigen::Index begin = 0, count = 0;
-    std::vector<int> read;  ///< searched unknowns that its scene reads
+    std::vector<int> read;  ///< searched unknowns that its scene reads, or what it reads follows from
+    std::vector<int> tied;  ///< table indices of what it reads and is tied
+    std::set<int> direct;   ///< table indices of all that it reads
     std::vector<Term> terms;
     double shape_factor = 1, mean_factor = 1;  ///< whitening of the parts across and along the mean
     double intensity_low = 0, intensity_high = 0;
     Rendering rendering;  ///< kept for its memory
   };
   void render_frame(std::size_t frame, bool derivatives, int threads);
+  using ColumnOf = std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>;
   void render_used(std::size_t frame, const std::vector<int>& active, int threads,
-                   Eigen::Ref<Eigen::VectorXd> intensity,
-                   const std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>& derivative);
+                   Eigen::Ref<Eigen::VectorXd> intensity, const ColumnOf& derivative);
+  void render_tied(std::size_t frame, const std::vector<int>& wanted, int threads,
+                   Eigen::Ref<Eigen::VectorXd> intensity, const ColumnOf& derivative);
   template <class Body>
   void for_frames(const Body& body);
   Eigen::VectorXd light(const Frame& frame, bool of_intensity, Eigen::Index begin, Eigen::Index rows) const;

@@ -1,9 +1,12 @@
 #include "fit/problem/shared_zeros.h"
 
 #include <algorithm>
+#include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "birefit/expression.h"
 #include "medium/references.h"
 
 namespace birefit::estimation {
@@ -28,15 +31,45 @@ std::vector<std::vector<Ref*>> numbers_of(Job& job) {
   return numbers;
 }
 
-/// Stated by every scene, not by all the same one, and known within a standard deviation.
+/// What scenes state of it: what is tied follows other dials.
+template <class Ref>
+std::vector<Ref*> stated_of(const FitJob& job, std::vector<Ref*> number) {
+  std::erase_if(number, [&](const Ref* ref) { return job.parameters.tie_of(ref->index) != nullptr; });
+  return number;
+}
+
+/// Stated by every scene that does not tie it, not by all the same one, and known within a standard deviation.
 template <class Ref>
 bool is_own_dial(const FitJob& job, const std::vector<Ref*>& number) {
+  if (number.empty()) return false;
   const bool own =
       std::any_of(number.begin(), number.end(), [&](const Ref* ref) { return ref->index != number.front()->index; });
   return own && std::all_of(number.begin(), number.end(), [&](const Ref* ref) {
            return *ref && !job.parameters[*ref].free && !job.parameters[*ref].linear &&
                   job.parameters[*ref].known_to.sd > 0;
          });
+}
+
+/// What other numbers follow from.
+std::set<int> followed(const FitJob& job) {
+  std::set<int> all;
+  for (const int tied : job.parameters.tied())
+    for (const int root : job.parameters.roots(tied)) all.insert(root);
+  for (const Derived& derived : job.derived)
+    for (const int of : derived.tie.of)
+      for (const int root : job.parameters.roots(of)) all.insert(root);
+  return all;
+}
+
+/// The entry is from now on what it was stated to be and the zero, so that what follows from it follows the zero, too.
+void tie_to_zero(ParameterTable& table, int index, ParameterRef zero) {
+  Parameter& stated = table[index];
+  stated.known_to = {};
+  const std::string unit = stated.unit;
+  const ParameterRef constant = table.add_constant("stated " + stated.name, stated.value, unit);
+  auto law = std::make_shared<Expression>(kByZero);
+  law->settle_units({unit, unit}, unit);
+  table.tie(index, {std::move(law), {zero.index, constant.index}});
 }
 
 /// Of "signal[1].row[3].sample.temperature_k" what follows the frame.
@@ -49,17 +82,24 @@ std::string path_in_frame(const std::string& name) {
 
 bool has_own_dials(const FitJob& job) {
   const auto numbers = numbers_of<const FitJob, const ParameterRef>(job);
-  return std::any_of(numbers.begin(), numbers.end(), [&](const auto& number) { return is_own_dial(job, number); });
+  return std::any_of(numbers.begin(), numbers.end(),
+                     [&](const auto& number) { return is_own_dial(job, stated_of(job, number)); });
 }
 
 FitJob with_shared_zeros(FitJob job) {
-  for (const std::vector<ParameterRef*>& number : numbers_of<FitJob, ParameterRef>(job)) {
+  const std::set<int> followed_by_others = followed(job);
+  for (const std::vector<ParameterRef*>& all : numbers_of<FitJob, ParameterRef>(job)) {
+    const std::vector<ParameterRef*> number = stated_of(job, all);
     if (!is_own_dial(job, number)) continue;
     const Parameter first = job.parameters[*number.front()];
     const ParameterRef zero = job.parameters.add_constant("zero of " + path_in_frame(first.name), 0, first.unit);
     for (const ParameterRef* ref : number)
       job.parameters[zero].known_to.sd = std::max(job.parameters[zero].known_to.sd, job.parameters[*ref].known_to.sd);
     for (ParameterRef* ref : number) {
+      if (followed_by_others.contains(ref->index)) {
+        if (!job.parameters.tie_of(ref->index)) tie_to_zero(job.parameters, ref->index, zero);
+        continue;
+      }
       ParameterRef moved = *ref;
       moved.plus += moved.times * job.parameters[*ref].value;
       moved.index = zero.index;

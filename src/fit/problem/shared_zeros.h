@@ -5,6 +5,9 @@
 
 namespace birefit::estimation {
 
+/// The expression by which what others are tied to follows such a zero: no tie of the user's.
+inline constexpr const char* kByZero = "its.zero + as.stated";
+
 /// Pictures at several angles, or rows at several temperatures, are read off one dial, whose zero is known no better
 /// than one of its readings: where frames state numbers of their own that are known within a standard deviation
 /// (Parameter::known_to.sd), what all of them are off by is a number of its own, stated as 0. A job without such is as

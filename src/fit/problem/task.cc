@@ -1,5 +1,6 @@
 #include "fit/problem/task.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -70,12 +71,18 @@ std::vector<Sight> sights_of(const FitJob& job) {
   return sights;
 }
 
+bool follows_from(const ParameterTable& table, ParameterRef number, int index) {
+  const std::vector<int> roots = table.roots(number.index);
+  return std::find(roots.begin(), roots.end(), index) != roots.end();
+}
+
 std::vector<int> known_to_all_frames(const Task& task) {
   std::map<int, int> readers;
   for (int g = 0; g < task.frames(); ++g) {
     std::set<int> read;
     for_each_ref(task.picture(g).scene, [&](const ParameterRef& ref) {
-      if (ref && !task.job.parameters[ref].free) read.insert(ref.index);
+      for (const int root : ref ? task.job.parameters.roots(ref.index) : std::vector<int>{})
+        if (!task.job.parameters[root].free) read.insert(root);
     });
     for (const int index : read) ++readers[index];
   }

@@ -37,7 +37,10 @@ struct Sight {
 std::vector<Sight> sights_of(const FitJob& job);
 
 struct Task;
-/// Table indices of the numbers that every frame of a task reads and that are not fitted, in ascending order.
+/// Whether the number is that entry, or tied to it.
+bool follows_from(const ParameterTable& table, ParameterRef number, int index);
+/// Table indices of the numbers that every frame of a task reads, or what it reads follows from, and that are not
+/// fitted, in ascending order.
 std::vector<int> known_to_all_frames(const Task& task);
 
 /// A job and what is estimated of it. Refers to the job, which has to outlive it.
@@ -61,6 +64,7 @@ struct Task {
       throw std::logic_error("a place of another task");
     for (std::size_t j = 0; j < unknowns.searched.size(); ++j)
       theta[static_cast<std::size_t>(unknowns.searched[j])] = searched[static_cast<Eigen::Index>(j)];
+    job.parameters.follow(theta);
     return theta;
   }
   double gain_of(int frame, const Theta& theta) const {

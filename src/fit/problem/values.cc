@@ -66,8 +66,13 @@ void LeastSquares::to_values(const Frame& frame, Eigen::Ref<Eigen::MatrixXd> col
     }
     const int unknown = j < std::ssize(searched) ? searched[static_cast<std::size_t>(j)] : -1;
     const int moved = unknown >= 0 ? unknowns_.searched[static_cast<std::size_t>(unknown)] : -1;
-    if (view.center_x_px && view.center_x_px.index == moved) change.center_x = 1;
-    if (view.center_y_px && view.center_y_px.index == moved) change.center_y = 1;
+    const auto by_moved = [&](ParameterRef centre) {
+      for (const TieSlope& slope : centre ? job_.parameters.slopes(centre.index, theta_) : std::vector<TieSlope>{})
+        if (slope.index == moved) return slope.by;
+      return 0.0;
+    };
+    change.center_x = by_moved(view.center_x_px);
+    change.center_y = by_moved(view.center_y_px);
     for (Eigen::Index i = 0; i < frame.count; ++i) {
       const auto [x, y] = frame.set.pixels[static_cast<std::size_t>(i)];
       double by_effects = 0;

@@ -21,9 +21,10 @@ FitJob job_by_rays(const FitJob& job) {
   return by_rays;
 }
 
+/// The diameter of a frame's sphere, or what that follows from.
 bool is_diameter(const Task& task, int g, std::size_t j) {
   const ParameterRef diameter = traits_of(task.picture(g).scene).sphere_diameter_um;
-  return diameter && diameter.index == task.unknowns.searched[j];
+  return diameter && follows_from(task.job.parameters, diameter, task.unknowns.searched[j]);
 }
 
 /// Wave plans for all of the places to look at: a grid for the largest droplet among them, as a larger one than it was
@@ -31,12 +32,11 @@ bool is_diameter(const Task& task, int g, std::size_t j) {
 Frames planned_for(const Task& task, Frames frames, const Theta& start, const std::vector<Eigen::VectorXd>& places) {
   for (int g = 0; g < task.frames(); ++g) {
     Theta theta = task.with(start, places.front());
-    for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)
-      if (is_diameter(task, g, j))
-        for (const Eigen::VectorXd& x : places) {
-          double& value = theta[static_cast<std::size_t>(task.unknowns.searched[j])];
-          value = std::max(value, x[static_cast<Eigen::Index>(j)]);
-        }
+    if (const ParameterRef diameter = traits_of(task.picture(g).scene).sphere_diameter_um)
+      for (const Eigen::VectorXd& x : places) {
+        const auto at = static_cast<std::size_t>(diameter.index);
+        theta[at] = std::max(theta[at], task.with(start, x)[at]);
+      }
     frames[static_cast<std::size_t>(g)].plan = task.planned(g, theta);
   }
   return frames;
@@ -102,8 +102,8 @@ Minima search_near_rays(const Task& task, const Start& start) {
   for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j)
     for_each_scene(by_rays.measurements, [&](const Scene& scene) {
       double& rate = rates[static_cast<Eigen::Index>(j)];
-      rate = std::max(rate,
-                      std::abs(fringe_phase_per_unit(scene, task.job.demand, rays.theta, task.unknowns.searched[j])));
+      rate = std::max(rate, std::abs(fringe_phase_per_unit(scene, task.job.demand, task.job.parameters, rays.theta,
+                                                           task.unknowns.searched[j])));
     });
   task.say("neighbouring fringe orders by wave optics");
   const auto problem_for = [&](const std::vector<Eigen::VectorXd>& places) {

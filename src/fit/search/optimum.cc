@@ -70,7 +70,8 @@ double Optimum::reduced_chi_square(const Task& task) const {
 double ripple_period_of(const Task& task, const Theta& theta, std::size_t j) {
   double period = 0;
   for (int g = 0; g < task.frames(); ++g)
-    period = std::max(period, ripple_period(task.picture(g).scene, task.job.demand, theta, task.unknowns.searched[j]));
+    period = std::max(period, ripple_period(task.picture(g).scene, task.job.demand, task.job.parameters, theta,
+                                            task.unknowns.searched[j]));
   return period;
 }
 

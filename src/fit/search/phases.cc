@@ -21,7 +21,8 @@ double inverse_of(const std::vector<double>& x, const std::vector<double>& y, do
 /// at either.
 double rate_at(const Task& task, int frame, const Theta& theta, int index) {
   try {
-    const double rate = fringe_phase_per_unit(task.picture(frame).scene, task.job.demand, theta, index);
+    const double rate =
+        fringe_phase_per_unit(task.picture(frame).scene, task.job.demand, task.job.parameters, theta, index);
     return std::isfinite(rate) ? rate : 0;
   } catch (const UserError&) {
     return 0;
@@ -57,6 +58,7 @@ PicturePhase fringe_phase(const Task& task, const Theta& theta, int index) {
     double fastest = 0;
     for (Theta& probe : others) {
       probe[static_cast<std::size_t>(index)] = phase.value.back();
+      task.job.parameters.follow(probe);
       for (int g = 0; g < frames; g += stride)
         if (task.observable(g).quantity == Quantity::intensity)  // nothing else has fringes
           fastest = std::max(fastest, rate_at(task, g, probe, index));

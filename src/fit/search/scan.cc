@@ -86,7 +86,7 @@ std::vector<Axis> axes_of(const Task& task, const std::vector<PicturePhase>& pha
       double longest = (parameter.upper - parameter.lower) / (of_fringes ? kFewestPointsOfFringes : kFewestPoints);
       for (const Sight& sight : task.sights)
         if (const ParameterRef diameter = traits_of(sight.picture->scene).sphere_diameter_um;
-            diameter && diameter.index == task.unknowns.searched[j])
+            diameter && follows_from(task.job.parameters, diameter, task.unknowns.searched[j]))
           longest = std::min(longest, kDiameterStep * parameter.upper);
       Axis axis = axis_along(static_cast<int>(j), phases[j], (of_fringes ? kStepOfFringes : kStep) / fineness, longest);
       const bool needed = of_fringes || phases[j].total() > kOneValley;

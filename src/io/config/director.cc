@@ -14,7 +14,7 @@ void check_pitch(ConfigReader& reader, const Block& block, ParameterRef ref) {
   const YamlNode* node = block.find("pitch_um");
   if (!node || !ref) return;
   const Parameter& pitch = reader.table[ref];
-  const double lower = pitch.free ? pitch.lower : pitch.value, upper = pitch.free ? pitch.upper : pitch.value;
+  const auto [lower, upper] = reader.span_of(ref);
   if (lower <= 0 && upper >= 0)
     reader.problems.add(node->where,
                         block.path_of("pitch_um") + (pitch.free ? " is fitted through 0" : " = 0 has no meaning"),
@@ -94,10 +94,7 @@ FreederickszDirector read_director<FreederickszDirector>(ConfigReader& reader, c
   // The sign of the dielectric anisotropy must be the one that lets the field do something, and stay so in a fit.
   if (const YamlNode* node = block.find(permittivities ? "eps_parallel" : "eps_ratio");
       node && reader.problems.empty()) {
-    const auto range = [&](ParameterRef ref) {
-      const Parameter& p = reader.table[ref];
-      return p.free ? std::pair(p.lower, p.upper) : std::pair(p.value, p.value);
-    };
+    const auto range = [&](ParameterRef ref) { return reader.span_of(ref); };
     auto [low, high] = range(permittivities ? d.eps_parallel : d.eps_ratio);
     if (permittivities) {
       const auto [least, most] = range(d.eps_perpendicular);

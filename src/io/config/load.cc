@@ -28,6 +28,7 @@
 #include "io/config/signal.h"
 #include "io/config/signal_frames.h"
 #include "io/config/starts.h"
+#include "io/config/ties.h"
 #include "medium/references.h"
 
 namespace birefit {
@@ -66,19 +67,22 @@ bool fits_in(const MicrographSettings& settings, const std::array<int, 2>& size)
 }
 
 /// `image` replaces the single micrograph's file; with `series` the micrograph is one of its frames. Without `starts`
-/// nothing is looked for in the image: enough to know that a config is sound.
+/// nothing is looked for in the image: enough to know that a config is sound. `tied`: what tied numbers begin with,
+/// which is known once the config was read; null: it has to be read for that.
 Config load(const std::filesystem::path& path, const std::string& text, const std::vector<std::string>& set,
             ConfigUse use, const std::optional<std::filesystem::path>& image, const ImageSeries* series = nullptr,
-            std::size_t frame = 0, bool starts = true) {
+            std::size_t frame = 0, bool starts = true, const TieStarts* tied = nullptr) {
   Config config;
   config.path = path;
   ConfigReader reader(path.string(), path.parent_path(), use);
+  if (tied) reader.tie_starts = *tied;
   const YamlNode tree = parse_config(text, reader.file, set, reader.problems);
   config.text = text_as_set(text, tree, set);
   const Block root{&tree, "", {reader.file}};
   reader.check_keys(tree, "",
                     {"micrograph", "micrographs", "calibration", "image_size_px", "sample", "microscope", "accuracy",
-                     "physics", "transport", "prior", "fit", "signal"});
+                     "physics", "transport", "prior", "fit", "signal", "report"});
+  const std::vector<Wanted> wanted = read_report(reader, root);
 
   const YamlNode* list = root.find("micrographs");
   TableNodes nodes;
@@ -211,6 +215,13 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     }
   }
 
+  std::vector<Scene*> scenes;
+  for (Picture& picture : micrographs) scenes.push_back(&picture.scene);
+  for (Readings& table : tables)
+    for (Scene& scene : table.rows) scenes.push_back(&scene);
+  const TieStarts found = bind_ties(reader, scenes, wanted, config.job.derived);
+  if (!tied && !reader.ties.empty()) return load(path, text, set, use, image, series, frame, starts, &found);
+
   // An image may have a focus of its own, which only waves know.
   for (const Picture& own : micrographs) {
     const ParameterRef focus = own.scene.microscope.focus_um;
@@ -235,13 +246,17 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
   if (use != ConfigUse::render) {
     // A shared parameter that every image replaces by its own is no unknown of the fit.
     std::set<int> used;
+    const auto use_root = [&](const ParameterRef& ref) {
+      if (ref)
+        for (const int root : reader.table.roots(ref.index)) used.insert(root);
+    };
     for (Picture& micrograph : micrographs) {
-      for_each_ref(micrograph.scene, [&](ParameterRef& ref) { used.insert(ref.index); });
+      for_each_ref(micrograph.scene, use_root);
       used.insert({micrograph.gain.index, micrograph.offset.index});
       for (const UnevenLight& uneven : micrograph.uneven) used.insert(uneven.coefficient.index);
     }
     for (Readings& table : tables) {
-      for (Scene& scene : table.rows) for_each_ref(scene, [&](ParameterRef& ref) { used.insert(ref.index); });
+      for (Scene& scene : table.rows) for_each_ref(scene, use_root);
       used.insert({table.gain.index, table.offset.index});
     }
     const bool sound = reader.problems.empty();  // else images may be missing
@@ -388,6 +403,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
         const auto used = [&] { return std::count(picture.mask.values().begin(), picture.mask.values().end(), 1); };
         const auto before = used();
         resolve_automatic(reader, picture.scene, &picture.values, &picture.mask, picture.name);
+        refresh_ties(reader);
         picture.outside_roi += static_cast<int>(before - used());  // other discs than the one that is meant
         check_overlap(reader, picture.scene, picture.name);
         check_stressed_disc(reader, picture);
@@ -442,6 +458,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
         "microscope.objective_na is not given: every ray that leaves the droplet is "
         "taken to reach the image, and wave optics, which needs it, is left out.");
 
+  if (reader.problems.empty()) check_ties(reader);
   if (!reader.problems.empty()) throw_sorted(reader);
   config.job.options.choose_rays = reader.choose_rays;
   config.job.options.max_seconds = reader.max_seconds;

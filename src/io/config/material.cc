@@ -160,9 +160,9 @@ HallerLaw read_haller(ConfigReader& reader, const Block& material, std::optional
 }
 
 /// Value and bounds of a parameter, the known ones of them.
-std::vector<double> extremes(const Parameter& p) {
-  std::vector<double> values{p.value};
-  if (p.free) values = {p.value, p.lower, p.upper};
+std::vector<double> extremes(const ConfigReader& reader, ParameterRef ref) {
+  const auto [low, high] = reader.span_of(ref);
+  std::vector<double> values{reader.table[ref].value, low, high};
   std::erase_if(values, [](double v) { return !std::isfinite(v); });
   return values;
 }
@@ -348,7 +348,7 @@ void check_material_ranges(ConfigReader& reader, const Block& root, const Scene&
                           "the ranges of this scene's indices have no wavelength in common");
       return;
     }
-    for (double nm : extremes(wavelength))
+    for (double nm : extremes(reader, scene.microscope.wavelength_nm))
       if (nm < lower - 1e-9 * lower || nm > upper + 1e-9 * upper) {
         reader.problems.add(
             wavelength.where,
@@ -369,9 +369,9 @@ void check_material_ranges(ConfigReader& reader, const Block& root, const Scene&
       const Where where = at.where.line > 0 || !material ? at.where : material->where;
       double lowest_clearing = 1e9;
       for (ParameterRef tc : clearing_points(*law))
-        for (double k : extremes(reader.table[tc])) lowest_clearing = std::min(lowest_clearing, k);
+        for (double k : extremes(reader, tc)) lowest_clearing = std::min(lowest_clearing, k);
       const bool reference = law->haller && t == law->haller->reference_k;
-      for (double k : extremes(at)) {
+      for (double k : extremes(reader, t)) {
         if (k > lowest_clearing - kClearingMargin_k) {
           reader.problems.add(where,
                               at.name + ": " + show(k) + " K is at or above the clearing point, " +

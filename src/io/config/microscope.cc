@@ -189,11 +189,11 @@ void read_microscope(ConfigReader& reader, const Block& root, Scene& scene) {
                         "state the light: {lamp: A}, or leave camera out");
 
   if (auto* constant = std::get_if<ConstantIndices>(&scene.material); constant && constant->resonance_nm) {
-    const Parameter &resonance = reader.table[constant->resonance_nm], &light = reader.table[microscope.wavelength_nm];
+    const Parameter& resonance = reader.table[constant->resonance_nm];
     // A quarter of the light's wavelength away from the band its law stops to hold; 589.3 nm is where birefringence is
     // given.
-    const double shortest = std::min(light.free ? light.lower : light.value, 589.3);
-    if ((resonance.free ? resonance.upper : resonance.value) > 0.8 * shortest)
+    const double shortest = std::min(reader.span_of(microscope.wavelength_nm).first, 589.3);
+    if (reader.span_of(constant->resonance_nm).second > 0.8 * shortest)
       reader.problems.add(
           resonance.where,
           resonance.name + " must stay below 0.8 of the wavelength (and of 589.3 nm, where birefringence is given)",

@@ -134,6 +134,7 @@ std::optional<double> ConfigReader::finite(const YamlNode& node, const std::stri
     problems.add(node.where, name + " must be a number, found " + node.describe());
     return std::nullopt;
   }
+  if (Expression::is_one(node.text)) return arithmetic(node, name);
   if (node.quoted) {
     problems.add(node.where, name + " must be a number, found " + node.describe(),
                  parse_number(node.text) ? "write it without quotes" : "");
@@ -162,6 +163,53 @@ std::optional<double> ConfigReader::finite(const YamlNode& node, const std::stri
   }
   problems.add(node.where, name + " must be a number, found " + node.describe(), hint);
   return std::nullopt;
+}
+
+/// Of numbers alone, "19.28 / 5.21", wherever there may be one.
+std::optional<double> ConfigReader::arithmetic(const YamlNode& node, const std::string& name) {
+  try {
+    const Expression expression(node.text);
+    if (const double value = expression.is_plain() ? expression.value({}) : 0; !std::isfinite(value))
+      problems.add(node.where, name + " = " + node.text + " is not a finite number");
+    else if (!expression.is_plain())
+      problems.add(node.where, name + " must be a number, found an expression that reads others",
+                   "numbers that may be fitted can be tied, here only numbers can stand");
+    else
+      return value;
+  } catch (const ExpressionError& error) {
+    problems.add(within(node, error.column), name + " = " + node.text + ": " + error.wrong, error.hint);
+  }
+  return std::nullopt;
+}
+
+/// True where the number is tied to others: its value follows once all names are known.
+bool ConfigReader::read_tie(const YamlNode& node, const std::string& name, const NumberSpec& spec, ParameterRef ref) {
+  const YamlNode* word = node.is_map() ? node.find("value") : &node;
+  std::shared_ptr<Expression> law = word && !spec.fixed ? tie_in(*word) : nullptr;
+  if (!law) return false;
+  Parameter& parameter = table[ref];
+  if (spec.linear)
+    problems.add(word->where, name + " is solved for once all else is known: it cannot be tied",
+                 "give it as a number, or {fit: auto}");
+  for (const YamlEntry& entry : node.entries)
+    if (entry.key != "value")
+      problems.add(entry.where, name + " is tied to other numbers and has " + entry.key,
+                   "give that to the numbers it follows from");
+  const auto start = tie_starts.find(parameter.name);
+  parameter.value = start != tie_starts.end() ? start->second.value : std::numeric_limits<double>::quiet_NaN();
+  parameter.known_to = {};  // as well as what it follows from
+  parameter.lower = spec.lower;
+  parameter.upper = spec.upper;
+  ties.push_back({ref.index, std::move(law), spec, within(*word, 1), {}});
+  return true;
+}
+
+std::pair<double, double> ConfigReader::span_of(ParameterRef ref) const {
+  const Parameter& parameter = table[ref];
+  if (parameter.free) return {parameter.lower, parameter.upper};
+  if (const auto tied = tie_starts.find(parameter.name); tied != tie_starts.end())
+    return {tied->second.low, tied->second.high};
+  return {parameter.value, parameter.value};
 }
 
 std::optional<double> ConfigReader::value_of(const YamlNode& node, const std::string& name, const NumberSpec& spec) {
@@ -206,6 +254,7 @@ ParameterRef ConfigReader::number_at(const YamlNode& node, const std::string& pa
   const ParameterRef ref = constant(path, spec, std::isfinite(spec.lower) ? spec.lower : 0);
   Parameter& parameter = table[ref];
   parameter.where = node.where;
+  if (read_tie(node, name, spec, ref)) return ref;
   if (!node.is_map()) {
     if (const std::optional<double> value = value_of(node, name, spec)) parameter.value = *value;
     return ref;

@@ -17,6 +17,7 @@
 #include "birefit/io.h"
 #include "birefit/light.h"
 #include "birefit/number_spec.h"
+#include "io/config/tied_number.h"
 #include "io/config/yaml.h"
 
 namespace birefit {
@@ -53,6 +54,8 @@ class ConfigReader {
   /// Range of every number of the config by path, given or defaulted: what `set:` of a micrograph may name.
   std::map<std::string, NumberSpec> specs;
   std::map<std::string, ParameterRef> refs;
+  std::vector<TiedNumber> ties;
+  TieStarts tie_starts;    ///< what is known of them from reading the config before
   std::set<int> replaced;  ///< parameters instead of which an image has one of its own
   /// Every file that was asked for.
   std::set<std::filesystem::path> inputs;
@@ -100,6 +103,12 @@ class ConfigReader {
   std::optional<std::vector<int>> integers(const Block& block, const std::string& key, std::size_t count,
                                            const std::string& shape);
 
+  /// What a number may be while a fit goes on: its bounds, or how far what it is tied to may take it; else its value.
+  /// Not finite where that is not known yet.
+  std::pair<double, double> span_of(ParameterRef ref) const;
+  /// Fitted, or tied to other numbers.
+  bool varies(ParameterRef ref) const { return table[ref].free || tie_starts.contains(table[ref].name); }
+
   /// A finite number within the spec's range, else nothing and a problem. `name` is the key shown.
   std::optional<double> value_of(const YamlNode& node, const std::string& name, const NumberSpec& spec);
 
@@ -112,6 +121,8 @@ class ConfigReader {
 
  private:
   std::optional<double> finite(const YamlNode& node, const std::string& name);
+  std::optional<double> arithmetic(const YamlNode& node, const std::string& name);
+  bool read_tie(const YamlNode& node, const std::string& name, const NumberSpec& spec, ParameterRef ref);
 };
 
 /// A config as text; UserError when it cannot be one.

@@ -53,8 +53,7 @@ std::optional<LoadedImage> load_ring_table(ConfigReader& reader, const std::file
   image.bits = 32;
   const Plate& plate = std::get<Plate>(scene.sample);
   observable = {Quantity::ring_radius_cm, {}};
-  const double least = reader.table[plate.ring_offset].free ? reader.table[plate.ring_offset].lower
-                                                            : reader.table[plate.ring_offset].value;
+  const double least = reader.span_of(plate.ring_offset).first;
   for (int i = 0; i < rows; ++i) {
     const std::vector<double>& row = table.table.rows[static_cast<std::size_t>(i)];
     const Where place{path.string(), table.lines[static_cast<std::size_t>(i)]};

@@ -89,7 +89,7 @@ Droplet read_shell(ConfigReader& reader, const Block& parent) {
                                               described<ShellDirector>("core_offset_um"));
         const Parameter& p = reader.table[shell.offset_um[i]];
         away += std::pow(p.value, 2);
-        zero = zero && p.value == 0 && !p.free;
+        zero = zero && p.value == 0 && !reader.varies(shell.offset_um[i]);
       }
       if (zero) shell.offset_um = {};  // a core in the middle is a simpler scene
     }
@@ -180,7 +180,7 @@ Plate read_plate(ConfigReader& reader, const Block& parent, View& shown) {
   read_ring_view(reader, view, plate);
   const ParameterRef* axis = plate.director.axis.data();
   const auto upright = [&](ParameterRef ref, double value) {
-    return !reader.table[ref].free && reader.table[ref].value == value;
+    return !reader.varies(ref) && reader.table[ref].value == value;
   };
   if (axis[0] ? !(upright(axis[0], 0) && upright(axis[1], 0))
               : plate.director.tilt_deg && !upright(plate.director.tilt_deg, 90))
@@ -337,8 +337,8 @@ Slab read_slab(ConfigReader& reader, const Block& parent, View& shown) {
 /// passes.
 void check_within(ConfigReader& reader, ParameterRef ref, double lower, double upper, const std::string& why) {
   const Parameter& parameter = reader.table[ref];
-  for (double value : {parameter.value, parameter.free ? parameter.lower : parameter.value,
-                       parameter.free ? parameter.upper : parameter.value}) {
+  const auto [low, high] = reader.span_of(ref);
+  for (double value : {parameter.value, low, high}) {
     if (std::isfinite(value) && (value < lower || value > upper)) {
       reader.problems.add(parameter.where, parameter.name + ": " + show(value) + " is outside [" + show(lower) + ", " +
                                                show(upper) + "], " + why);
@@ -519,7 +519,7 @@ void read_demand(ConfigReader& reader, const Block& root, const Scene& scene) {
 
 bool is_defocused(const ConfigReader& reader, const Scene& scene) {
   const ParameterRef focus = scene.microscope.focus_um;
-  return focus && (reader.table[focus].free || reader.table[focus].value != 0);
+  return focus && (reader.varies(focus) || reader.table[focus].value != 0);
 }
 
 void add_defocus_problem(ConfigReader& reader, const Scene& scene) {

@@ -21,19 +21,26 @@ Json plain_number(const NumberSpec& spec) {
   return json;
 }
 
+/// A number that is tied to others, or arithmetic: a sign between two numbers or names, a function, a path of keys.
+Json expression() {
+  return {{"type", "string"},
+          {"description", "tied to other numbers: 2 * sample.cell.thickness_um"},
+          {"pattern", "[*^(]|[0-9]/| [-+/] |[A-Za-z_]\\.[A-Za-z_]"}};
+}
+
 /// The forms of a number: known as well as such numbers are, to a standard deviation or exactly; fitted; with a prior.
 Json number_schema(const NumberSpec& spec, const std::string& words) {
   Json fit = {{{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}};
   if (spec.automatic) fit.push_back({{"const", "auto"}});
   const Json parameter = {{"type", "object"},
                           {"properties",
-                           {{"value", plain_number(spec)},
+                           {{"value", {{"anyOf", {plain_number(spec), expression()}}}},
                             {"fit", {{"anyOf", std::move(fit)}}},
                             {"prior_sd", {{"type", "number"}, {"exclusiveMinimum", 0}}},
                             {"exact", {{"type", "boolean"}}}}},
                           {"additionalProperties", false}};
   Json json = {{"description", words + (spec.unit.empty() ? "" : " (" + spec.unit + ")")},
-               {"anyOf", {plain_number(spec), parameter}}};
+               {"anyOf", {plain_number(spec), parameter, expression()}}};
   if (spec.fallback) json["default"] = *spec.fallback;
   return json;
 }
@@ -201,6 +208,9 @@ std::string config_schema() {
                            {"items", {{"type", "integer"}, {"minimum", 1}}},
                            {"minItems", 2},
                            {"maxItems", 2}};
+  keys["report"] = {{"description", "quantities that follow from numbers of the config, by name: expressions"},
+                    {"type", "object"},
+                    {"additionalProperties", {{"type", "string"}}}};
   schema["additionalProperties"] = false;
   return schema.dump(2) + "\n";
 }

@@ -78,7 +78,7 @@ std::string report_html(const Config& config, const FitResult& result) {
   if (!frames.empty()) out += "<h2>Images</h2>\n";
   for (const Frame& frame : frames) out += frame_section(frame, result, figure, largest_side);
 
-  out += "<h2>Parameters</h2>\n" + parameter_table(result) + statistics_section(config, result);
+  out += "<h2>Parameters</h2>\n" + parameter_table(result) + derived_table(result) + statistics_section(config, result);
   out += stated_table(result);
   out += departures_table(result);
   out += input_table(result);

@@ -52,6 +52,13 @@ std::string key_numbers(const FitResult& result) {
       ++shown;
       out += "<div><dt>" + escape_html(short_name(p.name)) + "</dt><dd>" + estimate_html(p) + "</dd></div>\n";
     }
+  for (const DerivedEstimate& d : result.derived)
+    if (!d.tied && d.stderr_ > 0 && shown++ < 2 * kShown)
+      out += "<div><dt>" + escape_html(d.name) + "</dt><dd>" +
+             fmt::format("{} <small>\u00b1 {}</small>{}", value_html(d.value, d.stderr_),
+                         html_number(format_error(d.stderr_)),
+                         d.unit.empty() ? "" : "<small>" + unit_suffix(d.unit) + "</small>") +
+             "</dd></div>\n";
   out += "<div><dt>reduced chi-square</dt><dd>" + plain(result.reduced_chi_square) +
          fmt::format(" <small>{} d.o.f.</small></dd></div>\n", result.degrees_of_freedom);
   if (const double fraction = residual_fraction(result); std::isfinite(fraction))
@@ -94,6 +101,29 @@ std::string parameter_table(const FitResult& result) {
     out += "<td class=\"left\">" + pretty_unit(p.unit) + "</td></tr>\n";
   }
   return out + "</table></div>\n";
+}
+
+std::string derived_table(const FitResult& result) {
+  std::string rows;
+  for (const DerivedEstimate& d : result.derived) {
+    const std::string brief = short_name(d.name);
+    rows += "<tr><td class=\"name\">" + escape_html(brief) +
+            (brief != d.name ? "<small>" + escape_html(d.name) + "</small>" : "") + "</td>";
+    rows += "<td class=\"value\">" + (d.stderr_ > 0 ? value_html(d.value, d.stderr_) : plain(d.value)) + "</td>";
+    rows += "<td>" +
+            (d.stderr_ > 0    ? html_number(format_error(d.stderr_))
+             : d.stderr_ == 0 ? "exact"
+                              : "not known") +
+            "</td>";
+    rows += "<td>" + (d.stderr_ > 0 ? interval_html(d.interval95_low, d.interval95_high, d.stderr_) : "\u2013") +
+            "</td><td class=\"left\">" + pretty_unit(d.unit) + "</td><td class=\"left\"><code>" +
+            escape_html(printable(d.expression)) + "</code></td></tr>\n";
+  }
+  if (rows.empty()) return {};
+  return "<h3>What follows from them</h3>\n<div class=\"scroll\"><table class=\"full\">\n<tr><th>quantity</th>"
+         "<th>value</th><th>std. error</th><th>95 % interval</th><th class=\"left\">unit</th><th class=\"left\">"
+         "by</th></tr>\n" +
+         rows + "</table></div>\n";
 }
 
 std::string correlation_table(const FitResult& result) {

@@ -10,6 +10,8 @@ namespace birefit::page {
 /// The estimates that were asked for, for the top of the page.
 std::string key_numbers(const FitResult& result);
 std::string parameter_table(const FitResult& result);
+/// What is tied, and what `report:` asked for; "" where there is none.
+std::string derived_table(const FitResult& result);
 std::string statistics_section(const Config& config, const FitResult& result);
 std::string correlation_table(const FitResult& result);
 /// How the branches of the sample compare.

@@ -62,6 +62,21 @@ FitResult fit_of(const json& root) {
   fit.stated_covariance = matrix_of(root.at("stated_covariance").at("matrix"), fit.names.size());
   fit.misfit = root.at("misfit");
   for (const std::string& name : fit.names) fit.parameters.push_back(estimate_of(name, root.at("parameters").at(name)));
+  for (const json& entry : root.at("derived")) {
+    DerivedEstimate derived;
+    derived.name = entry.at("name");
+    derived.expression = entry.at("expression");
+    derived.tied = entry.at("tied");
+    derived.unit = entry.at("unit");
+    derived.value = number(entry.at("value"));
+    derived.stderr_ = number(entry.at("stderr"));
+    derived.interval95_low = number(entry.at("interval_95").at(0));
+    derived.interval95_high = number(entry.at("interval_95").at(1));
+    const json& slopes = entry.at("slopes");
+    derived.by.resize(static_cast<Eigen::Index>(slopes.size()));
+    for (std::size_t k = 0; k < slopes.size(); ++k) derived.by[static_cast<Eigen::Index>(k)] = number(slopes[k]);
+    fit.derived.push_back(std::move(derived));
+  }
   return fit;
 }
 

@@ -81,6 +81,23 @@ Json stated_json(const FitResult& result) {
   return list;
 }
 
+Json derived_json(const FitResult& result) {
+  Json list = Json::array();
+  for (const DerivedEstimate& d : result.derived) {
+    Json slopes = Json::array();
+    for (const double by : d.by) slopes.push_back(number(by));
+    list.push_back({{"name", d.name},
+                    {"expression", d.expression},
+                    {"tied", d.tied},
+                    {"unit", d.unit},
+                    {"value", number(d.value)},
+                    {"stderr", number(d.stderr_)},
+                    {"interval_95", {number(d.interval95_low), number(d.interval95_high)}},
+                    {"slopes", std::move(slopes)}});
+  }
+  return list;
+}
+
 Json plan_json(const RenderPlan& plan) {
   return {{"method", plan.method},
           {"physics", plan.physics},
@@ -234,6 +251,17 @@ std::string parameter_line(const ParameterEstimate& p, std::size_t name_width) {
   return line;
 }
 
+std::string derived_line(const DerivedEstimate& d, std::size_t name_width) {
+  std::string line = fmt::format("  {:<{}} = ", d.name, name_width);
+  if (std::isfinite(d.stderr_) && d.stderr_ > 0)
+    line += fmt::format("{} +/- {}{} ({}) [95%: {} .. {}]", format_value(d.value, d.stderr_), format_error(d.stderr_),
+                        unit_suffix(d.unit), d.value != 0 ? format_percent(d.stderr_ / std::abs(d.value)) : "-",
+                        format_value(d.interval95_low, d.stderr_), format_value(d.interval95_high, d.stderr_));
+  else
+    line += fmt::format("{:.6g}{}{}", d.value, unit_suffix(d.unit), d.stderr_ == 0 ? "" : " +/- not known");
+  return line + " = " + d.expression;
+}
+
 std::string coverage_text(const Coverage& c) {
   std::string text = fmt::format(
       "  {} images simulated at this result ({}) and fitted from scratch: {} with an answer, {} of them more than 5 "
@@ -296,6 +324,7 @@ std::string fit_json(const Config& config, const FitResult& result) {
   json["departures"] = departures_json(result);
   json["parameters"] = Json::object();
   for (const ParameterEstimate& p : result.parameters) json["parameters"][p.name] = parameter_json(p);
+  json["derived"] = derived_json(result);
   json["coverage"] = coverage_json(result);
   json["samples"] = samples_json(result);
   json["correlation"] = matrix(result.names, result.correlation);
@@ -359,6 +388,10 @@ std::string summary(const FitResult& result) {
   std::size_t width = 0;
   for (const ParameterEstimate& p : result.parameters) width = std::max(width, p.name.size());
   for (const ParameterEstimate& p : result.parameters) text += parameter_line(p, width) + "\n";
+  width = 0;
+  for (const DerivedEstimate& d : result.derived) width = std::max(width, d.name.size());
+  if (!result.derived.empty()) text += "  what follows from them\n";
+  for (const DerivedEstimate& d : result.derived) text += derived_line(d, width) + "\n";
 
   text += fmt::format("  reduced chi-square {:.4g} ({} degrees of freedom), residual rms {}\n",
                       result.reduced_chi_square, result.degrees_of_freedom, describe_residual(result));

@@ -117,6 +117,26 @@ std::string cells(const ParameterEstimate& p) {
                                : "");
 }
 
+/// What follows from a frame's numbers, once other frames have moved these: to first order. `all` is in the order of
+/// the fit's own names.
+void move_derived(FitResult& fit, const Posterior& all, double t) {
+  Eigen::VectorXd change(static_cast<Eigen::Index>(fit.names.size()));
+  for (std::size_t k = 0; k < fit.names.size(); ++k) change[static_cast<Eigen::Index>(k)] = 0;
+  for (const ParameterEstimate& p : fit.parameters) {
+    const auto here = std::find(fit.names.begin(), fit.names.end(), p.name) - fit.names.begin(),
+               there = std::find(all.names.begin(), all.names.end(), p.name) - all.names.begin();
+    if (here < change.size() && there < all.mean.size()) change[here] = all.mean[there] - p.value;
+  }
+  for (DerivedEstimate& d : fit.derived) {
+    if (d.by.size() != change.size() || all.covariance.rows() != fit.covariance.rows()) continue;
+    const double before = d.by.dot(fit.covariance * d.by), after = d.by.dot(all.covariance * d.by);
+    d.value += d.by.dot(change);
+    d.stderr_ = std::sqrt(std::max(0.0, d.stderr_ * d.stderr_ - before + after));
+    d.interval95_low = d.value - t * d.stderr_;
+    d.interval95_high = d.value + t * d.stderr_;
+  }
+}
+
 }  // namespace
 
 ImageSeries load_series(const std::filesystem::path& path, const std::vector<std::string>& set) {
@@ -256,6 +276,7 @@ SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<
       of_shared.push_back(std::find(all.names.begin(), all.names.end(), name) - all.names.begin());
     stated += in_common(of_shared, of_shared) / static_cast<double>(posteriors.size());
     const double t = interval95_factor(all.degrees_of_freedom);
+    move_derived(fit, all, t);
     fit.covariance = all.covariance;
     for (ParameterEstimate& p : fit.parameters) {
       if (!p.limit.empty()) continue;
@@ -283,6 +304,11 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
   std::string text = pages ? "file,page" : "file";
   for (const ImageSeries::Column& column : series.columns) text += "," + csv_field(column.name);
   for (const std::string& name : names) text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", name);
+  std::vector<std::string> derived;
+  for (const auto& fit : result.frames)
+    for (const DerivedEstimate& d : fit ? fit->derived : std::vector<DerivedEstimate>{})
+      if (std::find(derived.begin(), derived.end(), d.name) == derived.end()) derived.push_back(d.name);
+  for (const std::string& name : derived) text += fmt::format(",{0},{0}_stderr,{0}_low95,{0}_high95", name);
   text += ",reduced_chi_square,verdict,reason\n";
   for (std::size_t i = 0; i < series.frames.size(); ++i) {
     const auto& fit = result.frames[i];
@@ -296,6 +322,14 @@ std::string series_csv(const ImageSeries& series, const SeriesResult& result) {
         for (const ParameterEstimate& p : fit->parameters)
           if (p.name == name) estimate = &p;
       text += "," + (estimate ? cells(*estimate) : ",,,");
+    }
+    for (const std::string& name : derived) {
+      const DerivedEstimate* found = nullptr;
+      for (std::size_t k = 0; fit && k < fit->derived.size(); ++k)
+        if (fit->derived[k].name == name) found = &fit->derived[k];
+      text += found ? fmt::format(",{},{},{},{}", cell(found->value), cell(found->stderr_), cell(found->interval95_low),
+                                  cell(found->interval95_high))
+                    : ",,,,";
     }
     if (fit)
       text += fmt::format(",{},{},{}\n", cell(fit->reduced_chi_square), fit->grade(),

@@ -66,6 +66,7 @@ Theta drawn(const FitJob& job, std::mt19937_64& random) {
                                                      std::min(p.upper - rim, value + reach))(random);
     }
   }
+  job.parameters.follow(theta);
   return theta;
 }
 
@@ -114,6 +115,7 @@ std::vector<Image> exposed(const FitJob& whole, const Disturbance* departure, Ex
   demand.intensity_accuracy = std::min(demand.intensity_accuracy, 1e-5);
   Theta shown = truth;
   if (departure && departure->scene) departure->scene(exposure, shown);
+  whole.parameters.follow(shown);
   const auto mixed = departure && departure->mixed ? departure->mixed(exposure, shown)
                                                    : std::vector<std::pair<double, Theta>>{{1, shown}};
   std::vector<Image> frames;
@@ -123,6 +125,7 @@ std::vector<Image> exposed(const FitJob& whole, const Disturbance* departure, Ex
     Scene scene = sight.picture->scene;
     for (const auto& [weight, as_mixed] : mixed) {
       Theta theta = as_mixed;
+      whole.parameters.follow(theta);
       if (departure && departure->added) {
         scene = sight.picture->scene;
         departure->added(exposure, scene, theta);

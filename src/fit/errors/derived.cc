@@ -1,0 +1,104 @@
+// Numbers that follow from others, with the errors that these have together.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "birefit/expression.h"
+#include "fit/errors/report.h"
+#include "fit/problem/shared_zeros.h"
+
+namespace birefit::estimation {
+namespace {
+
+/// What a number owes to all that is not exact.
+struct Owed {
+  Eigen::VectorXd by;    ///< d(number)/d(unknown)
+  double variance = 0;   ///< of the number
+  double by_stated = 0;  ///< the part of it that is no estimate: by what is stated and not fitted
+  bool known = true;     ///< no unknown that it follows from is without an error
+};
+
+using ValueAt = std::function<double(const Theta&)>;
+
+/// To first order in the unknowns. What is stated moves these with it, as far as a fit went: a retardance is known far
+/// better than the thickness that was stated, if the birefringence has made up for it.
+Owed owed(const Task& task, const Covariances& covariances, const FitResult& result,
+          const std::vector<TieSlope>& slopes, const ValueAt& value_at) {
+  const Stated& stated = covariances.stated;
+  Owed owed{Eigen::VectorXd::Zero(task.unknowns.size())};
+  double alone = 0;  // what nothing fitted depends on
+  for (const TieSlope& slope : slopes) {
+    bool found = false;
+    for (int j = 0; j < task.unknowns.size() && !found; ++j)
+      if ((found = task.unknowns.table_index(j) == slope.index)) {
+        owed.by[j] = slope.by;
+        owed.known = owed.known && std::isfinite(result.parameters[static_cast<std::size_t>(j)].stderr_);
+      }
+    for (Eigen::Index i = 0; i < stated.sd.size() && !found; ++i)
+      found = stated.index[static_cast<std::size_t>(i)] == slope.index;
+    const Parameter& parameter = task.job.parameters[slope.index];
+    if (!found) alone += std::pow(slope.by * parameter.known_to.of(parameter.value), 2);
+  }
+  const double together = owed.by.dot(result.covariance * owed.by);
+  double apart = 0, stated_variance = alone;
+  const double value = value_at(result.theta);
+  for (Eigen::Index i = 0; i < stated.sd.size() && stated.shift.size() > 0; ++i) {
+    apart += std::pow(owed.by.dot(stated.shift.col(i)), 2);
+    Theta otherwise = result.theta;
+    otherwise[static_cast<std::size_t>(stated.index[static_cast<std::size_t>(i)])] += stated.sd[i];
+    for (int j = 0; j < task.unknowns.size(); ++j)
+      otherwise[static_cast<std::size_t>(task.unknowns.table_index(j))] += stated.shift(j, i);
+    task.job.parameters.follow(otherwise);
+    stated_variance += std::pow(value_at(otherwise) - value, 2);
+  }
+  owed.variance = std::max(0.0, together - apart) + stated_variance;
+  owed.by_stated = stated_variance;
+  return owed;
+}
+
+}  // namespace
+
+void report_derived(const Task& task, const Covariances& covariances, FitResult& result) {
+  const ParameterTable& table = task.job.parameters;
+  const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom), normal = normal_quantile(0.975);
+  const auto add = [&](const std::string& name, const std::string& unit, const Tie& tie, bool tied, double value,
+                       const std::vector<TieSlope>& slopes, const ValueAt& value_at) {
+    const Owed of = owed(task, covariances, result, slopes, value_at);
+    DerivedEstimate estimate;
+    estimate.name = name, estimate.unit = unit, estimate.expression = tie.law->text();
+    estimate.tied = tied, estimate.value = value;
+    estimate.by = of.by;
+    estimate.stderr_ = of.known && std::isfinite(value) && std::isfinite(of.variance)
+                           ? std::sqrt(of.variance)
+                           : std::numeric_limits<double>::quiet_NaN();
+    const double half = std::sqrt(t * t * std::max(0.0, of.variance - of.by_stated) + normal * normal * of.by_stated);
+    const double reach = std::isfinite(estimate.stderr_) ? half : estimate.stderr_;
+    estimate.interval95_low = value - reach;
+    estimate.interval95_high = value + reach;
+    result.derived.push_back(std::move(estimate));
+  };
+  for (const int index : table.tied()) {
+    if (table.tie_of(index)->law->text() == kByZero) continue;
+    const Parameter& parameter = table[index];
+    const double value = result.theta[static_cast<std::size_t>(index)];
+    const bool of_row = parameter.name.find("].row[") != std::string::npos;  // of which there are hundreds
+    if (!of_row)
+      add(parameter.name, parameter.unit, *table.tie_of(index), true, value, table.slopes(index, result.theta),
+          [index](const Theta& theta) { return theta[static_cast<std::size_t>(index)]; });
+    if (!table.is_held(index, result.theta)) continue;
+    // Beyond it there is no such sample: the data pull across an end that is not the fitted parameters' own.
+    result.pinned = true;
+    if (of_row) continue;
+    DerivedEstimate& held = result.derived.back();
+    held.held = true, held.expected = table.value_of(*table.tie_of(index), result.theta);
+    held.stderr_ = held.interval95_low = held.interval95_high = std::numeric_limits<double>::quiet_NaN();
+  }
+  for (const Derived& derived : task.job.derived)
+    add(derived.name, derived.unit, derived.tie, false, table.value_of(derived.tie, result.theta),
+        table.slopes(derived.tie, result.theta),
+        [&](const Theta& theta) { return table.value_of(derived.tie, theta); });
+}
+
+}  // namespace birefit::estimation
