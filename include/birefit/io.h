@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,8 @@ struct SignalTable {
   std::string quantity = "signal";  ///< what was measured, for its axis
 };
 
+struct InMemory;  // birefit/in_memory.h
+
 struct Config;
 /// What the rows of a config's tables say about themselves, in sentences: which stand out of their neighbours, whether
 /// what is measured depends on when it was measured.
@@ -36,6 +39,9 @@ struct Config {
   std::vector<Scene> colours;                 ///< of a picture of red, green and blue: the same scene in each
   Observable observable;                      ///< what is measured in it
   std::vector<std::filesystem::path> inputs;  ///< every file that was read beside the config
+  /// Of a fit: those of `inputs` that are no files but arrays (InMemory), with the SHA-256 of their samples, row after
+  /// row, or of their bytes.
+  std::map<std::filesystem::path, std::string> arrays;
   /// of a frame of a series: all that determines its fit (birefit/series.h); goes into fit.json
   std::string fingerprint;
 };
@@ -55,10 +61,11 @@ Config load_config(const std::filesystem::path& path, ConfigUse use,
                    const std::optional<std::filesystem::path>& image = std::nullopt,
                    const std::vector<std::string>& set = {});
 /// The same of a config that is no file: `name` is what errors call it, and its folder where files that it names are
-/// looked for.
+/// looked for. What the config, or `image`, names and `in_memory` has is taken from there; it is read during this call
+/// alone.
 Config load_config_text(std::string text, const std::filesystem::path& name, ConfigUse use,
                         const std::optional<std::filesystem::path>& image = std::nullopt,
-                        const std::vector<std::string>& set = {});
+                        const std::vector<std::string>& set = {}, const InMemory* in_memory = nullptr);
 
 // ---- images ---------------------------------------------------------------------------------------------------------
 

@@ -13,12 +13,12 @@
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/watch.h"
-#include "app/work.h"
 #include "birefit/audit.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "core/threads.h"
 #include "io/report/format.h"
+#include "io/results/work.h"
 
 namespace birefit {
 namespace {

@@ -15,10 +15,10 @@
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/watch.h"
-#include "app/work.h"
 #include "birefit/forecast.h"
 #include "birefit/io.h"
 #include "core/printable.h"
+#include "io/results/work.h"
 
 namespace birefit {
 namespace {
@@ -93,7 +93,7 @@ int run_each(const Arguments& arguments) {
       job.options.samples = arguments.samples;
       job.options.interrupted = &interrupt.flag();
       const double memory = memory_to_fit(job);
-      result = watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); });
+      result = watched(arguments.quiet, job, [&] { return fit_config(config); });
       do_work(config, memory, [&] { write_results(folder_of_droplet(i), config, result, picture_formats(arguments)); });
       folder.keep();
       if (!arguments.quiet)
@@ -144,8 +144,7 @@ int run_fit(const Arguments& arguments) {
   job.options.interrupted = &interrupt.flag();
   const double memory = memory_to_fit(job);
   const std::vector<std::string> formats = picture_formats(arguments);
-  FitResult result = watched(arguments.quiet, job, [&] { return do_work(config, memory, [&] { return fit(job); }); });
-  for (std::string& words : describe_rows(config)) result.warnings.push_back(std::move(words));
+  FitResult result = watched(arguments.quiet, job, [&] { return fit_config(config); });
   if (arguments.coverage > 0 && result.has_answer() && config.signals.empty()) {
     write_results(out, config, result, formats);  // the audit may take hours
     folder->keep();

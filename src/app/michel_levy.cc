@@ -12,11 +12,11 @@
 
 #include "app/commands.h"
 #include "app/output.h"
-#include "app/work.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "io/files/file.h"
 #include "io/report/colour_strip.h"
+#include "io/results/work.h"
 #include "study/interference_chart.h"
 
 namespace birefit {

@@ -1,5 +1,6 @@
 // birefit render: the forward image at the config's values.
 
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -10,11 +11,12 @@
 
 #include "app/commands.h"
 #include "app/output.h"
-#include "app/work.h"
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "instrument/colour.h"
 #include "io/files/file.h"
+#include "io/results/picture.h"
+#include "io/results/work.h"
 
 namespace birefit {
 namespace {
@@ -43,24 +45,19 @@ int run_render(const Arguments& arguments) {
   problems.throw_if_any();
 
   const Theta theta = config.job.parameters.values();
-  const auto [chosen, rendering] = do_work(config, memory_to_render(config.scene), [&] {
-    const std::vector<Scene>& scenes = config.colours.empty() ? std::vector<Scene>{config.scene} : config.colours;
-    RenderPlan chosen;
-    Rendering rendering;
+  const auto [chosen, size] = do_work(config, memory_to_render(config.scene), [&] {
+    const std::vector<RenderPlan> plans = plans_of(config, theta);
     std::vector<Image> channels;
-    for (const Scene& scene : scenes) {
-      chosen = plan(scene, config.job.demand, theta, config.observable);
-      rendering = render(scene, chosen, theta, {}, arguments.threads);
-      channels.push_back(rendering.intensity);
-    }
+    for (Rendering& rendering : render_config(config, plans, theta, {}, arguments.threads))
+      channels.push_back(std::move(rendering.intensity));
     // As cameras write what is to be looked at.
     if (channels.size() > 1 && std::filesystem::path(arguments.out).extension() == ".png")
       for (Image& channel : channels)
         for (double& value : channel.values()) value = srgb_code(value);
-    const ParameterRef size = config.scene.view.pixel_size_um;
-    const double pixel_size_um = size ? size.in(theta) : 0;
+    const ParameterRef pixel = config.scene.view.pixel_size_um;
+    const double pixel_size_um = pixel ? pixel.in(theta) : 0;
     write_file(arguments.out, encode_channels(channels, arguments.out, pixel_size_um));
-    return std::pair(chosen, std::move(rendering));
+    return std::pair(plans.back(), std::array{channels[0].width(), channels[0].height()});
   });
   if (!arguments.quiet) {
     print_warnings(config.job.warnings);
@@ -68,8 +65,8 @@ int run_render(const Arguments& arguments) {
     print_warnings(chosen.warnings);
     print_warnings(chosen.left_out);
     std::cout << fmt::format("{}: {} x {} pixels, method {} ({}), numerical error {:.1e}, model error {:.1e}\n",
-                             printable(arguments.out), rendering.intensity.width(), rendering.intensity.height(),
-                             chosen.method, chosen.physics, chosen.numerical_error, chosen.model_error);
+                             printable(arguments.out), size[0], size[1], chosen.method, chosen.physics,
+                             chosen.numerical_error, chosen.model_error);
   }
   return kExitDone;
 }

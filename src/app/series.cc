@@ -16,12 +16,12 @@
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/watch.h"
-#include "app/work.h"
 #include "birefit/series.h"
 #include "core/printable.h"
 #include "core/threads.h"
 #include "io/files/table.h"
 #include "io/report/chart.h"
+#include "io/results/work.h"
 
 namespace birefit {
 namespace {

@@ -5,21 +5,12 @@
 #include <system_error>
 #include <utility>
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include "core/printable.h"
+#include "io/results/work.h"
 
 namespace birefit {
-
-std::string describe_duration(double seconds) {
-  constexpr double kMinute = 60, kHour = 3600, kDay = 24 * kHour;
-  if (seconds < 1) return "less than 1 s";
-  if (seconds < 1.5 * kMinute) return fmt::format("{:.0f} s", seconds);
-  if (seconds < 1.5 * kHour) return fmt::format("{:.0f} min", seconds / kMinute);
-  if (seconds < 2 * kDay) return fmt::format("{:.2g} h", seconds / kHour);
-  return fmt::format("{:.0f} days", seconds / kDay);
-}
 
 Watch::Watch(bool quiet, std::function<double(double)> left)
     : quiet_(quiet), terminal_(!quiet && ::isatty(STDERR_FILENO)), left_(std::move(left)) {

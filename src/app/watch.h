@@ -11,9 +11,6 @@
 
 namespace birefit {
 
-/// "40 s", "3 min", "2.5 h".
-std::string describe_duration(double seconds);
-
 class Watch {
  public:
   /// `left`: seconds that are left after so many, NaN where nobody knows; asked on a thread of its own, first after

@@ -57,7 +57,11 @@ LeastSquares::LeastSquares(const Task& task, std::vector<RenderPlan> plans, std:
     frame.inverse_sigma_norm = frame.inverse_sigma.norm();
     frame.shared = frame.set.shared_sd * frame.inverse_sigma_norm;
     for (const LightTerm& light : light_terms(picture)) {
-      Term term{light, light.coefficient ? position(unknowns_.linear, light.coefficient.index) : -1, {}, {}};
+      Term term{light,
+                light.coefficient ? position(unknowns_.linear, light.coefficient.index) : -1,
+                light.coefficient ? position(unknowns_.searched, light.coefficient.index) : -1,
+                {},
+                {}};
       if (term.shape) {
         term.at_pixels.resize(frame.count);
         for (Eigen::Index i = 0; i < frame.count; ++i)
@@ -369,6 +373,8 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
     auto columns = searched_columns_.middleRows(frame.begin, frame.count);
     to_values(frame, columns, all, threads);
     whiten(frame, columns, threads);
+    for (const Term& term : frame.terms)
+      if (term.searched >= 0) columns.col(term.searched) += term.whitened;
   });
   if (prior_root_.rows() > 0)
     searched_columns_.bottomRows(prior_root_.rows()) = prior_slope_.asDiagonal() * prior_root_.leftCols(p);

@@ -65,6 +65,10 @@ class LeastSquares {
   const Theta& theta() const { return theta_; }
   /// Inverse covariance of the linear unknowns where the searched ones are known, by the weights and priors.
   const Eigen::MatrixXd& linear_information() const { return linear_information_; }
+  /// Whitened, the priors' rows last; whitened model less value.
+  const Eigen::VectorXd& residual() const { return residual_; }
+  /// Of the rows of residual() by the searched unknowns, the linear ones held; after evaluate() with derivatives.
+  const Eigen::MatrixXd& searched_columns() const { return searched_columns_; }
   const Eigen::VectorXd& intensity() const { return intensity_; }  ///< of the model, every pixel of every frame
   int evaluations() const { return evaluations_; }
   /// Noise-whitened residual sums of one micrograph, its misfit weights not applied.
@@ -125,7 +129,8 @@ class LeastSquares {
 
  private:
   struct Term : LightTerm {
-    int unknown = -1;           ///< index among the linear unknowns, -1 = known
+    int unknown = -1;           ///< index among the linear unknowns, -1 = known or searched
+    int searched = -1;          ///< index among the searched unknowns, where a task searches it after all
     Eigen::VectorXd at_pixels;  ///< the shape, or what the effect does; empty where it is 1
     Eigen::VectorXd whitened;   ///< what the coefficient stands before
   };

@@ -29,6 +29,8 @@
 #include "io/config/signal_frames.h"
 #include "io/config/starts.h"
 #include "io/config/ties.h"
+#include "io/files/array_image.h"
+#include "io/files/whole_file.h"
 #include "medium/references.h"
 
 namespace birefit {
@@ -66,16 +68,28 @@ bool fits_in(const MicrographSettings& settings, const std::array<int, 2>& size)
          std::min(roi.width(), roi.height()) >= settings.bin;
 }
 
+/// What was read of arrays, for whoever wants to know what a result was made of.
+void note_arrays(const ConfigReader& reader, const std::optional<std::filesystem::path>& image, Config& config) {
+  if (image && reader.image_in_memory(*image)) config.inputs.push_back(*image);
+  for (const std::filesystem::path& input : config.inputs)
+    if (const ArrayImage* array = reader.image_in_memory(input))
+      config.arrays[input] = sha256(*array);
+    else if (const std::string* field = reader.field_in_memory(input))
+      config.arrays[input] = sha256(*field);
+}
+
 /// `image` replaces the single micrograph's file; with `series` the micrograph is one of its frames. Without `starts`
 /// nothing is looked for in the image: enough to know that a config is sound. `tied`: what tied numbers begin with,
 /// which is known once the config was read; null: it has to be read for that.
 Config load(const std::filesystem::path& path, const std::string& text, const std::vector<std::string>& set,
             ConfigUse use, const std::optional<std::filesystem::path>& image, const ImageSeries* series = nullptr,
-            std::size_t frame = 0, bool starts = true, const TieStarts* tied = nullptr) {
+            std::size_t frame = 0, bool starts = true, const TieStarts* tied = nullptr,
+            const InMemory* in_memory = nullptr) {
   Config config;
   config.path = path;
   ConfigReader reader(path.string(), path.parent_path(), use);
   if (tied) reader.tie_starts = *tied;
+  reader.in_memory = in_memory;
   const YamlNode tree = parse_config(text, reader.file, set, reader.problems);
   config.text = text_as_set(text, tree, set);
   const Block root{&tree, "", {reader.file}};
@@ -220,7 +234,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
   for (Readings& table : tables)
     for (Scene& scene : table.rows) scenes.push_back(&scene);
   const TieStarts found = bind_ties(reader, scenes, wanted, config.job.derived);
-  if (!tied && !reader.ties.empty()) return load(path, text, set, use, image, series, frame, starts, &found);
+  if (!tied && !reader.ties.empty()) return load(path, text, set, use, image, series, frame, starts, &found, in_memory);
 
   // An image may have a focus of its own, which only waves know.
   for (const Picture& own : micrographs) {
@@ -238,11 +252,13 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
 
   // Without an image to look at there is only the view.
   const bool view_only =
-      use == ConfigUse::render ||
-      (use == ConfigUse::plan && !image && signals.empty() &&
-       std::none_of(items.begin(), items.end(), [&](const Item& i) {
-         return i.image && (!size || std::filesystem::exists(reader.resolve(*i.image)));  // named, but not yet taken
-       }));
+      use == ConfigUse::render || (use == ConfigUse::plan && !image && signals.empty() &&
+                                   std::none_of(items.begin(), items.end(), [&](const Item& i) {
+                                     if (!i.image || !size) return i.image.has_value();
+                                     const std::filesystem::path file = reader.resolve(*i.image);
+                                     return reader.image_in_memory(file) ||
+                                            std::filesystem::exists(file);  // named, but not yet taken
+                                   }));
   if (use != ConfigUse::render) {
     // A shared parameter that every image replaces by its own is no unknown of the fit.
     std::set<int> used;
@@ -480,6 +496,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
   config.job.warnings = std::move(reader.warnings);
   config.job.misfit = std::move(reader.misfit);
   config.inputs.assign(reader.inputs.begin(), reader.inputs.end());
+  if (use == ConfigUse::fit) note_arrays(reader, image, config);
   return config;
 }
 
@@ -491,19 +508,20 @@ Config load_config(const std::filesystem::path& path, ConfigUse use, const std::
 }
 
 Config load_config_text(std::string text, const std::filesystem::path& path, ConfigUse use,
-                        const std::optional<std::filesystem::path>& image, const std::vector<std::string>& set) {
+                        const std::optional<std::filesystem::path>& image, const std::vector<std::string>& set,
+                        const InMemory* in_memory) {
   if (use != ConfigUse::fit && holds_series(text, set)) {
     // What the frames have in common shows in the first that can be read.
     const ImageSeries series = read_series(path, std::move(text), set);
     for (std::size_t frame = 0;; ++frame) {
       try {
-        return load(path, series.text, set, use, image, &series, frame);
+        return load(path, series.text, set, use, image, &series, frame, true, nullptr, in_memory);
       } catch (const FrameError&) {
         if (frame + 1 == series.frames.size()) throw;
       }
     }
   }
-  return load(path, text, set, use, image);
+  return load(path, text, set, use, image, nullptr, 0, true, nullptr, in_memory);
 }
 
 Config load_frame(const ImageSeries& series, std::size_t frame) {

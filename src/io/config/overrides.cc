@@ -222,6 +222,11 @@ std::string text_as_set(const std::string& text, const YamlNode& tree, const std
     std::replace(item.begin(), item.end(), '\n', ' ');
     out += "#   --set " + item + "\n";
   }
+  return out + text_of(tree);
+}
+
+std::string text_of(const YamlNode& tree) {
+  std::string out;
   append_block(tree, "", out);
   return out;
 }

@@ -20,4 +20,7 @@ YamlNode parse_config(const std::string& text, const std::string& file, const st
 /// `set` the text as it is.
 std::string text_as_set(const std::string& text, const YamlNode& tree, const std::vector<std::string>& set);
 
+/// A tree as the text of a config.
+std::string text_of(const YamlNode& tree);
+
 }  // namespace birefit

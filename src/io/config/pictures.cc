@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "io/files/array_image.h"
 #include "io/images/mosaic.h"
 #include "medium/references.h"
 
@@ -239,12 +240,13 @@ void say(ConfigReader& reader, const std::filesystem::path& file, const std::vec
 
 std::optional<LoadedImage> try_load(ConfigReader& reader, const MicrographSettings& settings,
                                     const std::filesystem::path& file, PageChoice page, const Where& where) {
-  if (!settle_page(reader, file, page)) return std::nullopt;
+  if (!reader.image_in_memory(file) && !settle_page(reader, file, page)) return std::nullopt;
   ImageRequest request{file, page.number, settings.channel, where};
   request.cells = !settings.mosaic.parts.empty();
   if (reader.use != ConfigUse::render) request.region = read_for(settings);
   try {
-    LoadedImage image = load_image(request);
+    const ArrayImage* array = reader.image_in_memory(file);
+    LoadedImage image = array ? load_array(request, *array) : load_image(request);
     say(reader, request.path, image.notes);
     return image;
   } catch (const UserError& error) {
@@ -369,7 +371,9 @@ std::optional<LoadedMask> load_user_mask(ConfigReader& reader, const MicrographS
   try {
     ImageRequest request{reader.resolve(*settings.mask), std::nullopt, "mean", settings.mask_where};
     request.region = read_for(settings);
-    LoadedMask mask = load_mask(request);
+    const ArrayImage* array = reader.image_in_memory(request.path);
+    LoadedMask mask = load_mask(
+        request, [&](const ImageRequest& asked) { return array ? load_array(asked, *array) : load_image(asked); });
     say(reader, *settings.mask, mask.notes);
     return mask;
   } catch (const UserError& error) {

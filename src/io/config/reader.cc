@@ -222,6 +222,18 @@ std::optional<double> ConfigReader::value_of(const YamlNode& node, const std::st
   return value;
 }
 
+const ArrayImage* ConfigReader::image_in_memory(const std::filesystem::path& file) const {
+  if (!in_memory) return nullptr;
+  const auto found = in_memory->images.find(file.string());
+  return found == in_memory->images.end() ? nullptr : &found->second;
+}
+
+const std::string* ConfigReader::field_in_memory(const std::filesystem::path& file) const {
+  if (!in_memory) return nullptr;
+  const auto found = in_memory->fields.find(file.string());
+  return found == in_memory->fields.end() ? nullptr : found->second.get();
+}
+
 ParameterRef ConfigReader::constant(const std::string& path, const NumberSpec& spec, double value) {
   Parameter parameter;
   parameter.name = path;

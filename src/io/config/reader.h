@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "birefit/in_memory.h"
 #include "birefit/io.h"
 #include "birefit/light.h"
 #include "birefit/number_spec.h"
@@ -112,12 +113,18 @@ class ConfigReader {
   /// A finite number within the spec's range, else nothing and a problem. `name` is the key shown.
   std::optional<double> value_of(const YamlNode& node, const std::string& name, const NumberSpec& spec);
 
-  /// A file that the config names; noted among `inputs`.
+  /// A file that the config names, or an array of that name; noted among `inputs`.
   std::filesystem::path resolve(const std::string& path) {
     const std::filesystem::path given(path);
-    inputs.insert(given.is_absolute() ? given : folder / given);
-    return given.is_absolute() ? given : folder / given;
+    const bool stays = given.is_absolute() || image_in_memory(given) || field_in_memory(given);
+    inputs.insert(stays ? given : folder / given);
+    return stays ? given : folder / given;
   }
+
+  const InMemory* in_memory = nullptr;  ///< arrays that are read in place of files of their names
+  /// The array in place of a file; null: it is a file.
+  const ArrayImage* image_in_memory(const std::filesystem::path& file) const;
+  const std::string* field_in_memory(const std::filesystem::path& file) const;
 
  private:
   std::optional<double> finite(const YamlNode& node, const std::string& name);

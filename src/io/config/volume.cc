@@ -52,6 +52,7 @@ SampledVolume read_sampled_volume(ConfigReader& reader, const Block& parent) {
   const std::optional<std::string> name = reader.text(block, "file");
   if (!name || !readable) return volume;
   request.path = reader.resolve(*name);
+  request.content = reader.field_in_memory(request.path);
   if (!request.spacing_um) request.where = block.find("file")->where;
   if (axes && (request.path.extension() == ".vti" || request.path.extension() == ".vtk"))
     reader.problems.add(block.find("axes")->where, "axes belongs to .npy files: in a .vti x runs fastest",

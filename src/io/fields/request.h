@@ -12,6 +12,7 @@ namespace birefit {
 
 struct VolumeRequest {
   std::filesystem::path path;
+  const std::string* content = nullptr;             ///< what the file would hold, where it is none; null: it is a file
   Where where;                                      ///< of the config entry, for what is wrong with the request
   std::string array;                                ///< its name, where the file has several; "" = n or Q
   double q_norm = 0;                                ///< Q = q_norm S (n n - 1/3); 0 = the format's own (1, or 3/2)

@@ -172,6 +172,7 @@ RawVolume read_raw(std::string content, const VolumeRequest& request) {
 }  // namespace
 
 LoadedVolume load_volume(const VolumeRequest& request) {
+  if (request.content) return GridMaker(read_raw(*request.content, request), request).make();
   std::error_code code;
   if (!std::filesystem::is_regular_file(request.path, code))
     throw UserError(

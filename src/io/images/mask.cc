@@ -7,10 +7,10 @@
 
 namespace birefit {
 
-LoadedMask load_mask(const ImageRequest& request) {
+LoadedMask load_mask(const ImageRequest& request, const std::function<LoadedImage(const ImageRequest&)>& load) {
   ImageRequest asked = request;
   asked.mask = true;
-  LoadedImage image = load_image(asked);
+  LoadedImage image = load(asked);
   // Programs that compute with masks (ImageJ) store what is selected as the top code and show it black through an
   // inverting lookup table: what is stored counts. Of one bit nothing but what is shown is meant.
   const bool white_is_zero = image.stored_zero != 0, stored_decides = white_is_zero && image.top_code != 1;

@@ -1,6 +1,7 @@
 #pragma once
 // A picture as a choice of pixels.
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,7 +16,9 @@ struct LoadedMask {
   std::vector<std::string> notes;  ///< the reader's, and what was taken as selected
 };
 
-/// Any picture of any depth or lookup table: pixels of value 0 are left out. Throws UserError as load_image does.
-LoadedMask load_mask(const ImageRequest& request);
+/// Any picture of any depth or lookup table: pixels of value 0 are left out. `load`: load_image() or what takes its
+/// place. Throws UserError as it does.
+LoadedMask load_mask(const ImageRequest& request,
+                     const std::function<LoadedImage(const ImageRequest&)>& load = load_image);
 
 }  // namespace birefit

@@ -19,6 +19,7 @@
 
 #include "birefit/io.h"
 #include "io/files/file.h"
+#include "io/images/asked.h"
 #include "io/images/npy_image.h"
 #include "io/images/pages.h"
 #include "io/images/signature.h"
@@ -32,18 +33,11 @@ namespace {
 namespace fs = std::filesystem;
 using OIIO::TypeDesc;
 
-constexpr int kLargestSide = 16384;
 constexpr int kListedPages = 12;
 constexpr int kCountedPages = 1000;            // libtiff walks the chain of pages from its start each time
 constexpr std::size_t kBandBytes = 64u << 20;  // read at once; a whole ordinary image
 
 // ---- reading --------------------------------------------------------------------------------------------------------
-
-[[noreturn]] void refuse(const ImageRequest& request, const std::string& found, const std::string& hint) {
-  Where where = request.where;
-  std::string what = "image '" + request.path.string() + "' " + found;
-  throw UserError(std::move(where), std::move(what), hint);
-}
 
 /// One line of OpenImageIO's messages, fit for the end of a sentence.
 std::string decoder_message(OIIO::ImageInput& input) {
@@ -54,14 +48,14 @@ std::string decoder_message(OIIO::ImageInput& input) {
 }
 
 [[noreturn]] void refuse_damaged(const ImageRequest& request, const Signature& signature, const std::string& detail) {
-  refuse(request,
-         fmt::format("is truncated or damaged: it starts like a {} file but cannot be read completely{}",
-                     signature.format_name, detail),
-         "copy it again from its source, or export it again");
+  refuse_image(request,
+               fmt::format("is truncated or damaged: it starts like a {} file but cannot be read completely{}",
+                           signature.format_name, detail),
+               "copy it again from its source, or export it again");
 }
 
 [[noreturn]] void refuse_one_bit(const ImageRequest& request) {
-  refuse(request, "has 1 bit per pixel: black and white carry no intensities", "export the original grey image");
+  refuse_image(request, "has 1 bit per pixel: black and white carry no intensities", "export the original grey image");
 }
 
 std::string describe_type(const OIIO::ImageSpec& spec) {
@@ -97,60 +91,14 @@ std::string list_pages(OIIO::ImageInput& input, int pages, const fs::path& file)
   return text;
 }
 
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
-/// Channels whose plain average is the image.
+/// The channels of a file, and which of them are asked for.
 std::vector<int> chosen_channels(const ImageRequest& request, const OIIO::ImageSpec& spec, bool palette,
                                  std::vector<std::string>& notes) {
-  static const std::array<std::string, 4> kChoices = {"r", "g", "b", "mean"};
-  const std::string choice = lower_case(request.channel);
-  const bool by_number = !choice.empty() && choice.find_first_not_of("0123456789") == std::string::npos;
-  if (!choice.empty() && !by_number && std::find(kChoices.begin(), kChoices.end(), choice) == kChoices.end())
-    throw UserError(request.where, "channel: '" + request.channel + "' is none of r, g, b, mean, nor a number",
-                    "choose one of them, or the channel's number, from 0");
-
-  std::vector<int> colours;
-  std::array<int, 3> rgb = {-1, -1, -1};
-  std::string names;
-  for (int c = 0; c < spec.nchannels; ++c) {
-    const std::string name = c < static_cast<int>(spec.channelnames.size()) ? spec.channelnames[c] : std::string();
-    const std::string last = lower_case(name.substr(name.rfind('.') + 1));
-    names += (c ? ", " : "") + name;
-    if (c == spec.alpha_channel || c == spec.z_channel || last == "a" || last == "alpha") continue;
-    colours.push_back(c);
-    for (int i = 0; i < 3; ++i)
-      if (last == std::array{"r", "g", "b"}[i] || last == std::array{"red", "green", "blue"}[i]) rgb[i] = c;
-  }
-  if (colours.size() < static_cast<std::size_t>(spec.nchannels)) notes.push_back("alpha channel ignored");
-  if (colours.empty() && spec.nchannels == 1) colours.push_back(0);
-
-  if (by_number) {
-    const int number = choice.size() < 9 ? std::stoi(choice) : spec.nchannels;
-    if (number >= spec.nchannels)
-      refuse(request, fmt::format("has no channel {}: it has {} ({})", choice, spec.nchannels, names),
-             "channels count from 0");
-    return {number};
-  }
-  if (colours.size() == 1) {
-    if (!choice.empty() && !request.mask && !request.cells)
-      notes.push_back("channel: " + choice + " has no effect: the image is grey");
-    return colours;
-  }
-  if (colours.size() == 3 && std::count(rgb.begin(), rgb.end(), -1) == 3) std::copy_n(colours.begin(), 3, rgb.begin());
-  if (std::count(rgb.begin(), rgb.end(), -1) > 0)
-    refuse(request,
-           fmt::format("has {} channels ({}) that are neither grey nor red, green and blue", spec.nchannels, names),
-           "add `channel: 0` for the first, or save the one to be fitted as a grey image");
-  if (choice.empty())
-    refuse(
-        request,
-        fmt::format("has colour channels ({}{}) and none is chosen", names, palette ? ", expanded from a palette" : ""),
-        "add `channel: r`, `g`, `b` or `mean` (their plain average)");
-  if (choice == "mean") return {rgb[0], rgb[1], rgb[2]};
-  return {rgb[choice == "r" ? 0 : choice == "g" ? 1 : 2]};
+  std::vector<StoredChannel> stored;
+  for (int c = 0; c < spec.nchannels; ++c)
+    stored.push_back({c < static_cast<int>(spec.channelnames.size()) ? spec.channelnames[c] : std::string(),
+                      c == spec.alpha_channel || c == spec.z_channel});
+  return channels_asked(request, stored, palette, notes);
 }
 
 /// What was read at once: these pixels of the file, `channels` samples each.
@@ -180,15 +128,6 @@ void add_samples(const Block& block, const std::vector<int>& offsets, const Pixe
       out[x] = offsets.size() == 1 ? sum : sum * weight;
     }
   }
-}
-
-/// What is asked for of an image of this size.
-PixelRect wanted(const ImageRequest& request, int width, int height) {
-  PixelRect part{0, 0, width, height};
-  if (!request.region) return part;
-  const PixelRect& region = *request.region;
-  part = {std::max(region.x0, 0), std::max(region.y0, 0), std::min(region.x1, width), std::min(region.y1, height)};
-  return part.width() > 0 && part.height() > 0 ? part : PixelRect{};
 }
 
 Image read_samples(const ImageRequest& request, const Signature& signature, OIIO::ImageInput& input, int page,
@@ -253,8 +192,8 @@ Image read_samples(const ImageRequest& request, const Signature& signature, OIIO
         add_samples<double>(block, offsets, part, values);
         break;
       default:
-        refuse(request, fmt::format("has samples of type {}", type.c_str()),
-               "save it as 8- or 16-bit integers or float");
+        refuse_image(request, fmt::format("has samples of type {}", type.c_str()),
+                     "save it as 8- or 16-bit integers or float");
     }
   }
   return values;
@@ -287,22 +226,23 @@ std::string with_one_bit_stated(const ImageRequest& request) {
   if (!request.mask) refuse_one_bit(request);
   std::string content = with_stated_bit(request.path, tags, page);
   if (content.empty() || tags.pages[page].samples != 1)
-    refuse(request, "has 1 bit per sample and does not say so", "save it with 8 bits");
+    refuse_image(request, "has 1 bit per sample and does not say so", "save it with 8 bits");
   return content;
 }
 
 /// `content`: of the file, where it is to be read otherwise than it stands there; else empty.
 LoadedImage load_checked(const ImageRequest& request, const Signature& signature, std::string content = {}) {
   if (signature.animated)
-    refuse(request, "is animated (" + signature.format_name + ")", "extract the frame to be fitted as a still image");
+    refuse_image(request, "is animated (" + signature.format_name + ")",
+                 "extract the frame to be fitted as a still image");
   if (signature.stored_bits == 1 && !request.mask) refuse_one_bit(request);
   if (signature.truncated) refuse_damaged(request, signature, " (its end is missing)");
 
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(signature.format);
   if (!input) {
     (void)OIIO::geterror();
-    refuse(request, "cannot be read: this OpenImageIO has no " + signature.format_name + " support",
-           "convert it to TIFF");
+    refuse_image(request, "cannot be read: this OpenImageIO has no " + signature.format_name + " support",
+                 "convert it to TIFF");
   }
   std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
   if (content.empty() && signature.format == "tiff") content = with_one_bit_stated(request);
@@ -318,24 +258,26 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   const bool several = input->seek_subimage(1, 0);
   (void)input->geterror();
   if (several && (signature.format == "gif" || spec.get_int_attribute("oiio:Movie", 0) != 0))
-    refuse(request, "is animated (" + signature.format_name + ")", "extract the frame to be fitted as a still image");
+    refuse_image(request, "is animated (" + signature.format_name + ")",
+                 "extract the frame to be fitted as a still image");
   int page = 0;
   if (several && !request.page) {
     const int pages = count_pages(*input);
-    refuse(request,
-           fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
-                       list_pages(*input, pages, request.path)),
-           "add `page: 0` for the first; micrographs: {files: ..} takes each as an image");
+    refuse_image(request,
+                 fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
+                             list_pages(*input, pages, request.path)),
+                 "add `page: 0` for the first; micrographs: {files: ..} takes each as an image");
   }
   if (request.page) {
     page = *request.page;
     if (page < 0 || !input->seek_subimage(page, 0)) {
       (void)input->geterror();
       const int pages = count_pages(*input);
-      refuse(request,
-             fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
-                         list_pages(*input, pages, request.path)),
-             "pages count from 0");
+      refuse_image(
+          request,
+          fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
+                      list_pages(*input, pages, request.path)),
+          "pages count from 0");
     }
   }
   if (!input->seek_subimage(page, 0)) refuse_damaged(request, signature, decoder_message(*input));
@@ -343,12 +285,9 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
 
   // From the header, before anything of the image's size is allocated.
   if (spec.width < 1 || spec.height < 1) refuse_damaged(request, signature, " (it has no pixels)");
-  if (spec.width > kLargestSide || spec.height > kLargestSide)
-    refuse(request,
-           fmt::format("is {} x {} pixels; at most {} on a side can be read", spec.width, spec.height, kLargestSide),
-           "crop it to the object, or bin it");
+  check_image_size(request, spec.width, spec.height);
   if (spec.depth > 1 || spec.deep)
-    refuse(request, spec.deep ? "is a deep image" : "is a volume, not an image", "export one plane of it");
+    refuse_image(request, spec.deep ? "is a deep image" : "is a volume, not an image", "export one plane of it");
 
   const bool is_float = spec.format.is_floating_point();
   const int bits = signature.stored_bits > 0 && signature.format != "bmp"
@@ -360,24 +299,25 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   const bool palette = signature.palette || photometric == kPalette;
   if (bits == 1 && !request.mask) refuse_one_bit(request);
   if (photometric == kCfaPhotometric && !request.cells)
-    refuse(request, "is a colour filter mosaic: its pixels see red, green and blue in cells of 2 x 2",
-           "add `bayer: rggb` (or bggr, grbg, gbrg) and `channel: g`");
+    refuse_image(request, "is a colour filter mosaic: its pixels see red, green and blue in cells of 2 x 2",
+                 "add `bayer: rggb` (or bggr, grbg, gbrg) and `channel: g`");
   if (tiff && photometric > kPalette && photometric != kSubsampledColour && photometric != kCfaPhotometric &&
       photometric != kLinearRawPhotometric)
-    refuse(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
+    refuse_image(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
   if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
-    refuse(request, "is stored in the print colour space " + space, "save it as grey or RGB");
-  if (bits == 24 && !is_float && tiff) refuse(request, "has 24 bits per sample", "save it as 16-bit integers or float");
+    refuse_image(request, "is stored in the print colour space " + space, "save it as grey or RGB");
+  if (bits == 24 && !is_float && tiff)
+    refuse_image(request, "has 24 bits per sample", "save it as 16-bit integers or float");
   if (!spec.channelformats.empty())
     for (const TypeDesc& type : spec.channelformats)
       if (!type.is_floating_point())
-        refuse(request, "has channels of different types", "save it as a grey image of 16-bit integers or float");
+        refuse_image(request, "has channels of different types", "save it as a grey image of 16-bit integers or float");
 
   LoadedImage loaded;
   const std::string description = spec.get_string_attribute("ImageDescription", "");
   const std::vector<int> channels = chosen_channels(request, spec, palette, loaded.notes);
   loaded.colour = spec.nchannels >= 3;
-  const PixelRect part = wanted(request, spec.width, spec.height);
+  const PixelRect part = part_asked(request, spec.width, spec.height);
   loaded.width = spec.width, loaded.height = spec.height;
   loaded.x0 = part.x0, loaded.y0 = part.y0;
   loaded.values = read_samples(request, signature, *input, page, spec, channels, part);
@@ -416,7 +356,8 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
     loaded.notes.push_back("the stored pixels are a window of a larger canvas: (0, 0) is the first stored pixel");
   if (const double stack = number_or_zero(imagej_value(description, "images")); stack > 1 && !several) {
     const std::string found = fmt::format("is an ImageJ stack of {:.0f} images with a single TIFF page", stack);
-    if (!request.page) refuse(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
+    if (!request.page)
+      refuse_image(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
     loaded.notes.push_back("it " + found + ": the first is used");
   }
   const StatedResolution resolution{spec.get_float_attribute("XResolution", 0),
@@ -454,13 +395,13 @@ LoadedImage load_raw(const ImageRequest& request, const TiffTags& tags) {
     if (picture != whole_pictures.end() && picture->pattern.size() == 4) raw->pattern = picture->pattern;
     const std::string filters = raw->pattern.empty() ? "in an order that it does not state" : "(" + raw->pattern + ")";
     if (!request.cells)
-      refuse(request,
-             fmt::format("is a raw photograph: {} x {} pixels under a mosaic of colour filters {}", raw->counts.width(),
-                         raw->counts.height(), filters),
-             "add `bayer: " + (raw->pattern.empty() ? "rggb" : raw->pattern) + "` and `channel: g` (or r, b)");
+      refuse_image(request,
+                   fmt::format("is a raw photograph: {} x {} pixels under a mosaic of colour filters {}",
+                               raw->counts.width(), raw->counts.height(), filters),
+                   "add `bayer: " + (raw->pattern.empty() ? "rggb" : raw->pattern) + "` and `channel: g` (or r, b)");
     LoadedImage loaded;
     loaded.width = raw->counts.width(), loaded.height = raw->counts.height();
-    const PixelRect part = wanted(request, loaded.width, loaded.height);
+    const PixelRect part = part_asked(request, loaded.width, loaded.height);
     loaded.x0 = part.x0, loaded.y0 = part.y0;
     loaded.values = cropped(raw->counts, part);
     loaded.bits = 16;
@@ -474,7 +415,7 @@ LoadedImage load_raw(const ImageRequest& request, const TiffTags& tags) {
                                    ? "this program cannot read its picture"
                                    : fmt::format("the readable image in it is a thumbnail of {} x {} pixels",
                                                  tags.pages.front().width, tags.pages.front().height);
-  refuse(request, "is a raw photograph; " + readable, develop);
+  refuse_image(request, "is a raw photograph; " + readable, develop);
 }
 
 // ---- writing --------------------------------------------------------------------------------------------------------
@@ -536,25 +477,25 @@ LoadedImage load_image(const ImageRequest& request) {
   std::error_code code;
   const fs::file_status status = fs::status(request.path, code);
   if (status.type() == fs::file_type::not_found)
-    refuse(request, "does not exist", "check the name; relative paths start at the config's folder");
-  if (code) refuse(request, "cannot be opened: " + code.message(), "check the permissions of its folder");
-  if (fs::is_directory(status)) refuse(request, "is a folder", "name one image in it");
-  if (!fs::is_regular_file(status)) refuse(request, "is not a file", "name an image file");
+    refuse_image(request, "does not exist", "check the name; relative paths start at the config's folder");
+  if (code) refuse_image(request, "cannot be opened: " + code.message(), "check the permissions of its folder");
+  if (fs::is_directory(status)) refuse_image(request, "is a folder", "name one image in it");
+  if (!fs::is_regular_file(status)) refuse_image(request, "is not a file", "name an image file");
   const std::uintmax_t size = fs::file_size(request.path, code);
-  if (code) refuse(request, "cannot be opened: " + code.message(), "check its permissions");
-  if (size == 0) refuse(request, "is empty (zero bytes)", "copy it again from its source");
+  if (code) refuse_image(request, "cannot be opened: " + code.message(), "check its permissions");
+  if (size == 0) refuse_image(request, "is empty (zero bytes)", "copy it again from its source");
   if (::access(request.path.c_str(), R_OK) != 0)
-    refuse(request, std::string("cannot be opened: ") + std::strerror(errno), "check its permissions");
+    refuse_image(request, std::string("cannot be opened: ") + std::strerror(errno), "check its permissions");
 
   const Signature signature = read_signature(request.path, size);
   if (signature.format.empty())
-    refuse(request, "is no image of a kind birefit reads", "use PNG, TIFF, OpenEXR, JPEG, BMP, GIF or WebP");
+    refuse_image(request, "is no image of a kind birefit reads", "use PNG, TIFF, OpenEXR, JPEG, BMP, GIF or WebP");
   try {
     const TiffTags tags = signature.format == "tiff" ? read_tiff_tags(request.path, 1) : TiffTags{};
     if (signature.format == "raw" || is_raw_photograph(tags)) return load_raw(request, tags);
     return load_checked(request, signature);
   } catch (const std::bad_alloc&) {
-    refuse(request, "does not fit into memory", "crop it to the object, or bin it");
+    refuse_image(request, "does not fit into memory", "crop it to the object, or bin it");
   } catch (const std::length_error&) {  // of a library that believes a header
     refuse_damaged(request, signature, " (it states a size that no memory holds)");
   }

@@ -1,6 +1,6 @@
 #pragma once
 // All that needs OpenImageIO and OpenCV. They bring 240 shared libraries, which take longer to load than many a fit
-// takes, so the program opens them with the first image (src/app/image_libraries.cc): this folder is then a library of
+// takes, so the program opens them with the first image (src/io/libraries/opened): this folder is then a library of
 // its own, known by the table below. The library birefit::io has the same functions linked in.
 
 #include <filesystem>

@@ -16,8 +16,11 @@ nlohmann::ordered_json made_by(const Config& config) {
   using Json = nlohmann::ordered_json;
   Json files = Json::array();
   files.push_back({{"file", printable(config.path.string())}, {"sha256", sha256(config.text)}});
-  for (const std::filesystem::path& file : config.inputs)
-    files.push_back({{"file", printable(file.string())}, {"sha256", sha256_of_file(file)}});
+  for (const std::filesystem::path& file : config.inputs) {
+    const auto array = config.arrays.find(file);
+    files.push_back({{"file", printable(file.string())},
+                     {"sha256", array == config.arrays.end() ? sha256_of_file(file) : array->second}});
+  }
   return {{"program", "birefit"}, {"version", BIREFIT_VERSION}, {"fft", BIREFIT_FFT}, {"files", std::move(files)}};
 }
 

@@ -53,17 +53,11 @@ std::vector<fs::path> left_by_earlier_fit(const fs::path& folder, const std::vec
 
 }  // namespace
 
-void write_results(const fs::path& folder, const Config& config, const FitResult& result,
-                   const std::vector<std::string>& picture_formats) {
-  std::error_code code;
-  fs::create_directories(folder, code);
-  if (code || !fs::is_directory(folder, code))
-    throw UserError({folder.string()},
-                    "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
-                    "choose another --out");
+std::vector<FileContent> result_files(const Config& config, const FitResult& result,
+                                      const std::vector<std::string>& picture_formats) {
   std::vector<FileContent> files;
   for (std::size_t k = 0; k < config.signals.size(); ++k)
-    files.push_back({folder / ("fitted" + (config.signals.size() > 1 ? "_" + std::to_string(k) : "") + ".csv"),
+    files.push_back({"fitted" + (config.signals.size() > 1 ? "_" + std::to_string(k) : "") + ".csv",
                      table_csv(config.signals[k], result)});
   for (std::size_t i = 0; config.signals.empty() && i < result.micrographs.size(); ++i) {
     const std::string number = result.micrographs.size() > 1 ? "_" + std::to_string(i) : "";
@@ -75,20 +69,36 @@ void write_results(const fs::path& folder, const Config& config, const FitResult
     const auto add = [&](const std::string& name, const Image& image) {
       if (image.empty()) return;
       for (const std::string& format : picture_formats) {
-        const fs::path path = folder / (name + number + format);
+        const fs::path path = name + number + format;
         files.push_back({path, encode_image(image, path, pixel_size_um)});
       }
     };
     add("fitted", result.micrographs[i].fitted);
     add("residual", result.micrographs[i].residual);
   }
-  if (result.samples) files.push_back({folder / "samples.csv", samples_csv(result)});
-  files.push_back({folder / "config.yaml", config.text});
-  files.push_back({folder / "log.txt", log_text(config, result)});
-  files.push_back({folder / "report.html", report_html(config, result)});
+  if (result.samples) files.push_back({"samples.csv", samples_csv(result)});
+  files.push_back({"config.yaml", config.text});
+  files.push_back({"log.txt", log_text(config, result)});
+  files.push_back({"report.html", report_html(config, result)});
   // Last: a script that waits for fit.json finds everything else in place.
-  files.push_back({folder / "fit.json", fit_json(config, result)});
+  files.push_back({"fit.json", fit_json(config, result)});
+  return files;
+}
+
+void write_result_files(const fs::path& folder, std::vector<FileContent> files) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code || !fs::is_directory(folder, code))
+    throw UserError({folder.string()},
+                    "cannot be created as a folder: " + (code ? code.message() : "a file is in its place"),
+                    "choose another --out");
+  for (FileContent& file : files) file.path = folder / file.path;
   write_files(files, left_by_earlier_fit(folder, files));
+}
+
+void write_results(const fs::path& folder, const Config& config, const FitResult& result,
+                   const std::vector<std::string>& picture_formats) {
+  write_result_files(folder, result_files(config, result, picture_formats));
 }
 
 }  // namespace birefit

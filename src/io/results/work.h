@@ -14,6 +14,8 @@ double memory_to_render(const Scene& scene);
 double memory_to_fit(const FitJob& job);
 /// "2.1 GB".
 std::string describe_memory(double bytes);
+/// "40 s", "3 min", "2.5 h".
+std::string describe_duration(double seconds);
 
 /// Throws UserError where this machine, or what this process may have of it, is smaller than `bytes`.
 void check_memory(const Config& config, double bytes);
@@ -21,10 +23,9 @@ UserError too_little_memory(const Config& config, double bytes);
 /// The same errors; those without a place have that of the config's pictures or tables.
 UserError with_place(const UserError& error, const Config& config);
 
-/// work(), which takes about `bytes`: its UserErrors have a place, and too little memory is one of them.
+/// work(), which takes about `bytes`: its UserErrors have a place, and where memory ends it is one of them.
 template <class Work>
-auto do_work(const Config& config, double bytes, const Work& work) {
-  check_memory(config, bytes);
+auto do_placed(const Config& config, double bytes, const Work& work) {
   try {
     return work();
   } catch (const std::bad_alloc&) {
@@ -33,5 +34,15 @@ auto do_work(const Config& config, double bytes, const Work& work) {
     throw with_place(error, config);
   }
 }
+/// The same; not begun where this machine has too little memory.
+template <class Work>
+auto do_work(const Config& config, double bytes, const Work& work) {
+  check_memory(config, bytes);
+  return do_placed(config, bytes, work);
+}
+
+/// What a config's job comes to, by its own options: the fit of `birefit fit`, with what rows of tables say of
+/// themselves among its warnings.
+FitResult fit_config(const Config& config);
 
 }  // namespace birefit

@@ -1,5 +1,5 @@
-// The functions of io that need OpenImageIO and OpenCV, in the program: each opens what has them when it is first
-// called, so that a program that touches no image starts without those libraries.
+// The functions of io that need OpenImageIO and OpenCV, in the program and in Python's module: each opens what has them
+// when it is first called, so that what touches no image starts without those libraries.
 
 #include <cstring>
 

@@ -1,4 +1,4 @@
-#include "app/work.h"
+#include "io/results/work.h"
 
 #include <algorithm>
 #include <fstream>
@@ -69,6 +69,15 @@ std::string describe_memory(double bytes) {
                                   : fmt::format("{:.1f} GB", bytes / (1024 * kMegabyte));
 }
 
+std::string describe_duration(double seconds) {
+  constexpr double kMinute = 60, kHour = 3600, kDay = 24 * kHour;
+  if (seconds < 1) return "less than 1 s";
+  if (seconds < 1.5 * kMinute) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 1.5 * kHour) return fmt::format("{:.0f} min", seconds / kMinute);
+  if (seconds < 2 * kDay) return fmt::format("{:.2g} h", seconds / kHour);
+  return fmt::format("{:.0f} days", seconds / kDay);
+}
+
 void check_memory(const Config& config, double bytes) {
   const double most = most_memory();
   if (bytes > most)
@@ -85,6 +94,12 @@ UserError with_place(const UserError& error, const Config& config) {
   for (Problem& problem : problems)
     if (problem.where.file.empty()) problem.where = place_of_data(config);
   return UserError(std::move(problems));
+}
+
+FitResult fit_config(const Config& config) {
+  FitResult result = do_work(config, memory_to_fit(config.job), [&] { return fit(config.job); });
+  for (std::string& words : describe_rows(config)) result.warnings.push_back(std::move(words));
+  return result;
 }
 
 }  // namespace birefit
