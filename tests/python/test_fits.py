@@ -1,0 +1,184 @@
+"""Fits: the program's bits, results, pickles, interruptions, and objectives for others' solvers."""
+
+import os
+import pickle
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+import birefit
+from conftest import SOURCE, fit_of
+
+
+@pytest.mark.parametrize("name", ["twisted_cell", "lc_5pch"])
+def test_a_fit_is_the_program_s_to_the_bit(program, name):
+    config = SOURCE / "fit_configs" / f"{name}.yaml"
+    program("fit", config, "--out", "out", "--quiet")
+    result = birefit.load(config).fit()
+    found = result.to_dict()
+    del found["run"]
+    assert found == fit_of("out")
+    report = result.report("again")
+    assert os.path.exists(report)
+    assert fit_of("again") == fit_of("out")
+    of_program, of_python = (sorted(p.name for p in os.scandir(folder)) for folder in ("out", "again"))
+    assert of_program == of_python
+
+
+def test_an_array_is_fitted_as_its_file_is(program, droplet, photograph):
+    from PIL import Image
+
+    Image.fromarray(photograph).save("photograph.tif")
+    droplet["micrograph"]["image"] = "photograph.tif"
+    droplet["micrograph"]["roi_px"] = [3, 2, 38, 34]
+    text = birefit.Job(droplet).text
+    with open("droplet.yaml", "w") as file:
+        file.write(text)
+    program("fit", "droplet.yaml", "--out", "out", "--quiet")
+    of_file = birefit.load("droplet.yaml").fit().to_dict()
+    of_array = birefit.load("droplet.yaml", arrays={"photograph.tif": photograph}).fit()
+    turned = np.asfortranarray(photograph)  # read where it lies, whatever the strides
+    in_place = birefit.load("droplet.yaml").fit(turned)
+    for fit in (of_array, in_place):
+        assert fit.to_dict()["parameters"] == of_file["parameters"] == fit_of("out")["parameters"]
+        assert fit.to_dict()["chi_square"] == of_file["chi_square"]
+    assert of_array.to_dict()["micrographs"][0]["name"] == "photograph.tif"
+    made_by = of_array.to_dict()["made_by"]["files"][1]
+    import hashlib
+    assert made_by == {"file": "photograph.tif", "sha256": hashlib.sha256(photograph.tobytes()).hexdigest()}
+
+
+def test_a_result_has_values_errors_and_words(result, photograph):
+    assert result.has_answer and result.grade == "answer"
+    assert abs(result.values["birefringence"] - 0.152) < 5 * result.stderr["birefringence"]
+    low, high = result.intervals["diameter_um"]
+    assert low < result.values["diameter_um"] < high
+    assert result.units["diameter_um"] == "um"
+    assert result.covariance.shape == (len(result.names),) * 2
+    assert np.isclose(np.sqrt(result.covariance[0, 0]), result.stderr[result.names[0]])
+    assert np.allclose(np.diag(result.correlation), 1)
+    assert result.samples.shape == (200, len(result.names))
+    assert "birefringence" in str(result) and result.verdict
+    assert result.fitted[0].shape == result.residual[0].shape == result.sigma[0].shape == photograph.shape
+    assert np.allclose((result.fitted[0] + result.residual[0])[5:8, 5:8], photograph[5:8, 5:8])
+    with pytest.raises(ValueError):
+        result.fitted[0][0, 0] = 1  # what the report shows
+    with pytest.raises(birefit.Error, match="no parameter"):
+        result.values["thickness"]
+
+
+def test_a_result_as_a_frame_and_a_figure(result):
+    pandas = pytest.importorskip("pandas")
+    frame = result.to_frame()
+    assert list(frame.index) == result.names
+    assert frame.loc["sample.material.birefringence", "value"] == result.values["birefringence"]
+    assert isinstance(result.to_frame(["value", "stderr"]), pandas.DataFrame)
+    pytest.importorskip("matplotlib")
+    assert len(result.plot().axes) >= 3
+
+
+def test_jobs_and_results_survive_pickling(droplet, photograph, result, tmp_path):
+    job = birefit.Job(droplet, image=photograph, set={"sample.surround.index": 1.44})
+    again = pickle.loads(pickle.dumps(job))
+    assert again.text == job.text and again.values == job.values
+    assert np.array_equal(again.render(), job.render())
+    assert again.log_posterior(job.theta0) == job.log_posterior(job.theta0)
+    copy = pickle.loads(pickle.dumps(result))
+    assert copy.to_json() == result.to_json() and str(copy) == str(result)
+    assert np.array_equal(copy.fitted[0], result.fitted[0]) and np.array_equal(copy.samples, result.samples)
+    copy.report(tmp_path / "copy")
+    result.report(tmp_path / "own")
+    for file in os.scandir(tmp_path / "own"):
+        assert (tmp_path / "copy" / file.name).read_bytes() == (tmp_path / "own" / file.name).read_bytes()
+    with pytest.raises(birefit.Error, match="pickled"):
+        copy.objective()
+    error = pickle.loads(pickle.dumps(birefit.Error([("a", "b", "c")])))
+    assert error.problems[0].hint == "c" and str(error) == "a: b; c"
+
+
+def test_objectives_are_consistent(droplet, photograph):
+    droplet["sample"]["material"]["birefringence"]["prior_sd"] = 0.01
+    job = birefit.Job(droplet, image=photograph)
+    theta = job.theta0
+    lower, upper = job.bounds
+    assert job.objective().names == job.names and np.all((lower <= theta) & (theta <= upper))
+    residual, jacobian = job.residual(theta), job.jacobian(theta)
+    assert residual.shape == (photograph.size + 1,) and jacobian.shape == (photograph.size + 1, theta.size)
+    moved = theta + 1e-3 * np.array([0.1, 0.01, 1, 1, 10, 10])
+    assert job.log_posterior(theta) == pytest.approx(-0.5 * residual @ residual, rel=1e-12)
+    chi_square, prior = ((job.residual(t)[:-1] @ job.residual(t)[:-1], ((t[1] - 0.15) / 0.01) ** 2) for t in (theta, moved))
+    fell = job.log_posterior(moved) - job.log_posterior(theta)
+    assert fell == pytest.approx(-0.5 * (prior[0] + prior[1] - chi_square[0] - chi_square[1]), abs=1e-6)
+    for j, step in enumerate([1e-4, 1e-5, 1e-4, 1e-4, 1e-2, 1e-2]):
+        by = np.zeros(theta.size)
+        by[j] = step
+        difference = (job.residual(theta + by) - job.residual(theta - by)) / (2 * step)
+        assert np.linalg.norm(jacobian[:, j] - difference) < 1e-3 * np.linalg.norm(difference), job.names[j]
+    outside = theta.copy()
+    outside[1] = 0.6
+    assert job.log_posterior(outside) == -np.inf
+    both = job.log_posterior(np.stack([theta, outside]))
+    assert both.shape == (2,) and both[0] == job.log_posterior(theta)
+    with pytest.raises(ValueError):
+        job.residual(theta[:2])
+
+
+def test_another_solver_finds_what_the_fit_found(droplet, photograph):
+    """Gauss-Newton by residual and jacobian, from beside the answer, where nothing is unknown but what is fitted."""
+
+    def exact(value):
+        return {"value": value, "exact": True}
+
+    droplet["micrograph"]["pixel_size_um"] = exact(0.3)
+    droplet["sample"]["material"]["ordinary"] = exact(1.52)
+    droplet["sample"]["surround"]["index"] = exact(1.43)
+    droplet["microscope"] = {"light": {"wavelength_nm": exact(590)}, "polarizer_deg": exact(0), "analyzer_deg": exact(90)}
+    result = birefit.Job(droplet).fit(photograph)
+    objective = result.objective()
+    assert objective.names == result.names
+    theta = objective.theta0
+    answer = np.array([result.values[name] for name in objective.names])
+    assert np.array_equal(theta, answer)
+    stderr = np.array([result.stderr[name] for name in objective.names])
+    theta = theta + 2 * stderr * np.array([1, -1, 1, -1, 1, -1])
+    for _ in range(6):
+        theta = theta - np.linalg.lstsq(objective.jacobian(theta), objective.residual(theta), rcond=None)[0]
+    assert np.all(np.abs(theta - answer) < 0.01 * stderr)
+    residual = objective.residual(answer)
+    assert residual @ residual == pytest.approx(result.chi_square, rel=1e-9)
+
+
+def test_progress_is_told_and_may_end_a_fit(droplet, photograph):
+    job = birefit.Job(droplet)
+    lines, threads = [], set()
+
+    def note(line):
+        lines.append(line)
+        threads.add(threading.get_ident())
+
+    job.fit(photograph, progress=note)
+    assert lines and all(isinstance(line, str) for line in lines) and threads == {threading.get_ident()}
+
+    def refuse(line):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        job.fit(photograph, progress=refuse)
+
+
+def test_ctrl_c_ends_a_fit_with_the_best_so_far(droplet, photograph):
+    job = birefit.Job(droplet)
+    with pytest.raises(birefit.Interrupted) as stop:
+        job.fit(photograph, progress=lambda line: os.kill(os.getpid(), signal.SIGINT))
+    assert isinstance(stop.value, KeyboardInterrupt)
+    result = stop.value.result
+    assert result.interrupted and not result.has_answer
+    assert "interrupted" in result.verdict.lower()
+
+
+def test_a_fit_without_an_answer_is_a_result(droplet):
+    noise = np.random.default_rng(1).normal(1000, 4, (36, 40))
+    result = birefit.Job(droplet).fit(noise)
+    assert not result.has_answer and result.grade != "answer" and result.verdict
