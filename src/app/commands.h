@@ -19,6 +19,8 @@ Command add_fit_command(CLI::App& app);
 Command add_series_command(CLI::App& app);
 Command add_render_command(CLI::App& app);
 Command add_jones_command(CLI::App& app);
+Command add_view_command(CLI::App& app);
+Command add_watch_command(CLI::App& app);
 Command add_explain_command(CLI::App& app);
 Command add_new_command(CLI::App& app);
 Command add_schema_command(CLI::App& app);

@@ -41,10 +41,11 @@ int run(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done; 1 the fit has no answer; 2 the input is wrong; 3 an internal error.\n"
       "birefit COMMAND --help tells more; `birefit new droplet > droplet.yaml` makes a config to start from.");
-  const std::vector<Command> commands = {add_fit_command(app),    add_series_command(app),     add_render_command(app),
-                                         add_jones_command(app),  add_explain_command(app),    add_chart_command(app),
-                                         add_stress_command(app), add_audit_command(app),      add_new_command(app),
-                                         add_schema_command(app), add_michel_levy_command(app)};
+  const std::vector<Command> commands = {add_fit_command(app),    add_series_command(app),      add_render_command(app),
+                                         add_jones_command(app),  add_explain_command(app),     add_chart_command(app),
+                                         add_stress_command(app), add_audit_command(app),       add_new_command(app),
+                                         add_schema_command(app), add_michel_levy_command(app), add_view_command(app),
+                                         add_watch_command(app)};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -52,7 +53,8 @@ int run(int argc, char** argv) {
                                                [&](const Command& c) { return c.app->get_name() == argv[1]; });
     if (argc > 1 && argv[1][0] != '-' && !known) {
       std::cerr << "birefit: unknown command " << printable(argv[1])
-                << "; known: fit, series, render, jones, explain, chart, stress, audit, michel-levy, new and schema\n";
+                << "; known: fit, series, render, jones, explain, chart, stress, audit, michel-levy, view, watch, new "
+                   "and schema\n";
       return kExitUserError;
     }
     // Help and version are "errors" of code 0 to CLI11; all others are the user's.

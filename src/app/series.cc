@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "app/frames.h"
 #include "app/interrupt.h"
 #include "app/output.h"
 #include "app/watch.h"
@@ -38,14 +39,6 @@ struct Arguments {
   bool resume = false;
   bool quiet = false;
 };
-
-/// What a killed run left half written in a folder.
-void remove_parts(const fs::path& folder) {
-  std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-    if (entry.path().extension() == ".part" && entry.path().filename().string().starts_with('.'))
-      fs::remove(entry.path(), ignored);
-}
 
 /// Is this folder of a frame's results, and not somebody else's?
 bool holds_fit(const fs::path& folder) {
@@ -290,18 +283,6 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
   return text;
 }
 
-/// A frame's fit; nothing, and the frame marked `unreadable`, where its picture is of no use.
-std::optional<FitResult> fit_frame(SeriesFrame& frame, const Config& config) {
-  return do_work(config, memory_to_fit(config.job), [&]() -> std::optional<FitResult> {
-    try {
-      return fit(config.job);
-    } catch (const UserError& error) {
-      frame.unreadable = error.what();
-      return std::nullopt;
-    }
-  });
-}
-
 int run_series(const Arguments& arguments) {
   ImageSeries series = load_series(arguments.config, arguments.set);
   const fs::path out = arguments.out.empty() ? fs::path(arguments.config).stem().string() + "-series" : arguments.out;
@@ -324,32 +305,21 @@ int run_series(const Arguments& arguments) {
     return elapsed / so_far * (all - static_cast<double>(done.load()));
   };
   std::optional<Watch> watch(std::in_place, arguments.quiet, seconds_left);
-  const auto do_frame = [&](std::size_t i, int threads) {
+  const auto do_one = [&](std::size_t i, int threads) {
     std::optional<Config> opened = open_frame(series, i);
     if (!opened) return;
-    Config& config = *opened;
-    if (neighbour) start_from(config, *neighbour);
-    config.fingerprint = fingerprint_of(config);
-    const fs::path place = out / "frames" / series.frames[i].name;
+    FitOptions& options = opened->job.options;
     earlier.bring_back(series.frames[i].name);
-    remove_parts(place);
-    std::optional<RecordedFit> record = load_recorded_fit(place / "fit.json");
-    if (record && record->fingerprint == config.fingerprint) {
-      ++kept;
-    } else {
-      config.job.options.threads = threads;
-      config.job.options.interrupted = &interrupt.flag();
+    FrameDone frame = do_frame(series.frames[i], *opened, neighbour, out / "frames" / series.frames[i].name, [&] {
+      options.threads = threads;
+      options.interrupted = &interrupt.flag();
       const std::string at = fmt::format("{} of {}: {}", i + 1, series.frames.size(), printable(series.frames[i].name));
       watch->say(at);
-      config.job.options.progress = [&](const std::string& line) { watch->say(at + ": " + line); };
-      const std::optional<FitResult> result = fit_frame(series.frames[i], config);
-      if (!result || result->interrupted) return;  // the next run does it whole
-      write_results(place, config, *result);
-      // What is read back is all that later runs will know of it.
-      record = load_recorded_fit(place / "fit.json");
-      if (!record) throw std::logic_error("fit.json cannot be read back");
-    }
-    fits[i] = std::move(record->result);
+      options.progress = [&, at](const std::string& line) { watch->say(at + ": " + line); };
+    });
+    if (!frame.record) return;
+    if (!frame.fresh) ++kept;
+    fits[i] = std::move(frame.record->result);
     ++done;
   };
   // The first alone, then a few at a time that all start where the frames before them ended: how many does not depend
@@ -360,7 +330,7 @@ int run_series(const Arguments& arguments) {
     count = std::min<std::size_t>(first == 0 ? 1 : kFramesTogether, series.frames.size() - first);
     const int side_by_side = std::min(cores, static_cast<int>(count)), each = cores / side_by_side;
     parallel_for(static_cast<int>(count), side_by_side, [&](int k) {
-      if (!interrupt.flag()) do_frame(first + static_cast<std::size_t>(k), each);
+      if (!interrupt.flag()) do_one(first + static_cast<std::size_t>(k), each);
     });
     for (std::size_t i = first; i < first + count; ++i)
       if (fits[i] && fits[i]->has_answer()) neighbour = &*fits[i];

@@ -62,6 +62,9 @@ std::optional<Step> first_step(const std::string& path) {
   return step;
 }
 
+/// Images and tables are counted from 0 as everywhere, items of other lists from 1.
+int first_index(const std::string& list) { return list == "micrographs" || list == "signal" ? 0 : 1; }
+
 class Override {
  public:
   explicit Override(const std::string& item) : where_{"--set " + item} {
@@ -97,8 +100,7 @@ class Override {
     const std::string here = above.empty() ? step->name : above + "." + step->name;
     if (step->rest.empty() && step->indices.empty()) return set_key(node, step->name);
     YamlNode* next = &entry_of(node, step->name).value;
-    // Images and tables are counted from 0 as everywhere, items of other lists from 1.
-    const int first = step->name == "micrographs" || step->name == "signal" ? 0 : 1;
+    const int first = first_index(step->name);
     for (const int index : step->indices) {
       if (!next->is_sequence()) fail(here + " is " + next->describe() + ", not a list");
       const int at = index - first;
@@ -213,6 +215,25 @@ YamlNode parse_config(const std::string& text, const std::string& file, const st
     }
   }
   return tree;
+}
+
+const YamlNode* node_at(const YamlNode& tree, const std::string& path) {
+  if (tree.is_sequence()) {  // `center_px: [x, y]` and its like
+    const std::size_t at = path.size() == 1 ? std::string("xyz").find(path[0]) : std::string::npos;
+    return at < tree.items.size() ? &tree.items[at] : nullptr;
+  }
+  if (const YamlNode* node = tree.find(path)) return node;
+  if (const YamlNode* own = tree.find("set"); own && own->is_map())
+    if (const YamlNode* node = own->find(path)) return node;
+  const std::optional<Step> step = first_step(path);
+  const YamlNode* next = step ? tree.find(step->name) : nullptr;
+  if (!next) return nullptr;
+  for (const int index : step->indices) {
+    const int at = index - first_index(step->name);
+    if (!next->is_sequence() || at < 0 || at >= static_cast<int>(next->items.size())) return nullptr;
+    next = &next->items[static_cast<std::size_t>(at)];
+  }
+  return step->rest.empty() ? next : node_at(*next, step->rest);
 }
 
 std::string text_as_set(const std::string& text, const YamlNode& tree, const std::vector<std::string>& set) {

@@ -22,5 +22,7 @@ std::string text_as_set(const std::string& text, const YamlNode& tree, const std
 
 /// A tree as the text of a config.
 std::string text_of(const YamlNode& tree);
+/// The node that a path of `--set` names, or nullptr.
+const YamlNode* node_at(const YamlNode& tree, const std::string& path);
 
 }  // namespace birefit

@@ -8,6 +8,9 @@
 
 namespace birefit {
 
+/// "40 s", "3 min", "2.5 h".
+std::string describe_duration(double seconds);
+
 /// Bytes at most, about: of the picture and of what is written of it.
 double memory_to_render(const Scene& scene);
 /// The same of a fit: pictures, their derivatives, what is written.

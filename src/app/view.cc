@@ -1,0 +1,55 @@
+// birefit view: a page on which a config's parameters are tried by hand.
+
+#include <iostream>
+#include <memory>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "app/commands.h"
+#include "birefit/io.h"
+#include "core/printable.h"
+#ifdef BIREFIT_VIEW
+#include "view/server.h"
+#endif
+
+namespace birefit {
+namespace {
+
+struct Arguments {
+  std::string config;
+  std::vector<std::string> set;
+  int threads = -1, port = 0;
+};
+
+#ifdef BIREFIT_VIEW
+int run_view(const Arguments& arguments) {
+  view::Session session(arguments.threads);
+  session.open(load_config(arguments.config, ConfigUse::fit, std::nullopt, arguments.set));
+  const view::Server server(session, arguments.port);
+  std::cout << server.address() << std::endl;
+  std::cerr << "birefit: open this address in a browser of this machine; Ctrl-C ends\n";
+  // The signal that ends the terminal's work ends this, too.
+  for (;;) ::pause();
+}
+#else
+int run_view(const Arguments&) {
+  throw UserError({}, "this birefit was built without `view`",
+                  "build it where cpp-httplib is installed (Debian: libcpp-httplib-dev)");
+}
+#endif
+
+}  // namespace
+
+Command add_view_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("view", "a page in the browser to look at a config and try its parameters");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
+  add_set_option(*command, arguments->set);
+  command->add_option("--port", arguments->port, "port on 127.0.0.1; default: one that is free")
+      ->check(CLI::Range(0, 65535));
+  add_threads_option(*command, arguments->threads);
+  return {command, [arguments] { return run_view(*arguments); }};
+}
+
+}  // namespace birefit
