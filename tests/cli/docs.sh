@@ -11,7 +11,7 @@ fail() { echo "FAIL $1"; failures=$((failures + 1)); }
 check=$source/tests/support/check_docs.py
 
 python3 "$check" links "$source" || fail 'links'
-python3 "$check" run "$program" "$source" tutorial_cell.md tutorial_disc.md tutorial_plate.md || fail 'pages that are run'
+python3 "$check" run "$program" "$source" tutorial_cell.md tutorial_plate.md || fail 'pages that are run'
 
 # The check itself: what is wrong is found.
 rm -rf wrong

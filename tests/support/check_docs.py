@@ -10,8 +10,8 @@ Of a page that is run:
 - A block ```text after it is what it prints: its lines, in their order, numbers to one unit of their last digit. A line `..`
   stands for any lines, `..` at a line's end for the rest of it.
 - Every "value ± error" of prose and tables is an estimate of some fit of the page, and so is every interval in a column of
-  tables whose head is "95 % interval". What other commands gave stands in the paragraph or table below a
-  comment that begins with "<!-- elsewhere" and says which.
+  tables whose head is "95 % interval". What other commands gave stands in the paragraph or table below a line of its own
+  that begins with "<!-- elsewhere" and says which.
 """
 
 import json
@@ -172,13 +172,15 @@ def estimates(work):
 
 def check_figures(page, text, work):
     known = list(estimates(work))
-    failures, elsewhere, interval_column = [], False, None
+    failures, elsewhere, interval_column, before = [], False, None, ""
     for number, line in enumerate(without_code(text), 1):
         if line.startswith("<!-- elsewhere"):
-            elsewhere = True
+            elsewhere, before = True, ""
             continue
         if not line.strip():
-            elsewhere, interval_column = False, None
+            interval_column = None
+            elsewhere = elsewhere and not before.strip()
+        before = line
         if elsewhere:
             continue
         for value, error in re.findall(rf"({NUMBER}) ?(?:±|\+-|\+/-) ?({NUMBER})", line):
