@@ -4,7 +4,7 @@ set -euo pipefail
 check=$1/tools/check_modules
 tree=$(mktemp -d)
 trap 'rm -rf "$tree"' EXIT
-mkdir -p "$tree"/src/{core,medium,transport/methods,fit,io} "$tree"/include/birefit
+mkdir -p "$tree"/src/{core,medium,transport/methods,fit,io,app,python} "$tree"/include/birefit
 echo '#include "birefit/error.h"' >"$tree/src/core/good.cc"
 echo '// nothing' >"$tree/include/birefit/error.h"
 "$check" "$tree" >/dev/null
@@ -27,6 +27,10 @@ refuse src/fit/bad.cc '#include <opencv2/imgproc.hpp>'
 refuse src/io/bad.cc '#include <opencv2/imgproc.hpp>'
 refuse src/io/bad.cc '#include "sibling.h"'
 refuse src/io/bad.cc '#include <ceres/ceres.h>'
+refuse src/io/bad.cc '#include <pybind11/pybind11.h>'
+refuse src/io/bad.cc '#include "python/job.h"'
+refuse src/app/bad.cc '#include "python/job.h"'
+refuse src/python/bad.cc '#include "app/output.h"'
 refuse include/birefit/error.h '#include "core/lanes.h"'
 refuse include/birefit/stray.h '// a header of no module'
 
