@@ -47,6 +47,21 @@ class TiffFile {
 
   /// Fewer where the file ends before.
   std::string bytes(std::uint64_t at, std::size_t count) {
+    if (count > kWindow / 2) return read(at, count);
+    const bool held =
+        at >= window_at_ && at - window_at_ < window_.size() && window_.size() - (at - window_at_) >= count;
+    if (!held) window_ = read(at, kWindow), window_at_ = at;
+    return window_.substr(at - window_at_, count);
+  }
+
+  bool good = false, big_endian = false, big_tiff = false, canon_raw = false;
+
+ private:
+  // A directory is some dozens of numbers, small pages have many directories in a window: of a stack whose pages are
+  // read one by one the chain is walked as often, and a seek for each number would take minutes.
+  static constexpr std::size_t kWindow = 1 << 16;
+
+  std::string read(std::uint64_t at, std::size_t count) {
     std::string text(count, '\0');
     stream_.clear();
     stream_.seekg(static_cast<std::streamoff>(at));
@@ -55,10 +70,9 @@ class TiffFile {
     return text;
   }
 
-  bool good = false, big_endian = false, big_tiff = false, canon_raw = false;
-
- private:
   std::ifstream stream_;
+  std::string window_;  ///< what was read last, from window_at_ on
+  std::uint64_t window_at_ = 0;
 };
 
 /// The directory at `offset`, and in `next` where the chain goes on; nothing where the file ends before it does.
