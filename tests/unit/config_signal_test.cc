@@ -56,6 +56,25 @@ TEST_F(ConfigSignal, GivesEveryRowOfASignalASceneOfItsOwn) {
   EXPECT_EQ(load(kSignal).scene.view.width, 1);
 }
 
+TEST_F(ConfigSignal, KnowsRowsAsWellAsTheNumberInItsOwnPlace) {
+  write("turns.csv", "dial,out\n0,1\n30,2\n60,4\n90,8\n");
+  const auto known_to = [&](const std::string& analyser) {
+    const auto config = load(R"(signal: {file: turns.csv, value: out, columns: {microscope.analyzer_deg: dial}}
+sample:
+  cell: {thickness_um: {value: 5, fit: [4, 6]}, director: {uniform: {azimuth_deg: 45, tilt_deg: 0}}}
+  material: {ordinary: 1.52, birefringence: 0.2}
+microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: )" +
+                                 analyser + "}\n",
+                             ConfigUse::fit);
+    const Readings& table = readings(config.job, 0);
+    EXPECT_EQ(table.rows.size(), 4u);
+    return config.job.parameters[table.rows[2].microscope.analyzer_deg].known_to.sd;
+  };
+  EXPECT_EQ(known_to("0"), 1);
+  EXPECT_EQ(known_to("{value: 0, exact: true}"), 0);
+  EXPECT_EQ(known_to("{value: 0, prior_sd: 0.2}"), 0.2);
+}
+
 TEST_F(ConfigSignal, SaysWhereASignalIsWrong) {
   write("a.csv", "volts,out\n0.5,1\n-1,2\n2,4\n");
   write("b.csv", "volts,aut\n0.5,1\n1,2\n1.5,3\n");

@@ -359,7 +359,10 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
       const std::string name =
           "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;
       const ParameterRef own = reader.table.add_constant(name, value, columns[c].spec->unit);
-      reader.table[own].known_to.sd = columns[c].spec->known_to.sd;  // the zero of a dial or thermometer
+      // The zero of a dial or thermometer, as well as it is known where the number itself stands in the config.
+      const Parameter& stated = reader.table[columns[c].shared];
+      reader.table[own].known_to.sd =
+          stated.where.line > 0 && !stated.free ? stated.known_to.sd : columns[c].spec->known_to.sd;
       replace(scene, columns[c].shared, own);
     }
     table.x.push_back(row.set[0]);
