@@ -1,6 +1,7 @@
 #include "io/config/pictures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -8,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "io/files/array_image.h"
+#include "io/images/analyser_sums.h"
 #include "io/images/mosaic.h"
 #include "medium/references.h"
 
@@ -227,6 +229,40 @@ bool is_unstated_mosaic(ConfigReader& reader, const MicrographSettings& settings
   return true;
 }
 
+/// Codes of a polarization mosaic that do not follow light: said, with the transfer that would make them. Of a file
+/// with codes alone: a program that wrote floats has done what it meant to.
+void check_analyser_sums(ConfigReader& reader, const MicrographSettings& settings, const LoadedImage& image,
+                         const std::string& name) {
+  std::array<std::array<double, 2>, 2> angle{};
+  for (const MosaicPart& part : settings.mosaic.parts) {
+    if (!part.analyzer_deg) return;
+    angle[static_cast<std::size_t>(part.y0)][static_cast<std::size_t>(part.x0)] = *part.analyzer_deg;
+  }
+  if (!(image.top_code > 0) || settings.calibrated()) return;
+  const PixelRect area = region_in(settings, image);
+  const double saturated = find_saturation(image, area, settings.saturation_counts).from;
+  Mask usable(image.values.width(), image.values.height(), 0);
+  for (std::size_t i = 0; i < usable.size(); ++i) usable.values()[i] = image.values.values()[i] < saturated;
+  Image light = image.values;
+  linearise(light, settings.transfer, image.top_code);
+  for (double& value : light.values()) value /= image.top_code;
+  const std::optional<AnalyserSums> sums = analyser_sums(light, usable, area, angle);
+  constexpr double kErrors = 3, kLeast = 0.05;
+  if (!sums || std::abs(sums->gamma - 1) < std::max(kErrors * sums->error, kLeast)) return;
+  const Transfer& transfer = settings.transfer;
+  const bool linear = transfer.kind == Transfer::Kind::linear, power = transfer.kind == Transfer::Kind::gamma;
+  const double before = power ? transfer.gamma : 1;
+  std::string text = fmt::format(
+      "{}: what two crossed analysers let through together differs between the two pairs of each cell by {:.2g} % "
+      "where "
+      "light is polarized, and must not: {} not proportional to light.",
+      name, 100 * sums->mismatch, linear ? "the codes are" : "after micrograph.transfer the values are");
+  if (linear || power)
+    text += fmt::format(" Of light = code^{0:.2f} (+- {1:.2f}) the pairs agree: transfer: {{gamma: {0:.2f}}}.",
+                        before * sums->gamma, before * sums->error);
+  reader.warnings.push_back(text);
+}
+
 }  // namespace
 
 void say(ConfigReader& reader, const std::filesystem::path& file, const std::vector<std::string>& notes) {
@@ -417,6 +453,7 @@ std::vector<Picture> pictures_of(ConfigReader& reader, const MicrographSettings&
   if (!image.filter_pattern.empty() && image.filter_pattern != settings.mosaic.bayer)
     reader.problems.add(settings.mosaic.where, micrograph.name + " states the filters " + image.filter_pattern,
                         "bayer: " + image.filter_pattern);
+  check_analyser_sums(reader, settings, image, micrograph.name);
   NumberSpec angle;
   angle.unit = "deg";
   for (const MosaicPart& part : settings.mosaic.parts) {
