@@ -4,14 +4,12 @@
 #include <cmath>
 #include <cstdint>
 #include <iostream>
-#include <optional>
 
 #include <fmt/format.h>
 
 #include "app/output.h"
 #include "birefit/error.h"
 #include "birefit/io.h"
-#include "birefit/render.h"
 
 namespace birefit {
 namespace {
@@ -36,20 +34,9 @@ class Noise {
   std::uint64_t state_ = 7;
 };
 
-/// Intensities of the config with the truth in place of its starts and `more` of `--set`.
-Image intensities(const Kind& kind, const fs::path& config, int width, int height, std::vector<std::string> more) {
-  std::vector<std::string> set = {fmt::format("image_size_px=[{}, {}]", width, height),
-                                  "micrograph.image=", "micrographs=", "calibration=", "signal="};
-  for (const auto& [path, value] : kind.truth) set.push_back(fmt::format("{}={}", path, value));
-  set.insert(set.end(), more.begin(), more.end());
-  const Config loaded = load_config(config, ConfigUse::render, std::nullopt, set);
-  const Theta theta = loaded.job.parameters.values();
-  return render(loaded.scene, plan(loaded.scene, loaded.job.demand, theta), theta).intensity;
-}
-
 void make_picture(const Kind& kind, const DemoPicture& picture, const fs::path& config, Noise& noise) {
   Image counts(kind.width, kind.height);
-  if (!picture.dark) counts = intensities(kind, config, kind.width, kind.height, picture.set);
+  if (!picture.dark) counts = picture_of(kind, config, kind.width, kind.height, picture.set);
   for (double& value : counts.values()) {
     const double light = kind.gain * value;
     value = kind.offset + light + noise() * std::sqrt(kReadCounts * kReadCounts + kCountsPerPhoton * light);
@@ -66,7 +53,7 @@ void make_table(const Kind& kind, const fs::path& config, Noise& noise) {
   for (int i = 0; i < 48; ++i) {
     const double volts = 0.5 + 0.1 * i;
     const std::string at = fmt::format("sample.cell.director.freedericksz.voltage_v={:.1f}", volts);
-    const double light = intensities(kind, config, 1, 1, {at})(0, 0);
+    const double light = picture_of(kind, config, 1, 1, {at})(0, 0);
     text += fmt::format("{:.1f},{:.4f}\n", volts, kind.offset + kind.gain * light + 0.01 * kind.gain * noise());
   }
   write_file(config.parent_path() / "sweep.csv", text);

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "app/kinds.h"
+#include "io/kinds/kinds.h"
 
 namespace birefit {
 

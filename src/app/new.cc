@@ -10,9 +10,9 @@
 
 #include "app/commands.h"
 #include "app/demo.h"
-#include "app/from_image.h"
-#include "app/kinds.h"
 #include "birefit/error.h"
+#include "io/kinds/from_image.h"
+#include "io/kinds/kinds.h"
 
 namespace birefit {
 namespace {

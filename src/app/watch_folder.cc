@@ -128,6 +128,7 @@ class Watched {
       }
       arrivals.take(arrival.name, arrival.state);
     }
+    for (std::size_t i = 0; i < fits_.size(); ++i) show_row(i);
   }
 
   /// Fits it, or says why not; false where it is to be looked at again later.
@@ -244,28 +245,27 @@ class Watched {
     if (done.fresh) screen_.show(config, std::move(done.fresh));
     return std::move(done.record->result);
   }
+  /// On the terminal and in the page's table.
   void tell(std::size_t i) {
+    show_row(i);
+    const SeriesFrame& frame = series_.frames[i];
+    if (!arguments_.quiet)
+      std::cout << printable(frame.file) << ": "
+                << (fits_[i] ? fits_[i]->grade() + estimates(*fits_[i]) : "unreadable: " + printable(frame.unreadable))
+                << std::endl;
+  }
+  void show_row(std::size_t i) {
     const SeriesFrame& frame = series_.frames[i];
     std::vector<std::string> columns{"file", "verdict"}, cells{frame.file};
-    std::string line = printable(frame.file) + ": ";
-    if (!fits_[i]) {
-      line += "unreadable: " + printable(frame.unreadable);
-      cells.push_back("unreadable: " + frame.unreadable);
-    } else {
-      line += fits_[i]->grade() + estimates(*fits_[i]);
-      cells.push_back(fits_[i]->grade());
-    }
-    for (std::size_t k = i + 1; k-- > 0;) {
-      if (!fits_[k]) continue;
-      for (const ParameterEstimate& p : fits_[k]->parameters)
+    cells.push_back(fits_[i] ? fits_[i]->grade() : "unreadable: " + frame.unreadable);
+    const auto last = std::find_if(fits_.rbegin(), fits_.rend(), [](const auto& fit) { return fit.has_value(); });
+    if (last != fits_.rend())
+      for (const ParameterEstimate& p : (*last)->parameters)
         if (!p.linear) columns.push_back(short_name(p.name));
-      break;
-    }
     if (fits_[i])
       for (const ParameterEstimate& p : fits_[i]->parameters)
         if (!p.linear) cells.push_back(format_value(p.value, p.stderr_) + " \u00b1 " + format_error(p.stderr_));
     screen_.row(columns, std::move(cells));
-    if (!arguments_.quiet) std::cout << line << std::endl;
   }
 
   const Arguments& arguments_;

@@ -64,6 +64,20 @@ std::string error_text(const std::string& words) {
   return Json({{"error", words}}).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+Answers answers_of(const Json& asked) {
+  Answers answers;
+  answers.kind = asked.at("kind");
+  answers.stated.pixel_um = asked.value("pixel_um", 0.0);
+  if (const Json& circle = asked.at("circle"); !circle.is_null())
+    answers.stated.circle = circle.get<std::array<double, 3>>();
+  if (const Json& region = asked.at("region"); !region.is_null()) {
+    const auto [x0, y0, x1, y1] = region.get<std::array<int, 4>>();
+    answers.stated.region = PixelRect{x0, y0, x1, y1};
+  }
+  for (const auto& [path, value] : asked.at("numbers").items()) answers.numbers.emplace_back(path, value.get<double>());
+  return answers;
+}
+
 /// Which page has the session: the first that asked, until it says goodbye or is not heard of any more.
 class Guest {
  public:
@@ -90,7 +104,7 @@ class Guest {
 }  // namespace
 
 struct Server::State {
-  explicit State(Session& of) : session(of) {}
+  State(Session& of, const Beginning* with) : session(of), beginning(with) {}
 
   using Answer = std::function<void(const httplib::Request&, httplib::Response&)>;
 
@@ -146,8 +160,10 @@ struct Server::State {
 
   void route();
   void route_page();
+  void route_beginning();
 
   Session& session;
+  const Beginning* beginning;
   httplib::Server http;
   std::string token = random_token(), host_, address;
   int port = 0;
@@ -177,8 +193,28 @@ void Server::State::route_page() {
   });
 }
 
+void Server::State::route_beginning() {
+  if (!beginning) return;
+  get("/beginning", for_guest([this](const httplib::Request&, httplib::Response& response) {
+        response.set_content(beginning->description(), kJson);
+      }));
+  post("/picture",
+       [this](const Json&, httplib::Response& response) { response.set_content(beginning->picture(), kBytes); });
+  post("/thumbnail", [this](const Json& asked, httplib::Response& response) {
+    response.set_content(beginning->thumbnail(asked.at("kind")), kBytes);
+  });
+  post("/grow", [this](const Json& asked, httplib::Response& response) {
+    response.set_content(beginning->grow(answers_of(asked)), kJson);
+  });
+  post("/open", [this](const Json& asked, httplib::Response& response) {
+    session.open(beginning->open(asked.at("text")));
+    response.set_content("{}", kJson);
+  });
+}
+
 void Server::State::route() {
   route_page();
+  route_beginning();
   get("/description", for_guest([this](const httplib::Request&, httplib::Response& response) {
         response.set_content(session.description(), kJson);
       }));
@@ -214,7 +250,8 @@ void Server::State::route() {
   });
 }
 
-Server::Server(Session& session, int port) : state_(std::make_unique<State>(session)) {
+Server::Server(Session& session, int port, const Beginning* beginning)
+    : state_(std::make_unique<State>(session, beginning)) {
   State& state = *state_;
   httplib::Server& http = state.http;
   http.set_keep_alive_max_count(1 << 30);

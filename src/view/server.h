@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "view/beginning.h"
 #include "view/session.h"
 
 namespace birefit::view {
@@ -14,7 +15,8 @@ namespace birefit::view {
 class Server {
  public:
   /// At this port of 127.0.0.1; 0: one that is free. Throws UserError where there is none to be had.
-  Server(Session& session, int port);
+  /// `beginning`: where the session has nothing to show until a config is made of an image; may be null.
+  Server(Session& session, int port, const Beginning* beginning = nullptr);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -195,7 +195,9 @@ std::string Session::description() const {
   if (!now) return text_of(json);
   const FitJob& job = now->config.job;
   json["file"] = now->config.path.filename().string();
-  json["save_as"] = now->config.path.stem().string() + "-tried.yaml";
+  std::error_code code;  // of an image that had no config the name is free
+  const std::string stem = now->config.path.stem().string();
+  json["save_as"] = stem + (std::filesystem::exists(now->config.path, code) ? "-tried.yaml" : ".yaml");
   json["items"] = Json::array();
   for (const Item& item : now->items) {
     if (const Picture* picture = std::get_if<Picture>(&job.measurements[item.measurement])) {

@@ -125,8 +125,11 @@ class Browser:
         """Until an expression is true."""
         end = time.time() + seconds
         while time.time() < end:
-            if self.run(expression):
-                return
+            try:
+                if self.run(expression):
+                    return
+            except RuntimeError:
+                pass  # the page is not there yet
             time.sleep(0.05)
         raise RuntimeError(f"not within {seconds} s: {expression}")
 

@@ -1,6 +1,7 @@
 """Uses `birefit view` in Chromium as people do. usage: use_view.py BIREFIT SOURCE_DIR, in the folder of view_page.sh"""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -73,6 +74,41 @@ with Browser() as page:
         page.go("about:blank")
         other.wait("self.birefitView && birefitView.drawn")
     check(process.poll() is None, "birefit ends with the page")
+process.terminate()
+process.wait(30)
+
+# From an image to a config without writing a line of it.
+subprocess.run([birefit, "new", "droplet", "--demo", "demo"], check=True, stdout=subprocess.DEVNULL)
+os.rename("demo/droplet.png", "inner/mine.png")
+process = subprocess.Popen([birefit, "view", "inner/mine.png", "--threads", "1"], stdout=subprocess.PIPE,
+                           stderr=subprocess.DEVNULL, text=True)
+address = process.stdout.readline().strip()
+with Browser() as page:
+    page.go(address)
+    page.wait("document.querySelectorAll('#kinds label').length > 3")
+    page.run("document.querySelector('#kinds [value=droplet]').click()")
+    page.wait("document.querySelectorAll('#told .missing').length === 1")
+    check("pixel_size_um" in page.run("document.querySelector('#told .missing').textContent"), "what is missing is not said")
+    x, y, width, height = page.run("(r => [r.x, r.y, r.width, r.height])(document.getElementById('photo').getBoundingClientRect())")
+    # From rim to rim of the droplet, which is 182 px across in the middle of 240.
+    ends = [(x + width * (0.5 + sign * 0.268), y + height * (0.5 + sign * 0.268)) for sign in (-1, 1)]
+    page.mouse("mousePressed", *ends[0], button="left", clickCount=1)
+    page.mouse("mouseMoved", *ends[1], button="left", buttons=1)
+    page.mouse("mouseReleased", *ends[1], button="left", clickCount=1)
+    page.run("(i => { i.value = '0.05'; i.dispatchEvent(new Event('input')); })(document.getElementById('pixel-um'))")
+    page.run("(i => { i.value = '546'; i.dispatchEvent(new Event('input')); })([...document.querySelectorAll('#numbers label')].find(l => l.title === 'microscope.light.wavelength_nm').querySelector('input'))")
+    page.wait("/pixel_size_um: 0.05/.test(begin.text) && /center_px: \\[{value: 1/.test(begin.text) && /wavelength_nm: 546/.test(begin.text)")
+    check(page.run("document.querySelectorAll('#told .missing').length") == 0, "something is still missing")
+    text = page.run("begin.text")
+    page.run("document.getElementById('open').click()")
+    page.wait("self.birefitView && birefitView.drawn && birefitView.drawn.settle")
+    check(abs(page.run("birefitView.values[0]") - 9.1) < 0.2, "the circle is not the diameter's start")
+    check(page.run("document.getElementById('save-as').value") == "mine.yaml", "the config has another name than the image")
+    page.run("document.getElementById('save-button').click()")
+    page.wait("document.getElementById('saved').textContent.startsWith('saved: ')")
+    check(open("inner/mine.yaml").read() == text, "what is saved is not what was shown")
+    check(page.complaints() == [], f"{page.complaints()}")
+check(subprocess.run([birefit, "explain", "inner/mine.yaml"], stdout=subprocess.DEVNULL).returncode == 0, "the config does not run")
 process.terminate()
 process.wait(30)
 print(f"{len(failures)} failures" if failures else "all as required")

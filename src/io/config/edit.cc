@@ -1,6 +1,7 @@
 #include "io/config/edit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <optional>
 
@@ -63,7 +64,7 @@ bool set_start(std::string& text, const YamlNode& node, const NewStart& start) {
 /// `center_px: {fit: auto}`, or no center_px at all: both axes at once.
 bool set_centre(std::string& text, const YamlNode& tree, const std::string& path, const NewStart& x,
                 const NewStart& y) {
-  const std::string list = "[" + written(x) + ", " + written(y) + "]";
+  const std::string list = fmt::format("[{}, {}]", written(x), written(y));
   if (const YamlNode* node = node_at(tree, path)) {
     const auto begin = offset_of(text, node->where);
     if (!node->is_map() || node->entries.size() != 1 || !begin || text[*begin] != '{') return false;
@@ -88,6 +89,23 @@ std::optional<double> value_in(const YamlNode& tree, const std::string& name) {
   return node && node->is_scalar() ? std::optional(std::strtod(node->text.c_str(), nullptr)) : std::nullopt;
 }
 
+std::optional<double> number_of(const YamlNode& node) {
+  if (!node.is_scalar() || node.quoted || node.text.empty()) return std::nullopt;
+  char* end = nullptr;
+  const double value = std::strtod(node.text.c_str(), &end);
+  return *end == '\0' && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+void list_numbers(const YamlNode& map, const std::string& above, std::vector<std::pair<std::string, double>>& numbers) {
+  for (const YamlEntry& entry : map.entries) {
+    const std::string path = above.empty() ? entry.key : above + "." + entry.key;
+    if (entry.value.is_map() && !entry.value.find("fit"))
+      list_numbers(entry.value, path, numbers);
+    else if (const auto value = number_of(entry.value))
+      numbers.emplace_back(path, *value);
+  }
+}
+
 /// One start, or both of a centre: places move with every change, so that the text is read anew for each.
 bool change(std::string& text, const std::vector<NewStart>& starts, std::size_t i) {
   Problems problems;
@@ -105,6 +123,24 @@ bool change(std::string& text, const std::vector<NewStart>& starts, std::size_t 
 }
 
 }  // namespace
+
+std::string with_numbers(const std::string& text, const std::vector<std::pair<std::string, double>>& numbers) {
+  std::string changed = text;
+  for (const auto& [path, value] : numbers) {
+    Problems ignored;
+    const YamlNode tree = parse_yaml(changed, "", ignored);
+    const YamlNode* node = node_at(tree, path);
+    if (node && number_of(*node) && number_of(*node) != value) replace(changed, *node, number(value));
+  }
+  return changed;
+}
+
+std::vector<std::pair<std::string, double>> known_numbers(const std::string& text) {
+  std::vector<std::pair<std::string, double>> numbers;
+  Problems ignored;
+  list_numbers(parse_yaml(text, "", ignored), "", numbers);
+  return numbers;
+}
 
 std::string with_starts(const std::string& text, const std::vector<NewStart>& starts) {
   std::string changed = text;
@@ -126,7 +162,7 @@ std::string with_starts(const std::string& text, const std::vector<NewStart>& st
     const auto other =
         std::find_if(starts.begin(), starts.end(), [&](const NewStart& s) { return s.name == path + ".y"; });
     if (axis == ".x" && other != starts.end())
-      set.push_back(path + "=[" + written(start) + ", " + written(*other) + "]");
+      set.push_back(fmt::format("{}=[{}, {}]", path, written(start), written(*other)));
     else if (axis != ".y")
       set.push_back(start.name + "=" + written(start));
   }

@@ -149,32 +149,43 @@ const draw = (settle) => {
   if (!settle && slow) at("speed").textContent = `${seconds(drawn.header.seconds)} a picture: made when the hand rests`;
 };
 
+/** The latest question, on its way; null where nothing was asked since the last. */
+const send = () => {
+  if (!wanted) return null;
+  const asked = wanted;
+  wanted = null;
+  if (asked.settle && slow) at("speed").textContent = "computing …";
+  const reply = ask("draw", asked).then(async (answer) => (answer.status === 204 ? null : answer.arrayBuffer()));
+  return { asked, reply: reply.catch((error) => error), begin: performance.now() };
+};
+
 const pump = async () => {
   if (busy) return;
   busy = true;
-  while (wanted) {
-    const asked = wanted;
-    wanted = null;
-    const begin = performance.now();
-    try {
-      if (asked.settle && slow) at("speed").textContent = "computing …";
-      const reply = await ask("draw", asked);
-      if (reply.status === 204 || asked.item !== item) continue;
-      const bytes = await reply.arrayBuffer(), length = new DataView(bytes).getUint32(0, true);
-      const header = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
-      drawn = { header, values: asked.values, settle: asked.settle, model: new Float32Array(bytes, 4 + length) };
-      slow = header.seconds > kSlow;
-      banner("");
-      showPicture();
-      counters.latency.push(performance.now() - begin);
-      ++counters.pictures;
-    } catch (error) {
-      if (!(error instanceof Refused)) ended();
-      else if (error.status === 409) taken(error.message);
-      else banner(error.message);
-      if (!(error instanceof Refused) || error.status === 409) break;
+  for (let sent = send(); sent;) {
+    const { asked, reply, begin } = sent, bytes = await reply;
+    if (bytes instanceof Error) {
+      if (!(bytes instanceof Refused)) ended();
+      else if (bytes.status === 409) taken(bytes.message);
+      else banner(bytes.message);
+      if (!(bytes instanceof Refused) || bytes.status === 409) break;
+      sent = send();
+      continue;
     }
-    await new Promise(requestAnimationFrame);
+    sent = send();  // the program makes the next while this one is painted
+    if (!bytes || asked.item !== item) continue;
+    const length = new DataView(bytes).getUint32(0, true);
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
+    drawn = { header, values: asked.values, settle: asked.settle, model: new Float32Array(bytes, 4 + length) };
+    slow = header.seconds > kSlow;
+    banner("");
+    showPicture();
+    counters.latency.push(performance.now() - begin);
+    ++counters.pictures;
+    if (!sent) {
+      await new Promise(requestAnimationFrame);
+      sent = send();
+    }
   }
   busy = false;
 };

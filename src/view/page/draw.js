@@ -2,7 +2,9 @@
 // Pictures and curves on canvases. Knows nothing of the server or of parameters.
 
 const Draw = (() => {
-  const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  let inks = {};
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { inks = {}; });
+  const ink = (name) => inks[name] || (inks[name] = getComputedStyle(document.documentElement).getPropertyValue(name).trim());
 
   /** 256 colours as 0xAABBGGRR. */
   const table = (colour) => {
@@ -197,7 +199,7 @@ const Draw = (() => {
       c.lineWidth = 1;
       c.textAlign = "right";
       c.textBaseline = "middle";
-      for (const v of ticks(range[0], range[1], Math.max(3, h / 30))) {
+      for (const v of ticks(range[0], range[1], Math.max(4, h / 30))) {
         c.beginPath();
         c.moveTo(left, Y(v));
         c.lineTo(width - right, Y(v));

@@ -1,4 +1,4 @@
-#include "app/from_image.h"
+#include "io/kinds/from_image.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,26 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kLeastContrast = 3;  ///< of a disc, DiscGuess::contrast
-
-/// The file as it can be read: its first page, its green channel, where it has several.
-struct Opened {
-  LoadedImage image;
-  bool first_page = false;
-};
-
-Opened open(const std::string& file) {
-  std::optional<UserError> first;
-  for (const bool page : {false, true})
-    for (const char* channel : {"", "g"}) {
-      ImageRequest request{file, page ? std::optional<int>(0) : std::nullopt, channel, {file}};
-      try {
-        return {load_image(request), page};
-      } catch (const UserError& error) {
-        if (!first) first = error;
-      }
-    }
-  throw *first;
-}
 
 /// The lines of a config, to be found by how they begin.
 class Lines {
@@ -80,7 +60,8 @@ std::string quoted(const std::string& path) {
   return out + "\"";
 }
 
-void fill_image(const std::string& file, const Opened& opened, Lines& lines, FilledConfig& filled) {
+void fill_image(const std::string& file, const OpenedImage& opened, const Stated& stated, Lines& lines,
+                FilledConfig& filled) {
   const LoadedImage& image = opened.image;
   std::vector<std::string> keys = {fmt::format("image: {}   # {} x {} pixels, {}", quoted(file), image.values.width(),
                                                image.values.height(),
@@ -91,6 +72,9 @@ void fill_image(const std::string& file, const Opened& opened, Lines& lines, Fil
     keys.push_back("page: 0                    # the first of several");
     filled.found.push_back("several pages: the first is taken, page: 0");
   }
+  if (const auto& region = stated.region)
+    keys.push_back(fmt::format("roi_px: [{}, {}, {}, {}]   # x0, y0, x1, y1, end exclusive", region->x0, region->y0,
+                               region->x1, region->y1));
   if (image.colour) {
     keys.push_back("channel: g                 # r, g, b or mean");
     filled.found.push_back("colour channels: green is taken, channel: g");
@@ -114,9 +98,13 @@ void fill_image(const std::string& file, const Opened& opened, Lines& lines, Fil
 }
 
 /// The pixel's size; 0 when the file does not state it.
-double fill_pixel_size(const LoadedImage& image, Lines& lines, FilledConfig& filled) {
+double fill_pixel_size(const LoadedImage& image, const Stated& stated, Lines& lines, FilledConfig& filled) {
   const auto line = lines.find("pixel_size_um:");
   if (!line) return 0;
+  if (stated.pixel_um > 0) {
+    lines.replace(*line, {fmt::format("pixel_size_um: {:.6g}   # on the sample", stated.pixel_um)});
+    return stated.pixel_um;
+  }
   if (image.pixel_size_um > 0) {
     lines.replace(
         *line, {fmt::format("pixel_size_um: {:.6g}   # as the file states it: on the sample?", image.pixel_size_um)});
@@ -128,20 +116,39 @@ double fill_pixel_size(const LoadedImage& image, Lines& lines, FilledConfig& fil
   return 0;
 }
 
-void fill_disc(const Kind& kind, const LoadedImage& image, double pixel_um, Lines& lines, FilledConfig& filled) {
+/// Where the object is: as it was drawn, or as it is found in the image or its region.
+DiscGuess disc_of(const LoadedImage& image, const Stated& stated) {
+  if (const auto& circle = stated.circle) return {(*circle)[0], (*circle)[1], (*circle)[2], kLeastContrast};
+  const PixelRect whole{0, 0, image.values.width(), image.values.height()};
+  const PixelRect region = stated.region.value_or(whole);
+  DiscGuess disc = find_disc(cropped(image.values, region), Mask(region.width(), region.height(), 1));
+  disc.center_x_px += region.x0, disc.center_y_px += region.y0;
+  return disc;
+}
+
+void fill_disc(const Kind& kind, const LoadedImage& image, const Stated& stated, double pixel_um, Lines& lines,
+               FilledConfig& filled) {
   const auto line = lines.find("diameter_um:");
   if (!line) return;
-  const DiscGuess disc = find_disc(image.values, Mask(image.values.width(), image.values.height(), 1));
+  const DiscGuess disc = disc_of(image, stated);
   if (!(disc.contrast >= kLeastContrast)) {
     filled.missing.push_back("no disc is visible: state micrograph.center_px and sample." + kind.name + ".diameter_um");
     return;
   }
-  filled.found.push_back(fmt::format("a disc of {:.4g} px around ({:.4g}, {:.4g})", 2 * disc.radius_px,
-                                     disc.center_x_px, disc.center_y_px));
+  const std::string whose = stated.circle ? "of the circle drawn" : "of the disc found";
+  filled.found.push_back(fmt::format("a {} of {:.4g} px around ({:.4g}, {:.4g})", stated.circle ? "circle" : "disc",
+                                     2 * disc.radius_px, disc.center_x_px, disc.center_y_px));
+  // What was drawn is a start: the picture knows better by a few pixels.
+  if (const auto centre = lines.find("center_px:"); centre && stated.circle && kind.name != "disc") {
+    const double x = disc.center_x_px, y = disc.center_y_px, room = std::max(2.0, 0.3 * disc.radius_px);
+    lines.replace(*centre, {fmt::format("center_px: [{{value: {:.1f}, fit: [{:.1f}, {:.1f}]}}, {{value: {:.1f}, fit: "
+                                        "[{:.1f}, {:.1f}]}}]   # as drawn",
+                                        x, x - room, x + room, y, y - room, y + room)});
+  }
   if (kind.name == "disc") {
     if (const auto centre = lines.find("center_px:"))
-      lines.replace(*centre, {fmt::format("center_px: [{:.1f}, {:.1f}]   # of the disc found", disc.center_x_px,
-                                          disc.center_y_px)});
+      lines.replace(*centre,
+                    {fmt::format("center_px: [{:.1f}, {:.1f}]   # {}", disc.center_x_px, disc.center_y_px, whose)});
   }
   if (!(pixel_um > 0)) {
     lines.replace(*line, {kind.name == "disc"
@@ -152,10 +159,10 @@ void fill_disc(const Kind& kind, const LoadedImage& image, double pixel_um, Line
     return;
   }
   const double diameter = 2 * disc.radius_px * pixel_um;
-  lines.replace(*line, {kind.name == "disc"
-                            ? fmt::format("diameter_um: {:.4g}   # of the disc found", diameter)
-                            : fmt::format("diameter_um: {{value: {:.4g}, fit: [{:.4g}, {:.4g}]}}   # of the disc found",
-                                          diameter, 0.8 * diameter, 1.25 * diameter)});
+  lines.replace(*line,
+                {kind.name == "disc" ? fmt::format("diameter_um: {:.4g}   # {}", diameter, whose)
+                                     : fmt::format("diameter_um: {{value: {:.4g}, fit: [{:.4g}, {:.4g}]}}   # {}",
+                                                   diameter, 0.8 * diameter, 1.25 * diameter, whose)});
 }
 
 /// `micrographs:` of one image, with the numbers of the first.
@@ -187,22 +194,37 @@ void list_assumed(const Lines& lines, FilledConfig& filled) {
 
 }  // namespace
 
-FilledConfig config_from_image(const Kind& kind, const std::string& file) {
+OpenedImage open_image(const std::string& file) {
+  std::optional<UserError> first;
+  for (const bool page : {false, true})
+    for (const char* channel : {"", "g"}) {
+      ImageRequest request{file, page ? std::optional<int>(0) : std::nullopt, channel, {file}};
+      try {
+        return {load_image(request), page};
+      } catch (const UserError& error) {
+        if (!first) first = error;
+      }
+    }
+  throw *first;
+}
+
+FilledConfig config_from_image(const Kind& kind, const std::string& file, const Stated& stated) {
   if (kind.config.find("image: ") == std::string::npos && kind.command != "series")
     throw UserError({}, "new " + kind.name + ": its config reads no image", "birefit new " + kind.name + " prints it");
-  const Opened opened = open(file);
+  const OpenedImage opened = open_image(file);
+  const std::string name = stated.file_name.empty() ? file : stated.file_name;
   Lines lines(kind.config);
   FilledConfig filled;
   if (kind.command == "series") {
-    const fs::path path(file);
+    const fs::path path(name);
     const std::string pattern = (path.parent_path() / ("*" + path.extension().string())).string();
-    lines.replace(*lines.find("files:"), {"files: " + quoted(pattern) + "   # * any letters, ? one"});
+    lines.replace(*lines.find("files:"), {fmt::format("files: {}   # * any letters, ? one", quoted(pattern))});
   } else {
-    fill_list(file, lines, filled);
+    fill_list(name, lines, filled);
   }
-  fill_image(file, opened, lines, filled);
-  const double pixel_um = fill_pixel_size(opened.image, lines, filled);
-  fill_disc(kind, opened.image, pixel_um, lines, filled);
+  fill_image(name, opened, stated, lines, filled);
+  const double pixel_um = fill_pixel_size(opened.image, stated, lines, filled);
+  fill_disc(kind, opened.image, stated, pixel_um, lines, filled);
   for (const std::string& note : opened.image.notes) filled.found.push_back(note);
   list_assumed(lines, filled);
   filled.text = lines.text();

@@ -1,4 +1,4 @@
-#include "app/kinds.h"
+#include "io/kinds/kinds.h"
 
 #include <cmath>
 

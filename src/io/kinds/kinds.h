@@ -2,9 +2,12 @@
 // The kinds of samples that `birefit new` knows: the words people use for them, a commented config, and what the
 // picture of its demonstration is made of.
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "birefit/image.h"
 
 namespace birefit {
 
@@ -29,5 +32,10 @@ struct Kind {
 };
 
 const std::vector<Kind>& kinds();
+
+/// Intensities that the kind's config makes with its truth in place of its starts and `set` of `--set`. `config`: where
+/// it is, or would be: files that it names are looked for beside it. Throws UserError where one is not there.
+Image picture_of(const Kind& kind, const std::filesystem::path& config, int width, int height,
+                 const std::vector<std::string>& set);
 
 }  // namespace birefit
