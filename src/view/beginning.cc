@@ -79,11 +79,18 @@ std::string Beginning::thumbnail(const std::string& name) const {
   std::string bytes;
   try {
     const Kind& kind = kind_of(name);
-    const auto lit =
-        std::find_if(kind.pictures.begin(), kind.pictures.end(), [](const DemoPicture& p) { return !p.dark; });
-    std::vector<std::string> set = lit == kind.pictures.end() ? std::vector<std::string>{} : lit->set;
-    set.push_back("microscope.objective_na=");  // rays show what it looks like, waves take longer than people wait for
-    bytes = as_bytes(small(picture_of(kind, kind.name + ".yaml", kind.width, kind.height, set), kThumbnail));
+    double most = -1;
+    for (const DemoPicture& picture : kind.pictures) {
+      if (picture.dark) continue;
+      std::vector<std::string> set = picture.set;
+      set.push_back(
+          "microscope.objective_na=");  // rays show what it looks like, waves take longer than people wait for
+      const Image light = picture_of(kind, kind.name + ".yaml", kind.width, kind.height, set);
+      const auto [low, high] = std::minmax_element(light.values().begin(), light.values().end());
+      if (*high - *low <= most) continue;  // of several the one that shows most
+      most = *high - *low;
+      bytes = as_bytes(small(light, kThumbnail));
+    }
   } catch (const UserError&) {
     // Of what its config names there may be no file here: the words have to do.
   }
