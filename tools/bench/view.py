@@ -72,6 +72,8 @@ with tempfile.TemporaryDirectory() as folder:
             page.run(DRAG % 1)
             found = page.run(DRAG % arguments.seconds)
             latency = sorted(found["latency"])
+            if not latency:
+                sys.exit("no picture while the slider moved: the machine is too busy for a figure")
             print(f"{arguments.size} x {arguments.size}: {found['pictures']:.0f} pictures a second, each "
                   f"{statistics.median(latency):.0f} ms from the question to the painted answer (one in twenty over "
                   f"{latency[int(0.95 * len(latency))]:.0f} ms), of which the model {1000 * found['render']:.1f} ms")

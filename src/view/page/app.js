@@ -112,6 +112,8 @@ const choose = async (index) => {
       at(id).setAttribute("aria-label", `${id === "measured" ? "measured picture" : id === "model" ? "picture of the model" : "measured less model"}, ${one.width} by ${one.height} pixels`);
   }
   drawn = null;
+  recent = [];
+  slow = false;
   draw(true);
 };
 
@@ -136,7 +138,7 @@ const rangeOf = (all, sigma) => {
 
 // ---- asking for pictures -------------------------------------------------------------------------------------------------
 
-let wanted = null, busy = false, rest = 0, slow = false;
+let wanted = null, busy = false, rest = 0, slow = false, recent = [];
 
 /** After a change: at once where pictures are quick, and once more, planned anew, when the hand rests. */
 const draw = (settle) => {
@@ -146,7 +148,7 @@ const draw = (settle) => {
     pump();
   }
   if (!settle) rest = setTimeout(() => draw(true), kRest);
-  if (!settle && slow) at("speed").textContent = `${seconds(drawn.header.seconds)} a picture: made when the hand rests`;
+  if (!settle && slow && drawn) at("speed").textContent = `${seconds(drawn.header.seconds)} a picture: made when the hand rests`;
 };
 
 /** The latest question, on its way; null where nothing was asked since the last. */
@@ -177,7 +179,8 @@ const pump = async () => {
     const length = new DataView(bytes).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
     drawn = { header, values: asked.values, settle: asked.settle, model: new Float32Array(bytes, 4 + length) };
-    slow = header.seconds > kSlow;
+    recent = [...recent.slice(-2), header.render_seconds];
+    slow = recent.every((s) => s > kSlow);  // one that other work has held up is none
     banner("");
     showPicture();
     counters.latency.push(performance.now() - begin);
