@@ -6,9 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "birefit/memo.h"
 #include "fit/problem/frame.h"
-#include "fit/zone.h"
+#include "fit/standing.h"
 
 namespace birefit {
 namespace {
@@ -24,47 +23,11 @@ Task with_all_searched(const FitJob& job) {
   return task;
 }
 
-/// Of several branches the one that was reported, or the first; one memo for all plans.
-FitJob settled(FitJob job, const FitResult* result) {
-  if (!job.demand.memo) job.demand.memo = std::make_shared<Memo>();
-  if (job.branches.size() < 2) return job;
-  std::size_t chosen = 0;
-  for (std::size_t b = 0; result && b < result->branches.size(); ++b)
-    if (result->branches[b].reported) chosen = b;
-  const SampleBranch branch = job.branches[chosen];
-  job.branches.clear();
-  std::size_t at = 0;
-  for_each_scene(job.measurements, [&](Scene& scene) { scene.sample = branch.samples[at++]; });
-  for (const int index : branch.idle) job.parameters[index].free = false;
-  return job;
-}
-
-/// Without what a sample takes out of its pictures where the job begins.
-FitJob without_zones(FitJob job) {
-  const Theta theta = job.parameters.values();
-  for (Measurement& measurement : job.measurements)
-    if (auto* picture = std::get_if<Picture>(&measurement)) picture->mask = fitted_pixels(*picture, theta);
-  return job;
-}
-
-void take_from(const FitResult& result, Frames& frames) {
-  for (std::size_t g = 0; g < std::min(frames.size(), result.micrographs.size()); ++g) {
-    const MicrographResult& own = result.micrographs[g];
-    frames[g].plan = own.plan;
-    frames[g].sigma = own.sigma;
-    frames[g].pixels.clear();
-    for (int y = 0; y < own.residual.height(); ++y)
-      for (int x = 0; x < own.residual.width(); ++x)
-        if (std::isfinite(own.residual(x, y))) frames[g].pixels.push_back({x, y});
-  }
-}
-
 }  // namespace
 
 struct Objective::Parts {
   Parts(FitJob of, const FitResult* result)
-      : job(result ? settled(std::move(of), result) : without_zones(settled(std::move(of), nullptr))),
-        task(with_all_searched(job)) {
+      : job(result ? as_ended(std::move(of), *result) : as_begun(std::move(of))), task(with_all_searched(job)) {
     const Task begun(job);
     Start begin = prepare(begun);
     if (result) {

@@ -6,40 +6,12 @@
 
 #include "fit/problem/frame.h"
 #include "fit/problem/light.h"
-#include "fit/zone.h"
+#include "fit/standing.h"
 
 namespace birefit {
 namespace {
 
 using namespace estimation;
-
-/// Without the pixels that samples take out where the job begins.
-FitJob without_zones(FitJob job) {
-  const Theta theta = job.parameters.values();
-  for (Measurement& measurement : job.measurements)
-    if (Picture* picture = std::get_if<Picture>(&measurement)) picture->mask = fitted_pixels(*picture, theta);
-  return job;
-}
-
-/// The job in which the fit ended: its branch, its physics, and what is stated where it had that.
-FitJob as_fitted(FitJob job, const FitResult& result) {
-  for (int i = 0; i < job.parameters.size() && i < static_cast<int>(result.theta.size()); ++i)
-    if (!job.parameters[i].free) job.parameters[i].value = result.theta[static_cast<std::size_t>(i)];
-  if (!result.micrographs.empty()) {
-    const std::shared_ptr<Memo> memo = job.demand.memo;
-    job.demand = result.micrographs[0].plan.demand;
-    job.demand.memo = memo;
-  }
-  for (const BranchResult& branch : result.branches)
-    for (const SampleBranch& of : job.branches) {
-      if (!branch.reported || of.name != branch.name) continue;
-      std::size_t next = 0;
-      for_each_scene(job.measurements, [&](Scene& scene) {
-        if (next < of.samples.size()) scene.sample = of.samples[next++];
-      });
-    }
-  return job;
-}
 
 }  // namespace
 
@@ -61,24 +33,14 @@ struct Trials::State {
   std::unique_ptr<LeastSquares> problem;
 };
 
-Trials::Trials(FitJob job) : state_(std::make_unique<State>(without_zones(std::move(job)))) {}
+Trials::Trials(FitJob job) : state_(std::make_unique<State>(as_begun(std::move(job)))) {}
 
 Trials::Trials(FitJob job, const FitResult& result)
-    : state_(std::make_unique<State>(as_fitted(std::move(job), result))) {
+    : state_(std::make_unique<State>(as_ended(std::move(job), result))) {
   State& state = *state_;
   for (std::size_t j = 0; j < state.start.size(); ++j)
     state.start[j] = result.theta.at(static_cast<std::size_t>(state.task.unknowns.searched[j]));
-  for (std::size_t g = 0; g < state.frames.size() && g < result.micrographs.size(); ++g) {
-    const MicrographResult& of = result.micrographs[g];
-    Frame& frame = state.frames[g];
-    frame.plan = of.plan;
-    frame.noise = of.noise;
-    frame.sigma = of.sigma;
-    frame.pixels.clear();
-    for (int y = 0; y < of.residual.height(); ++y)
-      for (int x = 0; x < of.residual.width(); ++x)
-        if (std::isfinite(of.residual(x, y))) frame.pixels.push_back({x, y});
-  }
+  take_from(result, state.frames);
   state.rebuild();
 }
 
