@@ -9,6 +9,8 @@
 
 #include "fit/errors/patterns.h"
 #include "fit/errors/statistics.h"
+#include "fit/problem/frame.h"
+#include "fit/weights/noise.h"
 #include "samples/kind.h"
 
 namespace birefit::estimation {
@@ -230,6 +232,21 @@ bool tells_row_patterns(const Task& task, const LeastSquares& problem) {
   return task.unknowns.size() > 0 && task.frames() >= task.unknowns.size() + kFreedom;
 }
 
+/// Of one picture: does it scatter about the fit by more than its noise? Of n pixels chi-square scatters by 2/n. A
+/// noise that was read off the picture is known to no better than 40/n; read once more off what is left over it is
+/// known to 14/n (weights/noise.cc).
+bool is_beyond_noise(const Task& task, const Optimum& optimum) {
+  const auto pixels = static_cast<double>(optimum.problem->pixel_rows());
+  const double reduced = optimum.problem->frame_misfit(0).chi_square / pixels;
+  if (!(reduced > 1 + 3 * std::sqrt(2 / pixels))) return false;
+  const Frame& frame = optimum.frames[0];
+  if (!frame.noise.estimated || frame.noise_of_all) return true;
+  const Image fitted = fitted_image(task, optimum.frames, 0, optimum.theta);
+  const double louder = mean_variance(task.picture(0), estimate_noise(task.picture(0), &fitted), fitted) /
+                        mean_variance(task.picture(0), frame.noise, fitted);
+  return reduced / louder > 1 + 3 * std::sqrt((2 + 14) / pixels);
+}
+
 /// What there is to say of a fit's residual; nothing where noise explains it.
 struct LeftOver {
   Parted sums;
@@ -270,7 +287,7 @@ std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
   // What noise does not explain is scaled by its own size as well (Misfit); only of what is round it asks without a
   // pattern that is seen.
   const bool round = !rows && traits_of(task.picture(0).scene).round;
-  const bool beyond_noise = round && problem.frame_misfit(0).chi_square / pixels > 1 + 3 * std::sqrt(2 / pixels);
+  const bool beyond_noise = round && is_beyond_noise(task, optimum);
   if (!beyond_noise && !(left.found.evidence > kEvidence)) return std::nullopt;
   return left;
 }

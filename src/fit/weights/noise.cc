@@ -100,6 +100,7 @@ class Codes {
 struct Sample {
   double signal, difference;  // counts; difference has the variance of one pixel
   double slope_x, slope_y;    // counts a pixel
+  double expected = 1;        // variance, up to a factor that all share
 };
 
 /// Differences that cancel smooth structure. The tensor product of (1 -4 6 -4 1) with itself answers to a fringe of
@@ -134,7 +135,7 @@ std::vector<Sample> differences(const Picture& micrograph, const Image* fitted, 
       if (!usable) continue;
       const double unit = value_per_count(micrograph, x, y);
       samples.push_back({sum.signal / (norm * norm) / unit, sum.difference / norm / unit, sum.slope_x / lever / unit,
-                         sum.slope_y / lever / unit});
+                         sum.slope_y / lever / unit, 1});
     }
   return samples;
 }
@@ -164,14 +165,27 @@ struct Bin {
   double darkest;  ///< signal in it
 };
 
-/// The median absolute deviation ignores dust, edges and the defect.
-double robust_variance(const std::vector<Sample>& samples, double step, double mask_order) {
+/// In standard deviations: of normal numbers one in 16,000 lies beyond, of dust and edges most.
+constexpr double kTrim = 4;
+
+/// At the level where `expected` is what samples expect; the median absolute deviation ignores dust, edges and the
+/// defect. Deviations are in units of what each sample expects: a median of small and large ones together is below
+/// their mean. `squares_too`: where a model is taken off, the mean square of all but what stands out, which knows a
+/// variance 1.6 times as well.
+double robust_variance(const std::vector<Sample>& samples, double expected, double step, double mask_order,
+                       bool squares_too) {
   std::vector<double> absolute;
-  for (const Sample& s : samples) absolute.push_back(std::abs(s.difference));
+  for (const Sample& s : samples) absolute.push_back(std::abs(s.difference) * std::sqrt(expected / s.expected));
   const double sd = kNormalSdPerMad * median(absolute), count = static_cast<double>(samples.size());
-  if (!(sd < step)) return sd * sd;
+  if (!(sd < step)) {
+    if (!squares_too) return sd * sd;
+    double squares = 0, kept = 0;
+    for (const double x : absolute)
+      if (x <= kTrim * sd) squares += x * x, ++kept;
+    return squares / kept;
+  }
   // Few codes have no median to speak of: the mean square, without what lies beyond four standard deviations.
-  const double limit = 4 * std::max(sd, step * std::sqrt(kQuantisation));
+  const double limit = kTrim * std::max(sd, step * std::sqrt(kQuantisation));
   double squares = 0, kept = 0, apart = 0;
   for (const Sample& s : samples) {
     if (std::abs(s.difference) <= limit) squares += s.difference * s.difference, ++kept;
@@ -194,24 +208,24 @@ constexpr double kVarianceSd = 6.2;
 /// than chance: beside bright fringes the dark field and the feet of the fringes come into one bin, and the steepest
 /// change of the variance is there. Signal and variance are both medians: means of a bin's signal would lie far above
 /// the pixels that its median variance stands for. Levels that noise takes below the cut go into `near_cut`.
-void add_levels(std::vector<Sample> samples, const Codes& codes, double mask_order, std::vector<Bin>& bins,
-                std::vector<Bin>& near_cut) {
+void add_levels(std::vector<Sample> samples, const Codes& codes, double mask_order, bool squares_too,
+                std::vector<Bin>& bins, std::vector<Bin>& near_cut) {
   const auto darker = [](const Sample& a, const Sample& b) { return a.signal < b.signal; };
   const auto middle = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
   std::nth_element(samples.begin(), middle, samples.end(), darker);
-  const double signal = middle->signal, count = static_cast<double>(samples.size());
+  const double signal = middle->signal, expected = middle->expected, count = static_cast<double>(samples.size());
   const double begin = std::min_element(samples.begin(), std::next(middle), darker)->signal;
   const double end = std::max_element(middle, samples.end(), darker)->signal;
   const auto variance_of = [&](const std::vector<Sample>& of, double from, double to) {
-    return std::max(robust_variance(of, codes.step(from, to), mask_order), codes.floor());
+    return std::max(robust_variance(of, expected, codes.step(from, to), mask_order, squares_too), codes.floor());
   };
   constexpr std::size_t kTwoLevels = 200;  // samples; fewer tell no two variances apart
   if (samples.size() >= kTwoLevels) {
     std::vector<Sample> dark(samples.begin(), middle), bright(middle, samples.end());
     const double log_ratio = std::log(variance_of(bright, signal, end) / variance_of(dark, begin, signal));
     if (std::abs(log_ratio) > 2 * kVarianceSd * std::sqrt(4 / count)) {
-      add_levels(std::move(dark), codes, mask_order, bins, near_cut);
-      add_levels(std::move(bright), codes, mask_order, bins, near_cut);
+      add_levels(std::move(dark), codes, mask_order, squares_too, bins, near_cut);
+      add_levels(std::move(bright), codes, mask_order, squares_too, bins, near_cut);
       return;
     }
   }
@@ -224,7 +238,7 @@ void add_levels(std::vector<Sample> samples, const Codes& codes, double mask_ord
 
 /// Samples of like signal together. Bins of equal width see the bright and the dark end alike; those with too few
 /// samples are skipped.
-std::vector<Bin> binned(std::vector<Sample> samples, const Codes& codes, double mask_order) {
+std::vector<Bin> binned(std::vector<Sample> samples, const Codes& codes, double mask_order, bool squares_too) {
   const std::size_t few = samples.size() / 200;
   const auto signal_of_rank = [&](std::size_t rank) {
     const auto at = samples.begin() + static_cast<std::ptrdiff_t>(rank);
@@ -242,7 +256,7 @@ std::vector<Bin> binned(std::vector<Sample> samples, const Codes& codes, double 
   std::vector<Bin> bins, near_cut;
   for (std::vector<Sample>& part : parts)
     if (part.size() >= std::min<std::size_t>(30, samples.size()))
-      add_levels(std::move(part), codes, mask_order, bins, near_cut);
+      add_levels(std::move(part), codes, mask_order, squares_too, bins, near_cut);
   for (std::vector<Bin>* levels : {&bins, &near_cut})  // a few specks are not the darkest level
     for (Bin& bin : *levels) bin.darkest = std::max(bin.darkest, low), bin.signal = std::max(bin.signal, bin.darkest);
   return bins.empty() ? near_cut : bins;
@@ -252,6 +266,7 @@ std::vector<Bin> binned(std::vector<Sample> samples, const Codes& codes, double 
 /// darkest level seen: above a black level, a straight line from zero would need a negative variance there.
 struct VarianceLine {
   double dark, at_dark, slope;
+  double at(double signal) const { return at_dark + slope * (signal - dark); }
 };
 
 /// The line by the likelihood of sample variances, -n/2 (ln m + v/m): a model far below what a level shows is as
@@ -277,7 +292,7 @@ VarianceLine variance_line(const std::vector<Bin>& bins, double floor, std::opti
   const auto unlikely = [&](const VarianceLine& l) {
     double sum = 0;
     for (const Bin& bin : bins) {
-      const double m = l.at_dark + l.slope * (bin.signal - dark);
+      const double m = l.at(bin.signal);
       sum += bin.count * (std::log(m) + bin.variance / m);
     }
     return sum;
@@ -345,7 +360,7 @@ NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
   noise.estimated = true;
   noise.read_counts = std::sqrt(codes.floor());
   if (samples.size() < 9) return noise;
-  const std::vector<Bin> bins = binned(std::move(samples), codes, order);
+  std::vector<Bin> bins = binned(samples, codes, order, false);
   if (bins.empty()) return noise;
   // Levels no farther apart than noise alone takes pixels tell one variance, and no slope: a frame of even light.
   constexpr double kApart = 4;  // standard deviations
@@ -359,7 +374,11 @@ NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
   // Calibration took the black level off, a cut is one.
   std::optional<double> black = codes.cut();
   if (!micrograph.variance_scale.empty()) black = 0;
-  const VarianceLine line = variance_line(bins, codes.floor(), black);
+  VarianceLine line = variance_line(bins, codes.floor(), black);
+  // Levels from here to there have pixels of different variance: once more, in units of what the line says of each.
+  for (Sample& sample : samples) sample.expected = std::max(line.at(std::max(sample.signal, line.dark)), codes.floor());
+  bins = binned(std::move(samples), codes, order, fitted != nullptr);
+  line = variance_line(bins, codes.floor(), black);
   noise.counts_per_photon = line.slope;
   // A model may come to be darker than anything seen: there the variance is not extrapolated below half of what was, by
   // the line or by the darkest pixels themselves, which a line through fringes finer than pixels may pass far below.
