@@ -25,6 +25,10 @@ struct TwoCells {
   TableBuilder b;
   ParameterRef first, second, birefringence, twist;
   double ratio = 1.5;
+  double turn_polarizer_deg = 37, turn_analyzer_deg = 61;  ///< from picture to picture
+
+  double polarizer_of(int k) const { return std::fmod(turn_polarizer_deg * k, 180); }
+  double analyzer_of(int k) const { return std::fmod(turn_analyzer_deg * k, 180); }
 
   FitJob job(unsigned seed) {
     std::mt19937_64 random(seed);
@@ -42,7 +46,7 @@ struct TwoCells {
       scene.material = ConstantIndices{b.fixed("ordinary", 1.5), birefringence};
       scene.surround_index = b.fixed("surround", 1.5);
       scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 1000 * cell.wavelength_um);
-      const double polarizer = 37 * k % 180, analyzer = 61 * k % 180;
+      const double polarizer = polarizer_of(k), analyzer = analyzer_of(k);
       scene.microscope.polarizer_deg = b.fixed("polarizer", polarizer);
       scene.microscope.analyzer_deg = b.fixed("analyzer", analyzer);
       scene.view.width = scene.view.height = kSide;
@@ -207,6 +211,40 @@ TEST(DerivedNumbers, KnowWhatIsStatedAndFittedTogether) {
   EXPECT_NEAR(derived(stated, "retardance").value, 650, 4 * derived(stated, "retardance").stderr_);
 }
 
+/// What is stated to a degree moves the estimates through what is tied to it, and so does what is done in its place.
+TEST(TiedNumbers, CarryWhatStatedNumbersAreKnownTo) {
+  const auto fitted = [](bool tied) {
+    TwoCells cells = with_thickness();
+    cells.second = cells.first.seen(1.5, 0);
+    cells.turn_polarizer_deg = 0, cells.turn_analyzer_deg = 29;
+    FitJob job = cells.job(7);
+    Parameter dial;
+    dial.name = "polarizer_deg", dial.unit = "deg", dial.known_to.sd = 1;
+    const ParameterRef polarizer = job.parameters.add(dial);
+    int k = 0;
+    for_each_scene(job.measurements, [&](Scene& scene) {
+      scene.microscope.polarizer_deg = polarizer;
+      const double turned = cells.analyzer_of(k++);
+      scene.microscope.analyzer_deg = polarizer.seen(1, turned);
+      if (!tied) return;
+      const ParameterRef analyzer = job.parameters.add_constant("turned" + std::to_string(k), 0, "deg");
+      job.parameters.tie(analyzer.index,
+                         {law_of("a.dial + " + std::to_string(turned) + " * deg", {"deg"}, "deg"), {polarizer.index}});
+      scene.microscope.analyzer_deg = analyzer;
+    });
+    return fit(job);
+  };
+  const FitResult tied = fitted(true), shared = fitted(false);
+  ASSERT_EQ(tied.grade(), shared.grade()) << tied.verdict << shared.verdict;
+  ASSERT_EQ(tied.stated.size(), 1u);
+  EXPECT_EQ(tied.stated[0].name, "polarizer_deg");
+  for (const char* name : {"thickness", "twist"}) {
+    const ParameterEstimate &a = *find_estimate(tied, name), &b = *find_estimate(shared, name);
+    EXPECT_NEAR(a.value, b.value, 1e-3 * b.stderr_) << name;
+    EXPECT_NEAR(a.stderr_, b.stderr_, 1e-3 * b.stderr_) << name;
+  }
+}
+
 /// A dial's zero moves what is tied to the dial.
 TEST(TiedNumbers, FollowADialThatIsOffByItsZero) {
   const auto fitted = [](bool tied) {
@@ -215,15 +253,16 @@ TEST(TiedNumbers, FollowADialThatIsOffByItsZero) {
     FitJob job = cells.job(6);
     int k = 0;
     for_each_scene(job.measurements, [&](Scene& scene) {
-      const double polarizer = 37 * k % 180;
+      const double polarizer = cells.polarizer_of(k);
       Parameter dial;
       dial.name = "micrographs[" + std::to_string(k) + "].microscope.polarizer_deg";
       dial.unit = "deg", dial.value = polarizer, dial.known_to.sd = 1;
       scene.microscope.polarizer_deg = job.parameters.add(dial);
       if (tied) {
         const ParameterRef turned = job.parameters.add_constant("turned" + std::to_string(k), 0, "deg");
-        job.parameters.tie(turned.index, {law_of(std::to_string(61 * k % 180) + " * deg + 0 * a.dial", {"deg"}, "deg"),
-                                          {scene.microscope.polarizer_deg.index}});
+        job.parameters.tie(turned.index,
+                           {law_of(std::to_string(cells.analyzer_of(k)) + " * deg + 0 * a.dial", {"deg"}, "deg"),
+                            {scene.microscope.polarizer_deg.index}});
         scene.microscope.analyzer_deg = turned;
       }
       ++k;

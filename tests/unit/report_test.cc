@@ -149,6 +149,7 @@ TEST(FitJson, EveryKeyIsInItsDocument) {
   r.branches.push_back({});
   r.directions.push_back({});
   r.inputs.push_back({});
+  r.derived.push_back({});
   r.strips.push_back({});
   r.coverage = Coverage{};
   r.coverage->parameters.push_back({});

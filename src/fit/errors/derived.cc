@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "birefit/expression.h"
 #include "fit/errors/report.h"
@@ -95,6 +96,10 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
     held.held = true, held.expected = table.value_of(*table.tie_of(index), result.theta);
     held.stderr_ = held.interval95_low = held.interval95_high = std::numeric_limits<double>::quiet_NaN();
   }
+  // By name, the second of twelve pictures before the tenth.
+  std::stable_sort(result.derived.begin(), result.derived.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.name.size(), a.name) < std::pair(b.name.size(), b.name);
+  });
   for (const Derived& derived : task.job.derived)
     add(derived.name, derived.unit, derived.tie, false, table.value_of(derived.tie, result.theta),
         table.slopes(derived.tie, result.theta),

@@ -86,7 +86,8 @@ std::string following_text(const FitJob& job) {
   const Theta theta = job.parameters.values();
   std::string text, what = "Tied       ";
   const auto say = [&](const std::string& name, const Tie& tie, double value, const std::string& unit) {
-    text += fmt::format("{}{} = {} = {:g} {}\n", what, name, printable(tie.law->text()), value, unit);
+    text += fmt::format("{}{} = {} = {:g}{}{}\n", what, name, printable(tie.law->text()), value,
+                        unit.empty() ? "" : " ", unit);
     what = "           ";
   };
   for (const int index : job.parameters.tied())
