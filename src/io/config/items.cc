@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include <fmt/format.h>
+
 #include "io/config/micrograph.h"
 #include "io/config/pictures.h"
 #include "io/config/series.h"
@@ -27,6 +29,15 @@ std::vector<Item> read_frames(ConfigReader& reader, const Config& config, TableN
   }
 }
 
+void read_set(ConfigReader& reader, const YamlNode& set, const std::string& path, Item& item) {
+  if (!set.is_map())
+    reader.problems.add(set.where, path + " must be a map of parameter paths, found " + set.describe());
+  for (const YamlEntry& entry : set.entries) {
+    item.set.emplace_back(entry.key, &entry.value);
+    item.set_where.push_back(entry.where);
+  }
+}
+
 Item read_item(ConfigReader& reader, const YamlNode& node, const std::string& path) {
   const Block block = reader.block_of(node, path, {"image", "set", "page"});
   Item item;
@@ -34,16 +45,7 @@ Item read_item(ConfigReader& reader, const YamlNode& node, const std::string& pa
   item.image_where = block.find("image") ? block.find("image")->where : block.where;
   if (!block.find("image") && reader.use == ConfigUse::fit) reader.missing(block, "image");
   item.page = read_page(reader, block);
-  const YamlNode* set = block.find("set");
-  if (!set) return item;
-  if (!set->is_map()) {
-    reader.problems.add(set->where, path + ".set must be a map of parameter paths, found " + set->describe());
-    return item;
-  }
-  for (const YamlEntry& entry : set->entries) {
-    item.set.emplace_back(entry.key, &entry.value);
-    item.set_where.push_back(entry.where);
-  }
+  if (const YamlNode* set = block.find("set")) read_set(reader, *set, path + ".set", item);
   return item;
 }
 
@@ -94,8 +96,11 @@ std::vector<Item> items_of(ConfigReader& reader, const ImageSeries& series, std:
   return items;
 }
 
-Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item, std::size_t index,
-                  const std::string& list) {
+namespace {
+
+/// apply_set() with what the names of own parameters begin with. Entries that have such a name already serve.
+Picture with_own(ConfigReader& reader, const Picture& shared, const Item& item, std::size_t index,
+                 const std::string& prefix) {
   Picture micrograph = shared;
   const std::map<std::string, NumberSpec> shared_specs = reader.specs;
   const std::map<std::string, ParameterRef> shared_refs = reader.refs;
@@ -111,7 +116,8 @@ Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item,
                           !near.empty() ? "did you mean " + near + "?" : "known here: " + list_words(known));
       continue;
     }
-    const ParameterRef own = reader.number_at(*node, list + "[" + std::to_string(index) + "]." + path, spec->second);
+    ParameterRef own = reader.table.find(prefix + path);
+    if (!own) own = reader.number_at(*node, prefix + path, spec->second);
     if (spec->second.linear && !std::isfinite(reader.table[own].value))
       reader.table[own].value = reader.table[shared_refs.at(path)].value;
     if (path == "micrograph.gain") keep_positive(reader.table[own]);
@@ -126,7 +132,7 @@ Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item,
       if (!reader.table[ref].free) continue;
       fitted = true;
       Parameter copy = reader.table[ref];
-      copy.name = list + "[" + std::to_string(index) + "]." + path;
+      copy.name = prefix + path;
       reader.replaced.insert(ref.index);
       replace_ref(micrograph, ref, reader.table.add(std::move(copy)));
     }
@@ -143,6 +149,20 @@ Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item,
   reader.specs = shared_specs;
   reader.refs = shared_refs;
   return micrograph;
+}
+
+}  // namespace
+
+Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item, std::size_t index,
+                  const std::string& list) {
+  return with_own(reader, shared, item, index, fmt::format("{}[{}].", list, index));
+}
+
+Picture apply_colour(ConfigReader& reader, const Picture& shared, const std::string& colour, const YamlNode& set) {
+  Item own;
+  const std::string path = "micrograph.channels." + colour;
+  read_set(reader, set, path, own);
+  return with_own(reader, shared, own, 0, path + ".");
 }
 
 }  // namespace birefit

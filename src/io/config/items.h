@@ -37,5 +37,7 @@ std::vector<Item> items_of(ConfigReader& reader, const ImageSeries& series, std:
 /// `list`, which the names of its parameters begin with.
 Picture apply_set(ConfigReader& reader, const Picture& shared, const Item& item, std::size_t index,
                   const std::string& list = "micrographs");
+/// The same of one of several colours, "r", "g" or "b", whose own values all images share: a map of parameter paths.
+Picture apply_colour(ConfigReader& reader, const Picture& shared, const std::string& colour, const YamlNode& set);
 
 }  // namespace birefit

@@ -223,7 +223,10 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
   for (std::size_t i = 0; i < items.size(); ++i) {
     const Picture own = apply_set(reader, shared, items[i], i);
     for (const MicrographSettings& of_channel : channels) {
-      Picture& picture = micrographs.emplace_back(own);
+      const auto of_colour = settings.channels.find(of_channel.channel);
+      Picture& picture = micrographs.emplace_back(
+          of_colour == settings.channels.end() ? own
+                                               : apply_colour(reader, own, of_channel.channel, *of_colour->second));
       choose_channel(reader, of_channel.channel, settings.channel_where, picture.scene);
       if (channels.size() > 1) own_levels(reader, of_channel.channel, picture);
     }
@@ -348,7 +351,9 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     config.scene = scene;
     for (std::size_t c = 0; c < channels.size(); ++c) {
       Scene& of_channel = micrographs[c].scene;
+      const ParameterRef own_size = of_channel.view.pixel_size_um;
       of_channel.view = scene.view;
+      if (own_size && settings.channels.count(channels[c].channel)) of_channel.view.pixel_size_um = own_size;
       if (channels.size() > 1) config.colours.push_back(of_channel);
       if (use == ConfigUse::plan) config.job.measurements.push_back(micrographs[c]);
     }

@@ -215,11 +215,12 @@ std::string not_square(double x, double y) { return fmt::format("{:.5g} x {:.5g}
 
 MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, const Scene& scene, Quantity quantity) {
   MicrographSettings settings;
-  const Block block = reader.block(
-      root, "micrograph",
-      {"image", "page", "channel", "mosaic", "bayer", "pixel_size_um", "transfer", "gain", "offset", "illumination",
-       "background", "center_px", "rotation_deg", "roi_px", "bin", "mask", "saturation_counts", "noise", "calibration"},
-      false);
+  const Block block =
+      reader.block(root, "micrograph",
+                   {"image",    "page", "channel", "channels",          "mosaic",     "bayer",      "pixel_size_um",
+                    "transfer", "gain", "offset",  "illumination",      "background", "center_px",  "rotation_deg",
+                    "roi_px",   "bin",  "mask",    "saturation_counts", "noise",      "calibration"},
+                   false);
   settings.where = block.where;
   const auto place = [&](const char* key) { return block.find(key) ? block.find(key)->where : block.where; };
   settings.image = reader.text(block, "image");
@@ -230,6 +231,12 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   if (settings.channel == "rgb" && reader.camera.empty())
     reader.problems.add(settings.channel_where, "channel: rgb needs the light and what the camera sees of it",
                         "microscope: {light: {lamp: A}, camera: {sensitivity: nikon_d5100}}");
+  if (const Block channels = reader.block(block, "channels", {"r", "g", "b"}, false); channels.node) {
+    if (settings.channel != "rgb")
+      reader.problems.add(channels.where, "channels is what each colour of channel: rgb has for itself",
+                          "channel: rgb, or leave channels out");
+    for (const YamlEntry& entry : channels.node->entries) settings.channels[entry.key] = &entry.value;
+  }
   settings.mosaic = read_mosaic(reader, block, settings.channel);
 
   settings.pixel_size_um = read_pixel_size(reader, block, scene);

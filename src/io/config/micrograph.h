@@ -1,6 +1,7 @@
 #pragma once
 // The block `micrograph` of a config: what it gives to every image.
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ struct MicrographSettings {
   PageChoice page;
   std::string channel;  ///< "rgb": all three, each a picture of its own
   Where channel_where;
+  /// Of `rgb`, what a colour has for itself, by its name: maps of parameter paths.
+  std::map<std::string, const YamlNode*> channels;
   MosaicSettings mosaic;
   Transfer transfer;
   ParameterRef pixel_size_um;  ///< none: the file's

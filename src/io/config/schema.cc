@@ -164,6 +164,7 @@ Json micrograph_schema() {
   for (const auto& [key, words] : std::vector<std::pair<const char*, const char*>>{
            {"page", "of a file of several, from 0; or {t, z, c}"},
            {"channel", "r, g, b, rgb (all three), mean, or a number from 0"},
+           {"channels", "r, g, b: parameter paths and what that colour of rgb has for itself"},
            {"transfer", "how codes follow light: linear, srgb, {gamma: ..}, {file: ..}"},
            {"gain", "value = gain * intensity + offset"},
            {"offset", "value = gain * intensity + offset"},
