@@ -242,7 +242,7 @@ bool is_beyond_noise(const Task& task, const Optimum& optimum) {
   const Frame& frame = optimum.frames[0];
   if (!frame.noise.estimated || frame.noise_of_all) return true;
   const Image fitted = fitted_image(task, optimum.frames, 0, optimum.theta);
-  const double louder = mean_variance(task.picture(0), estimate_noise(task.picture(0), &fitted), fitted) /
+  const double louder = mean_variance(task.picture(0), estimate_noise(task.picture(0), &fitted, true), fitted) /
                         mean_variance(task.picture(0), frame.noise, fitted);
   return reduced / louder > 1 + 3 * std::sqrt((2 + 14) / pixels);
 }

@@ -343,13 +343,13 @@ CoarseCodes coarse_codes(const std::vector<const Picture*>& pictures) {
   return codes;
 }
 
-NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
+NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted, bool squares) {
   if (const SubGrid grid = sub_grid(micrograph.mask); grid.spacing > 1) {
     Picture part;
     part.values = on_grid(micrograph.values, grid), part.mask = on_grid(micrograph.mask, grid);
     part.variance_scale = on_grid(micrograph.variance_scale, grid);
     const Image model = fitted ? on_grid(*fitted, grid) : Image();
-    return estimate_noise(part, fitted ? &model : nullptr);
+    return estimate_noise(part, fitted ? &model : nullptr, squares);
   }
   constexpr std::size_t kEnough = 200;
   const Codes codes(micrograph);
@@ -375,10 +375,12 @@ NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted) {
   std::optional<double> black = codes.cut();
   if (!micrograph.variance_scale.empty()) black = 0;
   VarianceLine line = variance_line(bins, codes.floor(), black);
-  // Levels from here to there have pixels of different variance: once more, in units of what the line says of each.
-  for (Sample& sample : samples) sample.expected = std::max(line.at(std::max(sample.signal, line.dark)), codes.floor());
-  bins = binned(std::move(samples), codes, order, fitted != nullptr);
-  line = variance_line(bins, codes.floor(), black);
+  if (squares) {
+    // Levels from here to there have pixels of different variance: once more, in units of what the line says of each.
+    for (Sample& s : samples) s.expected = std::max(line.at(std::max(s.signal, line.dark)), codes.floor());
+    bins = binned(std::move(samples), codes, order, true);
+    line = variance_line(bins, codes.floor(), black);
+  }
   noise.counts_per_photon = line.slope;
   // A model may come to be darker than anything seen: there the variance is not extrapolated below half of what was, by
   // the line or by the darkest pixels themselves, which a line through fringes finer than pixels may pass far below.

@@ -10,7 +10,9 @@ namespace birefit::estimation {
 /// Read and photon noise (in counts) from the differences between neighbouring pixels, whatever the fringes do.
 /// With `fitted` (the model's image in the same values) the differences are those of the residual, which no fringe
 /// fills: fringes finer than about six pixels look like noise in the image itself.
-NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted = nullptr);
+/// `squares`: by mean squares in place of medians, in units of what each pixel expects, which tells a variance 1.6
+/// times as well where the model leaves nothing over, and is misled by what it leaves.
+NoiseModel estimate_noise(const Picture& micrograph, const Image* fitted = nullptr, bool squares = false);
 /// Those of the pixels that a mask leaves, as far as they are numbers.
 std::vector<double> usable_values(const Picture& picture);
 /// Mean variance of the usable pixels' values under a model.
