@@ -184,6 +184,26 @@ TEST_F(Region, OfAModelIsThePartOfTheWholePicture) {
   EXPECT_LT(most_binned, 1e-3);
 }
 
+TEST_F(Region, OfItsOwnIsEachPicturesPart) {
+  write("a.tif", 64, 48, 1, 0);
+  const std::string config =
+      "micrograph: {pixel_size_um: 0.25, center_px: [20, 20]}\nmicrographs:\n"
+      "  - {image: a.tif, roi_px: [3, 5, 40, 45]}\n  - {image: a.tif}\n" +
+      std::string(kDroplet);
+  const Config loaded = load_config(text("own.yaml", config), ConfigUse::fit);
+  ASSERT_EQ(loaded.job.measurements.size(), 2u);
+  const auto& part = std::get<Picture>(loaded.job.measurements[0]);
+  const auto& whole = std::get<Picture>(loaded.job.measurements[1]);
+  ASSERT_EQ(part.values.width(), 37);
+  ASSERT_EQ(part.values.height(), 40);
+  EXPECT_EQ(whole.values.width(), 64);
+  for (int y = 0; y < part.values.height(); ++y)
+    for (int x = 0; x < part.values.width(); ++x) ASSERT_EQ(part.values(x, y), whole.values(x + 3, y + 5));
+  EXPECT_NE(part.name, whole.name);
+  EXPECT_THAT(mistake("calibration: {dark: a.tif, parallel: a.tif}\n" + config),
+              testing::HasSubstr("a region of its own is given beside calibration frames"));
+}
+
 TEST_F(Region, WhatCannotBeBinnedIsSaid) {
   save_image(Image(32, 32, 5), folder_ / "a.tif");
   const auto with = [](const std::string& keys) {

@@ -39,12 +39,13 @@ void read_set(ConfigReader& reader, const YamlNode& set, const std::string& path
 }
 
 Item read_item(ConfigReader& reader, const YamlNode& node, const std::string& path) {
-  const Block block = reader.block_of(node, path, {"image", "set", "page"});
+  const Block block = reader.block_of(node, path, {"image", "set", "page", "roi_px"});
   Item item;
   item.image = reader.text(block, "image");
   item.image_where = block.find("image") ? block.find("image")->where : block.where;
   if (!block.find("image") && reader.use == ConfigUse::fit) reader.missing(block, "image");
   item.page = read_page(reader, block);
+  if (block.find("roi_px")) item.roi = read_roi(reader, block, item.roi_where);
   if (const YamlNode* set = block.find("set")) read_set(reader, *set, path + ".set", item);
   return item;
 }

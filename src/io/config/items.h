@@ -9,6 +9,7 @@
 #include "birefit/measurement.h"
 #include "birefit/series.h"
 #include "io/config/pages.h"
+#include "io/config/pixels.h"
 #include "io/config/reader.h"
 
 namespace birefit {
@@ -18,6 +19,8 @@ struct Item {
   std::optional<std::string> image;
   Where image_where;
   PageChoice page;
+  std::optional<PixelRect> roi;  ///< of its own, in place of the one that all have
+  Where roi_where;
   std::vector<std::pair<std::string, const YamlNode*>> set;  ///< parameter paths and what the image gives them
   std::vector<Where> set_where;
   std::vector<std::pair<std::string, Where>> own;  ///< paths, or the beginnings of some, that it fits for itself

@@ -206,6 +206,8 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
       const Picture base = apply_set(reader, shared, own, i, "signal");
       std::size_t rows = 0;
       for (const Readings& table : tables) rows += table.rows.size();
+      // Frames may be many: they are not read for a config that is wrong.
+      if (signals[i].frames && !reader.problems.empty()) continue;
       const std::optional<TextTable> table =
           signals[i].frames ? table_of_frames(reader, signals[i], settings) : load_signal(reader, signals[i]);
       if (!table) continue;
@@ -380,16 +382,23 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
     const bool mask_missing = settings.mask && !user_mask;
     for (std::size_t i = 0; i < micrographs.size(); ++i) {
       const Item& item = items[i / channels.size()];
-      const MicrographSettings& own = channels[i % channels.size()];
+      MicrographSettings own = channels[i % channels.size()];
+      if (item.roi) own.roi = item.roi, own.roi_where = item.roi_where;
+      if (item.roi && (settings.calibrated() || settings.mask)) {
+        reader.problems.add(item.roi_where, "a region of its own is given beside calibration frames or a mask",
+                            "crop image, frames and mask alike, or give all images the same roi_px");
+        continue;
+      }
       const std::optional<Calibration>& calibration = calibrations[i % channels.size()];
       Picture& micrograph = micrographs[i];
       if (!item.image && !(image && !list)) continue;
       const bool replaced = image && !list;
       const std::filesystem::path file = replaced ? *image : reader.resolve(*item.image);
       const Where where = replaced ? Where{file.string()} : item.image_where;
-      micrograph.name = printable(file.filename().string()) +
-                        (item.page.given() && list ? " (" + item.page.words() + ")" : "") +
-                        (channels.size() > 1 && own.mosaic.parts.empty() ? " (" + own.channel + ")" : "");
+      micrograph.name =
+          printable(file.filename().string()) + (item.page.given() && list ? " (" + item.page.words() + ")" : "") +
+          (item.roi ? fmt::format(" [{}, {}, {}, {}]", item.roi->x0, item.roi->y0, item.roi->x1, item.roi->y1) : "") +
+          (channels.size() > 1 && own.mosaic.parts.empty() ? " (" + own.channel + ")" : "");
       std::optional<LoadedImage> loaded = has_ring_table(micrograph.scene)
                                               ? load_ring_table(reader, file, where, micrograph.scene, observables[i])
                                               : try_load(reader, own, file, item.page, where);
@@ -402,7 +411,7 @@ Config load(const std::filesystem::path& path, const std::string& text, const st
       set_view(reader, loaded->width, loaded->height, loaded->pixel_size_um, micrograph.name, micrograph.scene);
       if (sound) demand_pixel_size(micrograph.scene, loaded->uneven_pixel_um);
       if (!has_ring_table(micrograph.scene)) {
-        take_part(settings, micrograph.scene);
+        take_part(own, micrograph.scene);
       } else if (settings.roi || settings.bin > 1) {
         reader.problems.add(settings.roi ? settings.roi_where : settings.bin_where,
                             "a table of rings has no pixels to choose from or to bin", "leave roi_px and bin out");
