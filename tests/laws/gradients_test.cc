@@ -254,6 +254,18 @@ std::vector<Case> cases() {
     m.resonance_nm = c.t.fixed("resonance_nm", 250);
     all.push_back(c);
   }
+  for (const auto structure : {FormIndices::Structure::layers, FormIndices::Structure::rods}) {
+    Case c = base("film of layers or rods far smaller than a wavelength");
+    Cell film;
+    film.thickness_um = c.t.fixed("thickness_um", 7);
+    UniformDirector director;
+    director.tilt_deg = c.t.fixed("tilt_deg", 20), director.azimuth_deg = c.t.fixed("azimuth_deg", 35);
+    film.director = director;
+    c.scene.sample = film;
+    c.scene.material =
+        FormIndices{structure, c.t.fixed("fraction", 0.4), c.t.fixed("inside", 1.7), c.t.fixed("between", 1.33)};
+    all.push_back(c);
+  }
   {
     Case c = base("unwound helix");
     Cell cell;

@@ -43,6 +43,26 @@ Picture fringes(const Truth& truth, double period, unsigned seed, bool rounded =
   return micrograph;
 }
 
+// Read off what a right model leaves over, by squares: without bias, and about as well as n/7 independent differences
+// can tell (14/n); medians know 38/n and would fail.
+TEST(NoiseEstimate, SquaresOfTheResidualKnowItAsWellAsTheyCan) {
+  const Truth truth{4, 0.5};
+  constexpr int kDraws = 40, kPixels = 256 * 256;
+  double sum = 0, squares = 0;
+  for (unsigned seed = 1; seed <= kDraws; ++seed) {
+    const Picture noisy = fringes(truth, 40, seed, false), still = fringes({0, 0}, 40, 1, false);
+    const Image found = standard_deviation(noisy, estimate_noise(noisy, &still.values, true), still.values),
+                known = standard_deviation(noisy, {truth.read, truth.counts_per_photon}, still.values);
+    double ratio = 0;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      ratio += std::pow(found.values()[i] / known.values()[i], 2) / kPixels;
+    sum += ratio - 1, squares += std::pow(ratio - 1, 2);
+  }
+  const double sd = std::sqrt(14.0 / kPixels);
+  EXPECT_LT(std::abs(sum / kDraws), 4 * sd / std::sqrt(kDraws));
+  EXPECT_LT(std::sqrt(squares / kDraws), 1.35 * sd);  // three deviations of a scatter that forty draws show
+}
+
 TEST(NoiseEstimate, FindsReadAndPhotonNoiseUnderFringes) {
   for (const Truth truth : {Truth{20, 1.0}, Truth{5, 0.25}, Truth{40, 0.1}})
     for (const double period : {12.0, 40.0}) {

@@ -233,7 +233,7 @@ bool tells_row_patterns(const Task& task, const LeastSquares& problem) {
 }
 
 /// Of one picture: does it scatter about the fit by more than its noise? Of n pixels chi-square scatters by 2/n. A
-/// noise that was read off the picture is known to no better than 40/n; read once more off what is left over it is
+/// noise that was read off the picture is known to no better than 38/n; read once more off what is left over it is
 /// known to 14/n (weights/noise.cc).
 bool is_beyond_noise(const Task& task, const Optimum& optimum) {
   const auto pixels = static_cast<double>(optimum.problem->pixel_rows());
@@ -242,8 +242,10 @@ bool is_beyond_noise(const Task& task, const Optimum& optimum) {
   const Frame& frame = optimum.frames[0];
   if (!frame.noise.estimated || frame.noise_of_all) return true;
   const Image fitted = fitted_image(task, optimum.frames, 0, optimum.theta);
-  const double louder = mean_variance(task.picture(0), estimate_noise(task.picture(0), &fitted, true), fitted) /
-                        mean_variance(task.picture(0), frame.noise, fitted);
+  const Picture& picture = task.picture(0);
+  const Image again = standard_deviation(picture, estimate_noise(picture, &fitted, true), fitted);
+  double louder = 0;  // mean over the pixels that are fitted, as chi-square is
+  for (const auto& [x, y] : frame.pixels) louder += std::pow(again(x, y) / frame.sigma(x, y), 2) / pixels;
   return reduced / louder > 1 + 3 * std::sqrt((2 + 14) / pixels);
 }
 
