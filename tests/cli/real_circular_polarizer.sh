@@ -2,19 +2,8 @@
 # Real spectra behind a circular polarizer through six analysers: its film's retardance at each wavelength, and that the direction of the
 # polarizer in front, which nobody knows, leaves two answers. usage: real_circular_polarizer.sh BIREFIT SOURCE_DIR
 #   BIREFIT_REAL_DATA = the folder of tools/fetch_real, default out/real
-set -u
-birefit=$(realpath "$1")
-source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/out/real}")/circular_polarizer_spectra
-if [ ! -f "$data/l0c0.txt" ]; then
-  echo "skipped: no spectra of a circular polarizer at $data: tools/fetch_real fetches them"
-  exit 77
-fi
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failures=0
-fail() { echo "FAIL $*"; failures=$((failures + 1)); }
+# shellcheck source=../support/real_data.sh
+source "$2/tests/support/real_data.sh" "$1" "$2" circular_polarizer_spectra l0c0.txt 'spectra of a circular polarizer'
 check() { if awk "BEGIN { exit !($2) }"; then echo "ok   $1"; else fail "$1"; fi; }
 bands='480 560 640 720'
 

@@ -3,19 +3,8 @@
 # it by itself. The chart of its lamp, with the camera's gains, its leak and the four strips free, describes all eight colours with corners
 # that are the sums of their strips, and in two ways: the order of one strip stays open.
 # usage: real_mica.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with the data, default out/real
-set -u
-birefit=$(realpath "$1")
-source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/out/real}")/mica_mosaic_white_light
-if [ ! -f "$data/IMG_3198.crop.jpg" ]; then
-  echo "skipped: no mica mosaic at $data: it is part of a file and not fetched; BIREFIT_REAL_DATA names a folder that has it"
-  exit 77
-fi
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failures=0
-fail() { echo "FAIL $*"; failures=$((failures + 1)); }
+# shellcheck source=../support/real_data.sh
+source "$2/tests/support/real_data.sh" "$1" "$2" mica_mosaic_white_light IMG_3198.crop.jpg 'mica mosaic'
 
 config() {  # MICROGRAPH
   cat << YAML

@@ -2,19 +2,8 @@
 # A real imaging polarimeter looking at a mirror through two rotating retarders: are the zeros of its three dials those of its makers'
 # calibration, and the two retarders, which are of one make and fitted independently, equal within their errors at every wavelength?
 # usage: real_polarimeter.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with the data, default out/real
-set -u
-birefit=$(realpath "$1")
-source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/out/real}")/polarimeter_mirror_stack
-if [ ! -f "$data/mirror_580nm.tif" ]; then
-  echo "skipped: no stacks of a polarimeter at $data: they are cut from many files and not fetched; BIREFIT_REAL_DATA names a folder that has them"
-  exit 77
-fi
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failures=0
-fail() { echo "FAIL $*"; failures=$((failures + 1)); }
+# shellcheck source=../support/real_data.sh
+source "$2/tests/support/real_data.sh" "$1" "$2" polarimeter_mirror_stack mirror_580nm.tif 'stacks of a polarimeter'
 
 # The polarizer is fixed, at the angle that the first retarder's dial would call so; the mirror is a half-wave plate at 0, a rotator before it
 # and one behind the second retarder take dial to dial. Dials are exact: their zeros are what is asked. Every eleventh of the 512 frames,

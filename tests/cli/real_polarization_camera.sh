@@ -2,19 +2,8 @@
 # A real picture of a polarization camera, four polarizers standing in it: the cells of its sensor are read, what crossed analysers let
 # through together says that its codes are no light, and by which gamma they are; then the polarizers stand as they are labelled.
 # usage: real_polarization_camera.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder with the data, default out/real
-set -u
-birefit=$(realpath "$1")
-source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/out/real}")/polcam_four_polarizers
-if [ ! -f "$data/four_polarizers_mosaic.png" ]; then
-  echo "skipped: no picture of a polarization camera at $data: it is part of a file and not fetched; BIREFIT_REAL_DATA names a folder that has it"
-  exit 77
-fi
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failures=0
-fail() { echo "FAIL $*"; failures=$((failures + 1)); }
+# shellcheck source=../support/real_data.sh
+source "$2/tests/support/real_data.sh" "$1" "$2" polcam_four_polarizers four_polarizers_mosaic.png 'picture of a polarization camera'
 check() { if awk "BEGIN { exit !($2) }"; then echo "ok   $1"; else fail "$1"; fi; }
 
 # Light through one polarizer, which leaks, and no sample; of NAME, with these lines in its micrograph.
