@@ -88,12 +88,13 @@ const makeItems = () => {
 const choose = async (index) => {
   item = index;
   at("item").value = index;
-  const one = now.items[item], n = one.width * one.height;
-  if (!seen[item]) {
-    const all = new Float32Array(await (await ask("measured", { item })).arrayBuffer());
-    seen[item] = { measured: all.subarray(0, n), sigma: all.subarray(n) };
-    seen[item].range = rangeOf(seen[item].measured, seen[item].sigma);
+  const one = now.items[item], n = one.width * one.height, kept = seen;
+  if (!kept[index]) {
+    const all = new Float32Array(await (await ask("measured", { item: index })).arrayBuffer());
+    const measured = all.subarray(0, n), sigma = all.subarray(n);
+    kept[index] = { measured, sigma, range: rangeOf(measured, sigma) };
   }
+  if (kept !== seen || index !== item) return;  // described anew, or another was chosen, while this one was on its way
   const picture = one.kind === "picture";
   at("pictures").classList.toggle("table", !picture);
   at("hand").hidden = !picture;
@@ -143,8 +144,9 @@ let wanted = null, busy = false, rest = 0, slow = false, recent = [];
 /** After a change: at once where pictures are quick, and once more, planned anew, when the hand rests. */
 const draw = (settle) => {
   clearTimeout(rest);
+  if (!seen[item]) return;  // what is measured is on its way, and the picture is asked for when it has come
   if (settle || !slow) {
-    wanted = { item, values: values.slice(), settle };
+    wanted = { item, values: values.slice(), settle, beside: seen[item] };
     pump();
   }
   if (!settle) rest = setTimeout(() => draw(true), kRest);
@@ -157,7 +159,8 @@ const send = () => {
   const asked = wanted;
   wanted = null;
   if (asked.settle && slow) at("speed").textContent = "computing …";
-  const reply = ask("draw", asked).then(async (answer) => (answer.status === 204 ? null : answer.arrayBuffer()));
+  const { beside, ...question } = asked;
+  const reply = ask("draw", question).then(async (answer) => (answer.status === 204 ? null : answer.arrayBuffer()));
   return { asked, reply: reply.catch((error) => error), begin: performance.now() };
 };
 
@@ -175,7 +178,7 @@ const pump = async () => {
       continue;
     }
     sent = send();  // the program makes the next while this one is painted
-    if (!bytes || asked.item !== item) continue;
+    if (!bytes || asked.beside !== seen[item]) continue;  // made for another picture, or for one that was described anew since
     const length = new DataView(bytes).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
     drawn = { header, values: asked.values, settle: asked.settle, model: new Float32Array(bytes, 4 + length) };
@@ -500,7 +503,7 @@ const keyed = (event) => {
 
 const tell = ([x, y]) => {
   const one = now.items[item], i = Math.round(x), j = Math.round(y);
-  if (i < 0 || j < 0 || i >= one.width || j >= one.height || !drawn) {
+  if (i < 0 || j < 0 || i >= one.width || j >= one.height || !drawn || !seen[item]) {
     at("pointer").textContent = "\u00a0";
     return;
   }
@@ -526,7 +529,7 @@ const running = (is) => {
 
 const watchButtons = () => {
   at("item").addEventListener("change", () => act(() => choose(Number(at("item").value))));
-  at("unit").addEventListener("change", () => drawn && showPicture());
+  at("unit").addEventListener("change", () => drawn && seen[item] && showPicture());
   at("zoom-in").addEventListener("click", () => { sight.zoom(1.4); paint(); });
   at("zoom-out").addEventListener("click", () => { sight.zoom(1 / 1.4); paint(); });
   at("whole").addEventListener("click", () => { sight.reset(); paint(); });
