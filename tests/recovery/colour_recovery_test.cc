@@ -30,7 +30,7 @@ TEST(ColourRecovery, DropletsOfUnknownWhiteBalance) {
   constexpr double kStatedLamp = 2900, kNoise = 3, kResonance = 225;
   const CameraRows camera = camera_rows(data_path("instrument/camera/nikon_d5100.csv"));
   int inside = 0, asked = 0;
-  const int problems = problems_or(5);
+  const int problems = problems_or(3);
   for (int n = first_problem(); n < first_problem() + problems; ++n) {
     std::mt19937_64 random(static_cast<unsigned>(7000 + n));
     const auto between = [&](double low, double high) {

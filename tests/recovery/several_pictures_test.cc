@@ -144,7 +144,7 @@ TEST(FewCodes, RoundingIsInTheErrors) {
 // A law that is off by a bow about its mean is no scatter, which many rows would make small.
 TEST(Rows, ALawThatIsOffIsPaidFor) {
   expect_intervals_hold(
-      60, 29,
+      30, 29,
       [&](std::mt19937_64&) { return Series{.pictures = 36, .dials_known_to_deg = 0, .spread = 0.3, .bent = 0.04}; },
       no_zeros);
 }

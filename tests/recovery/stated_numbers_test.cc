@@ -111,19 +111,24 @@ void draw(Stated& s, std::mt19937_64& random) {
   }
 }
 
-TEST(StatedNumbers, DrawnFromTheirUncertaintyLeaveIntervalsThatHold) {
-  constexpr unsigned kPictures = 14;
+void expect_drawn_numbers_leave_intervals_that_hold(unsigned pictures) {
   for (const Ceiling ceiling : {Ceiling::one_way, Ceiling::wave}) {
     const Stated of = droplet(ceiling);
     Count count;
-    for (unsigned seed = 1; seed <= kPictures; ++seed) add(of, fit_changed(of, draw, seed), count);
+    for (unsigned seed = 1; seed <= pictures; ++seed) add(of, fit_changed(of, draw, seed), count);
     std::printf("  %s: %d answers of %u pictures, %d of %d intervals hold\n",
-                ceiling == Ceiling::wave ? "waves" : "rays", count.answers, kPictures, count.inside, count.intervals);
+                ceiling == Ceiling::wave ? "waves" : "rays", count.answers, pictures, count.inside, count.intervals);
     // Nineteen in twenty, and three sd of that many pictures, whose intervals miss together.
     EXPECT_GE(count.inside, count.intervals * (0.95 - 3 * std::sqrt(0.05 * 0.95 / count.answers)));
-    // One in twenty may be refused; three are two sd more.
-    EXPECT_GE(count.answers, static_cast<int>(kPictures) - 3);
+    // One in twenty may be refused, and three sd of that many.
+    EXPECT_GE(count.answers, pictures * 0.95 - 3 * std::sqrt(0.05 * 0.95 * pictures));
   }
+}
+TEST(StatedNumbers, DrawnFromTheirUncertaintyLeaveIntervalsThatHold) {
+  expect_drawn_numbers_leave_intervals_that_hold(7);
+}
+TEST(LongStatedNumbers, DrawnFromTheirUncertaintyLeaveIntervalsThatHold) {
+  expect_drawn_numbers_leave_intervals_that_hold(60);
 }
 
 // Each would move the diameter by ten standard errors and more were it taken as exact.
