@@ -60,8 +60,8 @@ double power(double a, double b) { return std::pow(a, b); }
 /// Each part by itself: a constant exponent takes any base, a logarithm only positive ones.
 Graded power(const Graded& a, const Graded& b) {
   Graded r(std::pow(a.value, b.value));
-  if (a.d[0] != 0) r.d[0] += b.value * std::pow(a.value, b.value - 1) * a.d[0];
-  if (b.d[0] != 0) r.d[0] += r.value * std::log(a.value) * b.d[0];
+  if (a.d[0] != 0 && b.value != 0) r.d[0] += b.value * std::pow(a.value, b.value - 1) * a.d[0];
+  if (b.d[0] != 0 && r.value != 0) r.d[0] += r.value * std::log(a.value) * b.d[0];
   return r;
 }
 

@@ -91,7 +91,9 @@ Eigen::MatrixXd Objective::jacobian(const Eigen::VectorXd& theta) const {
 }
 
 double Objective::log_posterior(const Eigen::VectorXd& theta) const {
-  for (Eigen::Index j = 0; j < std::min(theta.size(), parts_->start.size()); ++j)
+  if (theta.size() != parts_->start.size())
+    throw std::invalid_argument("theta has another length than the free parameters");
+  for (Eigen::Index j = 0; j < theta.size(); ++j)
     if (!(theta[j] >= parts_->lower[j] && theta[j] <= parts_->upper[j]))
       return -std::numeric_limits<double>::infinity();
   const std::lock_guard lock(parts_->mutex);

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <set>
 
 #include <pybind11/stl.h>
 
 #include "birefit/error.h"
 #include "core/threads.h"
+#include "io/config/overrides.h"
 #include "io/config/reader.h"
 #include "io/report/explain.h"
 #include "io/results/picture.h"
@@ -28,6 +31,41 @@ std::vector<int> free_indices(const ParameterTable& table) {
   return indices;
 }
 
+/// What is tied follows, but for numbers that the caller gave: these are known then, as by --set. A value that a tied
+/// number may not have is the caller's mistake.
+void follow(const ParameterTable& table, const ValueRanges& ranges, const std::vector<int>& given, const Where& where,
+            Theta& theta) {
+  for (const int index : table.tied()) {
+    if (std::find(given.begin(), given.end(), index) != given.end()) continue;
+    double& now = theta[static_cast<std::size_t>(index)];
+    const double value = table.value_of(*table.tie_of(index), theta);
+    if (value == now || (std::isnan(value) && std::isnan(now))) continue;
+    ranges.check(table, index, value, where);
+    now = value;
+  }
+}
+
+/// d(picture)/d(number) through what is tied to it: `by` times the derivative by the entry at place `from` of the
+/// active ones adds to that at place `to`.
+struct Link {
+  std::size_t to, from;
+  double by;
+};
+std::vector<Link> links_of(const ParameterTable& table, const std::vector<int>& given, const Theta& theta,
+                           std::vector<int>& active) {
+  const std::size_t wanted = active.size();
+  std::vector<Link> links;
+  for (const int tied : table.tied()) {
+    if (wanted == 0 || std::find(given.begin(), given.end(), tied) != given.end()) continue;
+    const std::size_t before = links.size();
+    for (const TieSlope& slope : table.slopes(tied, theta))
+      for (std::size_t j = 0; j < wanted; ++j)
+        if (active[j] == slope.index) links.push_back({j, active.size(), slope.by});
+    if (links.size() > before) active.push_back(tied);
+  }
+  return links;
+}
+
 }  // namespace
 
 Job::Job(std::string text, std::string name, std::vector<std::string> set,
@@ -44,6 +82,8 @@ Job::Job(std::string text, std::string name, std::vector<std::string> set,
     try {
       // Sound but for the size of its pictures, which a fit takes from an image that is yet to come.
       pictured_ = load(ConfigUse::render, image_, {"image_size_px=[64, 64]"});
+      Problems said;  // by load()
+      pictured_.text = text_as_set(text_, parse_config(text_, name_, set_, said), set_);
     } catch (const UserError&) {
       throw error;
     }
@@ -60,8 +100,10 @@ Config Job::load(ConfigUse use, const ImageInPlace& image, const std::vector<std
   std::optional<std::filesystem::path> file;
   if (const auto* path = std::get_if<std::string>(&image)) file = *path;
   if (const auto* array = std::get_if<py::array>(&image)) {
-    in_memory.images.insert_or_assign(kImage, image_of(*array, kImage));
-    file = kImage;
+    std::string name = kImage;  // beside arrays that have a name of the user's
+    while (in_memory.images.contains(name) || in_memory.fields.contains(name)) name += "'";
+    in_memory.images.emplace(name, image_of(*array, kImage));
+    file = name;
   }
   const py::gil_scoped_release unlocked;
   return load_config_text(text_, name_, use, file, set, &in_memory);
@@ -84,7 +126,14 @@ std::vector<std::string> Job::warnings() const {
 py::list Job::parameters() const {
   py::list list;
   const ParameterTable& table = pictured_.job.parameters;
+  // What all pictures have for themselves stands in the table once more, and nothing reads it there.
+  std::set<int> read;
   for (int i = 0; i < table.size(); ++i)
+    if (table[i].free || table[i].linear || ranges_->reads(i)) {
+      read.insert(i);
+      for (const int root : table.roots(i)) read.insert(root);
+    }
+  for (const int i : read)
     if (table.find(table[i].name).index == i)  // of one name the first is meant
       list.append(py::make_tuple(table[i].name, table[i].unit, table[i].value, table[i].free));
   return list;
@@ -119,14 +168,19 @@ std::shared_ptr<const Job::Planned> Job::planned_at(const Theta& theta) const {
 py::tuple Job::render(const std::vector<std::pair<std::string, double>>& changes,
                       const std::vector<std::string>& active, int threads) const {
   check_pictured();
-  Theta theta = pictured_.job.parameters.values();
+  const ParameterTable& table = pictured_.job.parameters;
+  Theta theta = table.values();
+  std::vector<int> given;
   for (const auto& [name, value] : changes) {
     const int index = index_of(name, "render");
-    ranges_->check(pictured_.job.parameters, index, value, {"render"});
+    ranges_->check(table, index, value, {"render"});
     theta[static_cast<std::size_t>(index)] = value;
+    given.push_back(index);
   }
+  follow(table, *ranges_, given, {"render"}, theta);
   std::vector<int> indices;
   for (const std::string& name : active) indices.push_back(index_of(name, "derivatives"));
+  const std::vector<Link> links = links_of(table, given, theta, indices);
   std::vector<Rendering> colours;
   {
     const py::gil_scoped_release unlocked;
@@ -135,6 +189,10 @@ py::tuple Job::render(const std::vector<std::pair<std::string, double>>& changes
   }
   std::vector<Image> picture, derivatives;
   for (Rendering& colour : colours) {
+    for (const Link& link : links)
+      for (std::size_t p = 0; p < colour.derivatives[link.to].size(); ++p)
+        colour.derivatives[link.to].values()[p] += link.by * colour.derivatives[link.from].values()[p];
+    colour.derivatives.resize(active.size());
     picture.push_back(std::move(colour.intensity));
     for (Image& derivative : colour.derivatives) derivatives.push_back(std::move(derivative));
   }
@@ -143,7 +201,7 @@ py::tuple Job::render(const std::vector<std::pair<std::string, double>>& changes
   // (rows, columns, parameters), or (rows, columns, colours, parameters).
   py::array jacobian = array_of(std::move(derivatives));
   if (jacobian.ndim() == 2) jacobian = jacobian.attr("reshape")(rows, columns, 1).cast<py::array>();
-  if (count > 1) jacobian = jacobian.attr("reshape")(rows, columns, count, indices.size()).cast<py::array>();
+  if (count > 1) jacobian = jacobian.attr("reshape")(rows, columns, count, active.size()).cast<py::array>();
   return py::make_tuple(array_of(std::move(picture)), jacobian);
 }
 
@@ -163,6 +221,9 @@ py::array Job::render_many(const std::vector<std::string>& names, const Doubles&
       const double value = values.at(i, static_cast<py::ssize_t>(j));
       ranges_->check(table, indices[j], value, {"render_many, row " + std::to_string(i)});
       thetas[static_cast<std::size_t>(i)][static_cast<std::size_t>(indices[j])] = value;
+      if (j + 1 == indices.size())
+        follow(table, *ranges_, indices, {"render_many, row " + std::to_string(i)},
+               thetas[static_cast<std::size_t>(i)]);
     }
   const auto [rows, columns, count] = shape();
   std::vector<py::ssize_t> shape{pictures, rows, columns};
@@ -186,7 +247,14 @@ py::array Job::render_many(const std::vector<std::string>& names, const Doubles&
     // Waves take memory by the gigabyte: one at a time. Else a picture a core, when there are enough of them.
     const bool waves = planned_at(thetas[0])->plans[0].wave != nullptr;
     const bool apart = !waves && pictures >= thread_count(threads);
-    parallel_for(static_cast<int>(pictures), apart ? threads : 1, [&](int i) { write(i, apart ? 1 : threads); });
+    // A few at a time, so that Ctrl-C is seen.
+    const int at_once = apart ? 16 * thread_count(threads) : 1;
+    for (int begin = 0; begin < static_cast<int>(pictures); begin += at_once) {
+      parallel_for(std::min(at_once, static_cast<int>(pictures) - begin), apart ? threads : 1,
+                   [&](int i) { write(begin + i, apart ? 1 : threads); });
+      const py::gil_scoped_acquire locked;
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    }
   });
   return all;
 }

@@ -28,7 +28,7 @@ void raise(const UserError& error) {
     Problem place{problem.where, "", ""};
     std::string text = to_string(place);  // "FILE:LINE:COLUMN: "
     text = text.size() < 2 ? "" : text.substr(0, text.size() - 2);
-    problems.append(py::make_tuple(text, printable(problem.what), printable(problem.hint), problem.where.file,
+    problems.append(py::make_tuple(text, printable(problem.what), printable(problem.hint), name_of(problem.where.file),
                                    problem.where.line, problem.where.column));
   }
   const py::object type = py::module_::import("birefit._errors").attr("Error");

@@ -113,6 +113,7 @@ void write_files_of(const std::string& folder, const std::map<std::string, py::b
 }
 
 Eigen::VectorXd vector_of(const Doubles& values) {
+  if (values.ndim() != 1) throw std::invalid_argument("theta is (parameters,)");
   return Eigen::Map<const Eigen::VectorXd>(values.data(), values.size());
 }
 
@@ -132,7 +133,11 @@ py::object log_posteriors(const Objective& objective, const Doubles& theta) {
   Eigen::VectorXd values(points.rows());
   {
     const py::gil_scoped_release unlocked;
-    for (Eigen::Index i = 0; i < points.rows(); ++i) values[i] = objective.log_posterior(points.row(i).transpose());
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+      values[i] = objective.log_posterior(points.row(i).transpose());
+      const py::gil_scoped_acquire locked;
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    }
   }
   return array_of(std::move(values));
 }

@@ -93,6 +93,14 @@ def test_all_mistakes_at_once_and_their_lines(droplet):
     assert first.file == "config" and 0 < first.line < second.line
 
 
+def test_names_of_files_that_are_no_text(tmp_path):
+    with pytest.raises(birefit.Error) as caught:
+        birefit.load(os.fsencode(tmp_path) + b"/no\xff.yaml")
+    assert caught.value.problems[0].file.endswith(".yaml")
+    job = birefit.load(SOURCE / "fit_configs" / "e12_droplet.yaml", set={"micrograph.image": pathlib.Path("e12.tif")})
+    assert "e12.tif" in job.text
+
+
 def test_set_names_what_it_sets(droplet):
     with pytest.raises(birefit.Error) as error:
         birefit.Job(droplet, set={"sample.droplet.diameter_um": -1})

@@ -121,8 +121,11 @@ def test_objectives_are_consistent(droplet, photograph):
     assert job.log_posterior(outside) == -np.inf
     both = job.log_posterior(np.stack([theta, outside]))
     assert both.shape == (2,) and both[0] == job.log_posterior(theta)
+    for wrong in (job.residual, job.log_posterior):
+        with pytest.raises(ValueError):
+            wrong(theta[:2])
     with pytest.raises(ValueError):
-        job.residual(theta[:2])
+        job.residual(theta[None])
 
 
 def test_another_solver_finds_what_the_fit_found(droplet, photograph):
@@ -182,3 +185,42 @@ def test_a_fit_without_an_answer_is_a_result(droplet):
     noise = np.random.default_rng(1).normal(1000, 4, (36, 40))
     result = birefit.Job(droplet).fit(noise)
     assert not result.has_answer and result.grade != "answer" and result.verdict
+
+
+def test_what_is_masked_is_left_out(droplet, photograph):
+    """As NaN is, whatever lies below the mask."""
+    mask = np.zeros(photograph.shape, bool)
+    mask[:, :12] = True
+    garbage, holes = photograph.copy(), photograph.astype(float)
+    garbage[mask], holes[mask] = 3999, np.nan
+    job = birefit.Job(droplet)
+    masked, expected = job.fit(np.ma.masked_array(garbage, mask)), job.fit(holes)
+    assert masked.values == expected.values
+    # An array of the user's own may have any name.
+    droplet["micrograph"] |= {"image": "photo", "mask": "image"}
+    both = birefit.Job(droplet, arrays={"photo": photograph, "image": (~mask).astype(np.uint8)})
+    assert both.fit().values == both.fit(photograph).values
+
+
+def test_what_follows_from_a_limit_is_not_known(droplet):
+    """A thickness that the picture does not tell from 0 has no product with an error."""
+    cell = {
+        "micrograph": {"pixel_size_um": 0.5, "gain": 3000, "offset": 100},
+        "sample": {
+            "cell": {"thickness_um": {"value": 0.05, "fit": [0, 1]}, "director": {"uniform": {"azimuth_deg": 45}}},
+            "material": {"ordinary": 1.5, "birefringence": 0.1},
+            "surround": {"index": 1.5},
+        },
+        "microscope": {"light": {"wavelength_nm": 550}, "polarizer_deg": 0, "analyzer_deg": 90},
+        "physics": {"ceiling": "e_only"},
+        "report": {"retardance_nm": "sample.cell.thickness_um * sample.material.birefringence"},
+    }
+    for seed in range(4):
+        dark = 100 + np.random.default_rng(seed).normal(0, 5, (24, 24))
+        found = birefit.Job(cell).fit(dark).to_dict()
+        if found["parameters"]["sample.cell.thickness_um"].get("limit"):
+            derived = next(d for d in found["derived"] if d["name"] == "retardance_nm")
+            assert derived["stderr"] is None and derived["interval_95"] == [None, None]
+            break
+    else:
+        pytest.fail("no limit in four pictures of nothing")

@@ -1,5 +1,7 @@
 """Pictures: the program's bits, derivatives, batches, arrays in place of files."""
 
+import os
+import signal
 import threading
 import time
 
@@ -194,6 +196,7 @@ def test_a_config_without_a_size_waits_for_its_picture(droplet, photograph):
     job = birefit.Job(droplet)
     with pytest.raises(birefit.Error, match="image_size_px"):
         job.render()
+    assert "image_size_px" not in job.text
     assert birefit.Job(droplet, image=photograph).render().shape == photograph.shape
 
 
@@ -204,3 +207,32 @@ def test_explain_says_what_the_program_says(program):
     measured = ("Cost", "Time")  # of this moment
     assert [line for line in words if not line.startswith(measured)] == [line for line in said if not line.startswith(measured)]
     assert birefit.load(config).explanation()["method"]
+
+
+def test_what_is_tied_follows(droplet):
+    """Pictures, batches and derivatives are those of a config with the numbers written out."""
+    droplet["microscope"]["analyzer_deg"] = "microscope.polarizer_deg + 90 * deg"
+    job = birefit.Job(droplet)
+
+    def turned(angle):
+        return birefit.Job(droplet, set={"microscope.polarizer_deg": angle}).render()
+
+    assert np.array_equal(job.render(polarizer_deg=30), turned(30))
+    assert np.array_equal(job.render_many({"polarizer_deg": [0, 30]})[1], turned(30))
+    _, jacobian = job.render(derivatives=["polarizer_deg"])
+    difference = (turned(1e-3) - turned(-1e-3)) / 2e-3
+    assert np.allclose(jacobian[..., 0], difference, rtol=0, atol=1e-3 * np.abs(difference).max())
+    # One that is given is known, as by --set.
+    apart = birefit.Job(droplet, set={"microscope.analyzer_deg": 100}).render()
+    assert np.array_equal(job.render(analyzer_deg=100), apart)
+
+
+def test_ctrl_c_ends_a_batch(droplet):
+    droplet["image_size_px"] = [200, 200]
+    job = birefit.Job(droplet)
+    timer = threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        job.render_many({"birefringence": np.linspace(0.1, 0.2, 100_000)[:20_000]}, threads=1)
+    assert time.monotonic() - begin < 30  # all of them take minutes

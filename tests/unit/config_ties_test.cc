@@ -45,6 +45,11 @@ TEST_F(ConfigTies, BeginAsTheExpressionSays) {
   EXPECT_EQ(theta[static_cast<std::size_t>(analyzer.index)], 120);
 }
 
+TEST_F(ConfigTies, OfUnitsAloneAreNumbers) {
+  EXPECT_EQ(value(load(cell("analyzer_deg: 110", "analyzer_deg: \"pi / 2 * rad\"")), "microscope.analyzer_deg"), 90);
+  EXPECT_EQ(value(load(cell("{value: 5, fit: [4, 6]}", "\"5000 * nm\"")), "sample.cell.thickness_um"), 5);
+}
+
 TEST_F(ConfigTies, TakeTheFormsThatNumbersHaveAndEndsOfPaths) {
   for (const char* form : {"{value: \"polarizer_deg + 90 * deg\"}", "polarizer_deg + 90 * deg",
                            "'microscope.polarizer_deg + pi / 2 * rad'"}) {
@@ -179,6 +184,15 @@ TEST_F(PicturesWithTies, LetTheSharedNumberActThroughThem) {
                         "micrographs[0].sample.cell.thickness_um does not"));
 }
 
+// Shared numbers may follow from each other one way, and a picture's own the other way round.
+TEST_F(PicturesWithTies, ACircleThroughAPicturesOwnNumberIsNamed) {
+  const std::string list =
+      "  - {image: a.tif, set: {sample.cell.thickness_um: \"2 * polarizer_deg / deg * um\"}}\n  - {image: b.tif}\n";
+  EXPECT_THAT(
+      mistakes(pictures(list, "polarizer_deg: 20", "polarizer_deg: \"thickness_um / um * deg\""), ConfigUse::fit),
+      HasSubstr("tied in a circle"));
+}
+
 TEST_F(PicturesWithTies, AskWhichPicturesNumberIsReported) {
   const std::string list =
       "  - {image: a.tif, set: {microscope.polarizer_deg: 0}}\n  - {image: b.tif, set: {microscope.polarizer_deg: "
@@ -204,6 +218,9 @@ TEST_F(ConfigTies, ReportTakesItsUnitFromItsName) {
   EXPECT_EQ(derived("retardance: \"thickness_um * birefringence\"").second, "um");
   EXPECT_EQ(derived("waves: \"thickness_um * birefringence / wavelength_nm\"").second, "");
   EXPECT_EQ(derived("same: \"sample.cell.thickness_um\"").first, 5);
+  // One letter is a unit of what has one.
+  EXPECT_EQ(derived("delta_n: \"birefringence\"").second, "");
+  EXPECT_EQ(derived("turn_rad: \"polarizer_deg\"").second, "rad");
   const std::string text = kCell;
   EXPECT_EQ(mistakes(text + "report: {retardance_deg: \"thickness_um * birefringence\"}\n"),
             "config.yaml:11:27: the expression is in um, and not in deg");

@@ -106,6 +106,10 @@ TEST(Expression, HasDerivativesWhereAPartHasNone) {
   EXPECT_EQ(slopes, (std::vector<double>{0, 0}));
   EXPECT_EQ(Expression("a.a ^ 2").value({-3}, slopes), 9);  // no logarithm of what is negative
   EXPECT_EQ(slopes, (std::vector<double>{-6}));
+  EXPECT_EQ(Expression("a.a ^ b.b").value({0, 2}, slopes), 0);  // at the end of a range
+  EXPECT_EQ(slopes, (std::vector<double>{0, 0}));
+  EXPECT_EQ(Expression("a.a ^ 0").value({0}, slopes), 1);
+  EXPECT_EQ(slopes, (std::vector<double>{0}));
   EXPECT_EQ(Expression("sqrt(0) + a.a").value({1}, slopes), 1);  // nor a root's slope that nothing takes
   EXPECT_EQ(slopes, (std::vector<double>{1}));
 }

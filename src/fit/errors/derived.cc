@@ -18,10 +18,20 @@ struct Owed {
   Eigen::VectorXd by;    ///< d(number)/d(unknown)
   double variance = 0;   ///< of the number
   double by_stated = 0;  ///< the part of it that is no estimate: by what is stated and not fitted
-  bool known = true;     ///< no unknown that it follows from is without an error
 };
 
 using ValueAt = std::function<double(const Theta&)>;
+
+/// No unknown that it follows from is without an error, or a limit: a slope of 0 makes neither known.
+bool all_known(const Task& task, const FitResult& result, const Tie& tie) {
+  for (const int of : tie.of)
+    for (const int root : task.job.parameters.roots(of))
+      for (int j = 0; j < task.unknowns.size(); ++j)
+        if (const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
+            task.unknowns.table_index(j) == root && (!std::isfinite(p.stderr_) || !p.limit.empty()))
+          return false;
+  return true;
+}
 
 /// To first order in the unknowns. What is stated moves these with it, as far as a fit went: a retardance is known far
 /// better than the thickness that was stated, if the birefringence has made up for it.
@@ -33,10 +43,7 @@ Owed owed(const Task& task, const Covariances& covariances, const FitResult& res
   for (const TieSlope& slope : slopes) {
     bool found = false;
     for (int j = 0; j < task.unknowns.size() && !found; ++j)
-      if ((found = task.unknowns.table_index(j) == slope.index)) {
-        owed.by[j] = slope.by;
-        owed.known = owed.known && std::isfinite(result.parameters[static_cast<std::size_t>(j)].stderr_);
-      }
+      if ((found = task.unknowns.table_index(j) == slope.index)) owed.by[j] = slope.by;
     for (Eigen::Index i = 0; i < stated.sd.size() && !found; ++i)
       found = stated.index[static_cast<std::size_t>(i)] == slope.index;
     const Parameter& parameter = task.job.parameters[slope.index];
@@ -71,13 +78,26 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
     estimate.name = name, estimate.unit = unit, estimate.expression = tie.law->text();
     estimate.tied = tied, estimate.value = value;
     estimate.by = of.by;
-    estimate.stderr_ = of.known && std::isfinite(value) && std::isfinite(of.variance)
+    estimate.stderr_ = all_known(task, result, tie) && std::isfinite(value) && std::isfinite(of.variance)
                            ? std::sqrt(of.variance)
                            : std::numeric_limits<double>::quiet_NaN();
     const double half = std::sqrt(t * t * std::max(0.0, of.variance - of.by_stated) + normal * normal * of.by_stated);
     const double reach = std::isfinite(estimate.stderr_) ? half : estimate.stderr_;
     estimate.interval95_low = value - reach;
     estimate.interval95_high = value + reach;
+    // Of one fitted number alone: what that number's own interval says, which need not be symmetric.
+    for (int j = 0; j < task.unknowns.size() && slopes.size() == 1 && of.by_stated == 0; ++j) {
+      const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
+      if (task.unknowns.table_index(j) != slopes[0].index || !p.profiled || std::isnan(estimate.stderr_)) continue;
+      const auto at = [&](double end) {
+        Theta theta = result.theta;
+        theta[static_cast<std::size_t>(slopes[0].index)] = std::clamp(end, p.lower, p.upper);
+        table.follow(theta);
+        return value_at(theta);
+      };
+      const auto [low, high] = std::minmax({at(p.interval95_low), at(p.interval95_high)});
+      if (low <= value && value <= high) estimate.interval95_low = low, estimate.interval95_high = high;
+    }
     result.derived.push_back(std::move(estimate));
   };
   for (const int index : table.tied()) {

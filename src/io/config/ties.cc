@@ -16,20 +16,13 @@ namespace birefit {
 namespace {
 
 /// Units by what names of numbers end in.
-const std::vector<std::pair<const char*, const char*>> kEndings{{"_mm2_s", "mm2/s"},
-                                                                {"_v_per_um", "V/um"},
-                                                                {"_brewster", "brewster"},
-                                                                {"_mpa", "MPa"},
-                                                                {"_deg", "deg"},
-                                                                {"_um", "um"},
-                                                                {"_nm", "nm"},
-                                                                {"_mm", "mm"},
-                                                                {"_px", "px"},
-                                                                {"_pn", "pN"},
-                                                                {"_k", "K"},
-                                                                {"_v", "V"},
-                                                                {"_n", "N"},
-                                                                {"_s", "s"}};
+const std::vector<std::pair<const char*, const char*>> kEndings{
+    {"_mm2_s", "mm2/s"}, {"_v_per_um", "V/um"}, {"_brewster", "brewster"},
+    {"_mpa", "MPa"},     {"_deg", "deg"},       {"_rad", "rad"},
+    {"_um", "um"},       {"_nm", "nm"},         {"_mm", "mm"},
+    {"_cm", "cm"},       {"_px", "px"},         {"_pn", "pN"},
+    {"_k", "K"},         {"_v", "V"},           {"_n", "N"},
+    {"_s", "s"}};
 
 std::optional<std::string> unit_by_name(const std::string& name) {
   for (const auto& [ending, unit] : kEndings)
@@ -95,10 +88,13 @@ class Binder {
   }
 
   void tie_all() {
+    break_circles();  // again, of what pictures have for themselves
     std::set<int> done;
     const std::function<void(int)> tie = [&](int index) {
       const auto found = tied_.find(index);
-      if (found == tied_.end() || !used_.contains(index) || !done.insert(index).second || found->second->of.empty())
+      // One of units alone ("5000 * nm") reads nothing, and is known.
+      if (found == tied_.end() || !used_.contains(index) || !done.insert(index).second ||
+          found->second->of.size() != found->second->law->names().size())
         return;
       for (const int of : found->second->of) tie(of);
       if (varies_by_picture(index, *found->second)) return;
@@ -110,7 +106,11 @@ class Binder {
   std::optional<Derived> derived(const Wanted& wanted) {
     std::vector<int> of = look_up(*wanted.law, wanted.where, "", -1, true);
     if (of.size() != wanted.law->names().size()) return std::nullopt;
-    if (!settle(*wanted.law, of, unit_by_name(wanted.name), wanted.where)) return std::nullopt;
+    if (!settle(*wanted.law, of, std::nullopt, wanted.where)) return std::nullopt;
+    // One letter is a unit only of what has one: delta_n, eps_s.
+    const bool letter = wanted.name.size() > 1 && wanted.name[wanted.name.size() - 2] == '_';
+    if (!(letter && wanted.law->unit().empty()) && !settle(*wanted.law, of, unit_by_name(wanted.name), wanted.where))
+      return std::nullopt;
     for (const int index : of) use(index);
     return Derived{wanted.name, wanted.law->unit(), {wanted.law, std::move(of)}};
   }

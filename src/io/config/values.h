@@ -22,6 +22,8 @@ class ValueRanges {
   explicit ValueRanges(const Config& config);
   /// Throws UserError at `where`, of a table's entry and a value that it may not have.
   void check(const ParameterTable& table, int index, double value, const Where& where) const;
+  /// Does a scene read that entry?
+  bool reads(int index) const { return specs_.contains(index); }
 
  private:
   std::map<int, NumberSpec> specs_;

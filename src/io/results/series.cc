@@ -131,6 +131,7 @@ void move_derived(FitResult& fit, const Posterior& all, double t) {
     if (d.by.size() != change.size() || all.covariance.rows() != fit.covariance.rows()) continue;
     const double before = d.by.dot(fit.covariance * d.by), after = d.by.dot(all.covariance * d.by);
     d.value += d.by.dot(change);
+    if (!std::isfinite(d.stderr_)) continue;  // what is not known stays so
     d.stderr_ = std::sqrt(std::max(0.0, d.stderr_ * d.stderr_ - before + after));
     d.interval95_low = d.value - t * d.stderr_;
     d.interval95_high = d.value + t * d.stderr_;

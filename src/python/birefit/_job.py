@@ -261,15 +261,25 @@ def _value(value: Any) -> str:
         return ""
     if isinstance(value, str):
         return value
-    return json.dumps(value, default=lambda other: other.tolist())
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    as_list = lambda other: os.fspath(other) if isinstance(other, os.PathLike) else other.tolist()
+    return json.dumps(value, ensure_ascii=False, default=as_list)
 
 
 def _in_place(image: Picture) -> Any:
+    if isinstance(image, np.ma.MaskedArray):
+        return _unmasked(image)
     if image is None or isinstance(image, (bytes, np.ndarray)):  # bytes: the name of a file
         return image
     if isinstance(image, (str, os.PathLike)):
         return os.fsencode(image)
     return np.asarray(image)
+
+
+def _unmasked(array: np.ma.MaskedArray) -> np.ndarray:
+    """Masked elements as NaN, which no fit uses."""
+    return array.astype(float).filled(np.nan) if np.ma.is_masked(array) else array.data
 
 
 def _held(arrays: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
@@ -284,7 +294,7 @@ def _held(arrays: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, b
         if isinstance(value, Mapping):
             np.savez(file, **value)
         else:
-            array = np.asarray(value)
+            array = _unmasked(value) if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
             if array.ndim < 4:
                 images[name] = array
                 continue
