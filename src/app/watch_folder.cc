@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -19,6 +20,8 @@
 #include "app/watch.h"
 #include "birefit/series.h"
 #include "core/printable.h"
+#include "io/config/edit.h"
+#include "io/config/overrides.h"
 #include "io/files/arrivals.h"
 #include "io/files/file.h"
 #include "io/report/format.h"
@@ -53,8 +56,8 @@ class Screen {
   void show(const Config& config, std::optional<FitResult> result = std::nullopt) {
     if (session_) session_->open(config, std::move(result));
   }
-  void row(const std::vector<std::string>& columns, std::vector<std::string> cells) {
-    if (session_) session_->add_row(columns, std::move(cells));
+  void row(std::size_t at, const std::vector<std::string>& columns, std::vector<std::string> cells) {
+    if (session_) session_->set_row(at, columns, std::move(cells));
   }
   void say(const std::string& line) {
     if (session_) session_->say(line);
@@ -73,7 +76,7 @@ class Screen {
                       "watch without --view, or build it where cpp-httplib is installed (Debian: libcpp-httplib-dev)");
   }
   void show(const Config&, std::optional<FitResult> = std::nullopt) {}
-  void row(const std::vector<std::string>&, std::vector<std::string>) {}
+  void row(std::size_t, const std::vector<std::string>&, std::vector<std::string>) {}
   void say(const std::string&) {}
 };
 #endif
@@ -122,7 +125,7 @@ class Watched {
           if (auto record = load_recorded_fit(place_of(arrival.name) / "fit.json"))
             fits_[index_of(arrival.name)] = std::move(record->result);
       } else if (arrivals.is_still(arrival)) {
-        if (!take(arrival, true)) continue;
+        if (!take(arrivals, arrival, true)) continue;
       } else {
         continue;  // it has changed, and comes as if it were new
       }
@@ -132,7 +135,7 @@ class Watched {
   }
 
   /// Fits it, or says why not; false where it is to be looked at again later.
-  bool take(const Arrival& arrival, bool again = false) {
+  bool take(const Arrivals& arrivals, const Arrival& arrival, bool again = false) {
     if (!arrival.renamed_from.empty() && rename(arrival)) return true;
     const std::optional<std::size_t> known = find(arrival.name);
     SeriesFrame frame;
@@ -144,8 +147,8 @@ class Watched {
     std::optional<FitResult> fitted;
     try {
       Config config = load_frame(one, 0);
-      if (!arrival.last_call && !still(arrival)) return false;
-      fitted = fit_one(one.frames[0], config, again);
+      if (!arrival.last_call && !arrivals.is_still(arrival)) return false;
+      fitted = fit_one(one.frames[0], config, again, [&] { return arrivals.is_still(arrival); });
       if (!fitted && one.frames[0].unreadable.empty()) return false;  // interrupted
     } catch (const UserError& error) {                                // the config is sound
       // Perhaps the rest of it is still to come.
@@ -192,10 +195,6 @@ class Watched {
     for (const Problem& problem : error.problems()) words += (words.empty() ? "" : "; ") + problem.what;
     return words;
   }
-  bool still(const Arrival& arrival) const {
-    std::error_code code;
-    return fs::file_size(folder_ / arrival.name, code) == arrival.state.size && !code;
-  }
   fs::path place_of(const std::string& name) const { return out_ / "frames" / name; }
   std::optional<std::size_t> find(const std::string& name) const {
     for (std::size_t i = 0; i < series_.frames.size(); ++i)
@@ -220,13 +219,33 @@ class Watched {
     fs::rename(place_of(arrival.renamed_from), place_of(arrival.name), code);
     series_.frames[*at].name = series_.frames[*at].file = arrival.name;
     write();
+    show_row(*at);
     screen_.say(printable(arrival.renamed_from + " is now called " + arrival.name));
     if (!arguments_.quiet)
       std::cout << printable(arrival.renamed_from) << " is now called " << printable(arrival.name) << std::endl;
     return true;
   }
-  /// From where the last one with an answer ended.
-  std::optional<FitResult> fit_one(SeriesFrame& frame, Config& config, bool again) {
+  /// The config of this image alone, with its starts: what the page explains, fits and saves.
+  Config alone(const SeriesFrame& frame, Config config) const {
+    std::vector<std::string> set = arguments_.set;
+    set.push_back("micrographs=");
+    set.push_back("micrograph.image=" + Json(frame.file).dump(-1, ' ', false, Json::error_handler_t::replace));
+    Problems ignored;  // by load_frame()
+    config.text = text_as_set(series_.text, parse_config(series_.text, arguments_.config, set, ignored), set);
+    std::vector<NewStart> starts;
+    const ParameterTable& table = config.job.parameters;
+    const auto in_prior = [&](const std::string& name) {
+      const std::optional<JointPrior>& joint = config.job.prior;
+      return joint && std::find(joint->names.begin(), joint->names.end(), name) != joint->names.end();
+    };
+    for (int i = 0; i < table.size(); ++i)
+      if (const Parameter& p = table[i]; p.free && !p.linear && !p.automatic && !p.prior_sd && !in_prior(p.name))
+        starts.push_back({p.name, p.value, p.lower, p.upper});
+    if (!starts.empty()) config.text = with_starts(config.text, starts);
+    return config;
+  }
+  /// From where the last one with an answer ended. Throws UserError where the file is no longer `still`.
+  std::optional<FitResult> fit_one(SeriesFrame& frame, Config& config, bool again, const std::function<bool()>& still) {
     const FitResult* neighbour = nullptr;
     const std::size_t before = find(frame.name).value_or(fits_.size());
     for (std::size_t i = before; i-- > 0 && !neighbour;)
@@ -234,15 +253,17 @@ class Watched {
     if (arguments_.threads >= 0) config.job.options.threads = arguments_.threads;
     Config shown = config;
     if (neighbour) start_from(shown, *neighbour);
-    if (!again) screen_.show(shown);
+    if (!again) screen_.show(alone(frame, shown));
     FrameDone done = do_frame(frame, config, neighbour, place_of(frame.name), [&] {
+      // The fingerprint is of the file as it is now; its pixels were read before.
+      if (!still()) throw UserError({frame.file}, "changes while it is read");
       config.job.options.interrupted = &Interrupt::flag();
       config.job.options.progress = [&](const std::string& line) { screen_.say(frame.name + ": " + line); };
     });
     config.job.options.progress = {};
     config.job.options.interrupted = nullptr;
     if (!done.record) return std::nullopt;
-    if (done.fresh) screen_.show(config, std::move(done.fresh));
+    if (done.fresh) screen_.show(alone(frame, config), std::move(done.fresh));
     return std::move(done.record->result);
   }
   /// On the terminal and in the page's table.
@@ -265,7 +286,7 @@ class Watched {
     if (fits_[i])
       for (const ParameterEstimate& p : fits_[i]->parameters)
         if (!p.linear) cells.push_back(format_value(p.value, p.stderr_) + " \u00b1 " + format_error(p.stderr_));
-    screen_.row(columns, std::move(cells));
+    screen_.row(i, columns, std::move(cells));
   }
 
   const Arguments& arguments_;
@@ -297,7 +318,7 @@ int run_watch(const Arguments& arguments) {
   const Interrupt interrupt;
   Watched watched(arguments, out);
   if (arguments.resume) watched.resume(arrivals);
-  watched.write();
+  if (!interrupt.flag()) watched.write();  // else what the earlier run left stays
   folder.keep();
   if (!arguments.quiet)
     std::cerr << "birefit: watching " << printable(arguments.folder) << ", " << watched.size()
@@ -307,7 +328,7 @@ int run_watch(const Arguments& arguments) {
     for (const Arrival& arrival : arrivals.next(kLookUp)) {
       if (interrupt.flag()) break;
       if (!arrivals.is_still(arrival)) continue;
-      if (!watched.take(arrival)) {
+      if (!watched.take(arrivals, arrival)) {
         arrivals.put_off(arrival);
         continue;
       }

@@ -282,6 +282,11 @@ Server::Server(Session& session, int port, const Beginning* beginning)
       response.set_content(error_text("unknown exception"), kJson);
     }
   });
+  // The library's own options let programs share a port, which would get each other's requests.
+  http.set_socket_options([](socket_t socket) {
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  });
   state.route();
   const bool bound = port == 0 ? (state.port = http.bind_to_any_port("127.0.0.1")) > 0
                                : http.bind_to_port("127.0.0.1", state.port = port);

@@ -13,6 +13,7 @@
 
 #include "core/printable.h"
 #include "io/config/edit.h"
+#include "io/config/reader.h"
 #include "io/report/explain.h"
 #include "io/report/format.h"
 #include "io/results/work.h"
@@ -190,6 +191,7 @@ std::string Session::description() const {
     json["running"] = running_;
     json["columns"] = columns_;
     json["rows"] = rows_;
+    json["rows_set"] = rows_set_;
   }
   json["ready"] = now != nullptr;
   if (!now) return text_of(json);
@@ -337,13 +339,20 @@ std::filesystem::path Session::save(const std::string& name, const std::vector<d
   std::error_code code;
   if (!overwrite && std::filesystem::exists(path, code))
     throw UserError({path.string()}, "is there already", "another name, or overwrite it");
-  write_file(path, config_text(values));
+  const std::string text = config_text(values);
+  const auto is_rewritten = [](const std::string& of) { return of.starts_with("# As set on the command line"); };
+  if (path == shown()->config.path && is_rewritten(text) && std::filesystem::exists(path, code) &&
+      !is_rewritten(read_text(path)))
+    throw UserError({path.string()}, "would lose its comments: these values have no place in it as it is written",
+                    "another name");
+  write_file(path, text);
   return path;
 }
 
 std::string Session::words(const std::vector<double>& values) const {
   const std::filesystem::path path = shown()->config.path;
-  const Config config = load_config_text(config_text(values), path, ConfigUse::plan);
+  Config config = load_config_text(config_text(values), path, ConfigUse::plan);
+  if (threads_ >= 0) config.job.options.threads = threads_;
   return explanation_text(config, explain(config));
 }
 
@@ -359,11 +368,11 @@ void Session::start_fit(const std::vector<double>& values) {
   const std::lock_guard lock(guard_);
   if (running_) throw UserError({}, "a fit is running", "stop it first");
   if (fit_.joinable()) fit_.join();
-  running_ = true;
   stop_ = false;
+  fit_ = std::thread([this, of, text = std::move(text)]() mutable { run_fit(of, std::move(text)); });
+  running_ = true;  // the fit's first word waits for the lock
   log_.push_back("fit from these values");
   changed();
-  fit_ = std::thread([this, of, text = std::move(text)]() mutable { run_fit(of, std::move(text)); });
 }
 
 void Session::run_fit(std::shared_ptr<Shown> of, std::string text) {
@@ -373,7 +382,7 @@ void Session::run_fit(std::shared_ptr<Shown> of, std::string text) {
     if (threads_ >= 0) config.job.options.threads = threads_;
     config.job.options.interrupted = &stop_;
     config.job.options.progress = [&](const std::string& line) { say(line); };
-    FitResult result = do_work(config, memory_to_fit(config.job), [&] { return fit(config.job); });
+    FitResult result = fit_config(config);
     config.job.options.interrupted = nullptr;
     config.job.options.progress = {};
     end = fmt::format("{} after {}", result.grade(), describe_duration(result.seconds));
@@ -404,10 +413,12 @@ void Session::say(const std::string& line) {
   changed();
 }
 
-void Session::add_row(const std::vector<std::string>& columns, std::vector<std::string> cells) {
+void Session::set_row(std::size_t at, const std::vector<std::string>& columns, std::vector<std::string> cells) {
   const std::lock_guard lock(guard_);
   columns_ = columns;
-  rows_.push_back(std::move(cells));
+  if (at >= rows_.size()) rows_.resize(at + 1);
+  rows_[at] = std::move(cells);
+  ++rows_set_;
   changed();
 }
 
@@ -417,7 +428,7 @@ std::string Session::news(long seen, std::size_t line, double seconds) {
   Json json = {{"state", state_}, {"version", description_}, {"running", running_}, {"lines", Json::array()}};
   for (std::size_t i = std::min(line, log_.size()); i < log_.size(); ++i) json["lines"].push_back(log_[i]);
   json["line"] = log_.size();
-  json["rows"] = rows_.size();
+  json["rows_set"] = rows_set_;
   return text_of(json);
 }
 

@@ -53,8 +53,8 @@ class Session {
   void close();
   /// Anything that the page shall hear of, a line of the log.
   void say(const std::string& line);
-  /// A row of the table below the pictures, as `watch` has it: cells under `columns`.
-  void add_row(const std::vector<std::string>& columns, std::vector<std::string> cells);
+  /// Row `at` of the table below the pictures, as `watch` has it: cells under `columns`.
+  void set_row(std::size_t at, const std::vector<std::string>& columns, std::vector<std::string> cells);
 
   /// What `birefit explain` says at these values; takes seconds.
   std::string words(const std::vector<double>& values) const;
@@ -77,7 +77,7 @@ class Session {
   mutable std::mutex guard_;  ///< of all below but trials
   std::condition_variable news_;
   std::shared_ptr<Shown> shown_;
-  long state_ = 0, description_ = 0;
+  long state_ = 0, description_ = 0, rows_set_ = 0;
   std::vector<std::string> log_, columns_;
   std::vector<std::vector<std::string>> rows_;
   bool running_ = false, ended_ = false;

@@ -22,5 +22,37 @@ sed 's/bias_v: 700/bias_w: 700/' crystal.yaml > wrong.yaml
 refused 'a wrong config' 'bias_w' wrong.yaml --folder in --out other
 [ -e other ] && fail 'a refused run leaves a folder'
 
+# Links to what is there already are images of their own, once; a picture is that of its row, however soon it was overwritten.
+mkdir links
+cp pool/1.tif links/a.tif
+ln -s a.tif links/latest.tif
+ln links/a.tif links/again.tif
+"$birefit" watch crystal.yaml --folder links --out linked --threads 1 > links.txt 2>&1 &
+pid=$!
+for ((k = 0; k < 600; ++k)); do
+  [ "$(grep -c ': answer' links.txt)" -ge 3 ] && break
+  sleep 0.1
+done
+expose other.tif 650 9
+for ((k = 1; k <= 12; ++k)); do
+  cp pool/1.tif "links/b$k.tif"
+  sleep "0.0$k"
+  cp other.tif "links/b$k.tif"
+done
+for ((k = 0; k < 600; ++k)); do
+  [ "$(grep -c '^b[0-9]*.tif,' linked/series.csv)" -ge 12 ] && break
+  sleep 0.1
+done
+sleep 1
+kill -TERM "$pid"
+wait "$pid"
+[ "$(grep -c '^latest.tif: \|^a.tif: \|^again.tif: ' links.txt)" -eq 3 ] || fail "links: $(sort links.txt | uniq -c | head)"
+python3 - << 'PYTHON' || fail 'rows of overwritten pictures'
+import csv
+rows = list(csv.DictReader(open('linked/series.csv')))
+values = {r['file']: float(r['sample.crystal.half_wave_voltage_v']) for r in rows if r['file'].startswith('b')}
+assert len(values) == 12 and len(set(values.values())) == 1, values
+PYTHON
+
 [ $failures -eq 0 ] && echo "all as required" || echo "$failures failures"
 exit $((failures > 0))

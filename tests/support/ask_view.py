@@ -177,6 +177,11 @@ values_of = {name: p["value"] for name, p in by_command("inner/tried.yaml")["par
 check(all(p["value"] == values_of[p["name"]] for p in after["result"]["parameters"]), "the saved config's fit has other values than the page's")
 check(ok("words", {"values": values}).startswith(b"Image      48 x 48"), "the planner's words")
 
+# ---- a port is one program's ---------------------------------------------------------------------------------------------------
+
+other = subprocess.run([birefit, "view", "inner/crystal.yaml", "--port", host.split(":")[1]], capture_output=True, text=True, timeout=60)
+check(other.returncode == 2 and "no port" in other.stderr, f"a second program at the same port: {other.returncode} {other.stderr}")
+
 # ---- a page that leaves makes room; the program ends as others do -----------------------------------------------------------------
 
 connection = http.client.HTTPConnection(host, timeout=60)
@@ -185,5 +190,17 @@ check(connection.getresponse().status == 204, "goodbye")
 check(ask("description", client="second")[0] == 200, "nobody gets the session that was left")
 process.send_signal(signal.SIGTERM)
 check(process.wait(30) == -signal.SIGTERM, "SIGTERM does not end it as it ends other commands")
+
+# ---- from an image: a region that it does not have ---------------------------------------------------------------------------------
+
+image = next(name for name in os.listdir("inner") if name.endswith(".tif"))
+process = subprocess.Popen([birefit, "view", "inner/" + image, "--threads", "1"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+host, token = process.stdout.readline().strip().removeprefix("http://").rstrip("/").split("/")
+for region in ([-5, -5, 40, 40], [0, 0, 300, 300], [20, 20, 20, 30], [30, 30, 10, 10]):
+    status, data, _ = ask("grow", {"kind": "droplet", "circle": None, "region": region, "numbers": {}, "pixel_um": 0.1}, prefix="/" + token + "/")
+    check(status == 400 and b"region" in data, f"region {region}: {status} {data[:200]}")
+check(process.poll() is None, "a region that is none ends the program")
+process.terminate()
+process.wait(30)
 print(f"{len(failures)} failures" if failures else "all as required")
 sys.exit(bool(failures))

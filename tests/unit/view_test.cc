@@ -138,6 +138,31 @@ TEST_F(View, NothingIsSavedElsewhere) {
   EXPECT_THROW(session.save("x.yaml", {1400, 0.3}, false), UserError);
 }
 
+// Where a value has no place in the text the config is written anew: not over what somebody wrote.
+TEST_F(View, CommentsAreNotOverwritten) {
+  crystal();
+  std::filesystem::copy_file(folder_ / "crystal.tif", folder_ / "\u00e4.tif");
+  write("own.yaml",
+        "# mine\n{micrograph: {image: \u00e4.tif}, sample: {crystal: {half_wave_voltage_v: {value: 1400, fit: [1000, "
+        "2500]}, "
+        "bias_v: 700, field_along: y, electrodes_px: [-0.5, 47.5], field_legendre: [{value: 0.3, fit: [0.1, 0.7]}]}}, "
+        "microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}}\n");
+  view::Session session(1);
+  session.open(load_config(folder_ / "own.yaml", ConfigUse::fit));
+  EXPECT_THROW(session.save("own.yaml", {1480, 0.3}, true), UserError);
+  EXPECT_EQ(session.save("other.yaml", {1480, 0.3}, true), folder_ / "other.yaml");
+}
+
+TEST_F(View, RowsAreReplacedInTheirPlace) {
+  view::Session session(1);
+  session.open(crystal());
+  session.set_row(0, {"file"}, {"a.tif"});
+  const long seen = Json::parse(session.description())["rows_set"];
+  session.set_row(0, {"file"}, {"b.tif"});
+  EXPECT_NE(Json::parse(session.news(-1, 0, 0))["rows_set"], seen);
+  EXPECT_EQ(Json::parse(session.description())["rows"], Json::parse(R"([["b.tif"]])"));
+}
+
 TEST(WithStarts, OnlyNumbersChange) {
   const std::string text =
       "a:  # one\n  x: {value: 9.0, fit: [8, 10.5]}   # two\n  y:\n    value: 3\n    fit: [1, 4]\n";
@@ -149,6 +174,14 @@ TEST(WithStarts, WhatTheImageWasAskedForIsWrittenDown) {
   EXPECT_EQ(with_starts("a: {x: {fit: auto}}  # c\n", {{"a.x", 7, 5, 9}}), "a: {x: {value: 7, fit: [5, 9]}}  # c\n");
   EXPECT_EQ(with_starts("a:\n  x:\n    fit: auto  # c\n", {{"a.x", 7, 5, 9}}),
             "a:\n  x:\n    value: 7\n    fit: [5, 9]  # c\n");
+}
+
+// What stands there is no 1500, whatever its first characters are; and quotes go with the text that they hold.
+TEST(WithStarts, ArithmeticAndQuotesGiveWayToTheNumber) {
+  for (const char* written : {"1500 + 3", "\"1500 + 3\"", "'1503'"})
+    EXPECT_EQ(
+        with_starts("a: {x: {value: " + std::string(written) + ", fit: [1, 2000]}}  # c\n", {{"a.x", 1500, 1, 2000}}),
+        "a: {x: {value: 1500, fit: [1, 2000]}}  # c\n");
 }
 
 TEST(WithStarts, ACentreIsTwoNumbers) {

@@ -39,9 +39,15 @@ std::optional<std::size_t> offset_of(const std::string& text, const Where& where
 /// Puts `with` in place of a scalar; says whether it could.
 bool replace(std::string& text, const YamlNode& scalar, const std::string& with) {
   const auto at = offset_of(text, scalar.where);
-  if (!at || !scalar.is_scalar() || scalar.quoted || text.compare(*at, scalar.text.size(), scalar.text) != 0)
-    return false;
-  text.replace(*at, scalar.text.size(), with);
+  if (!at || !scalar.is_scalar()) return false;
+  std::string before = scalar.text;
+  if (scalar.quoted) {
+    const char quote = text[*at];
+    if (quote != '"' && quote != '\'') return false;
+    before = quote + before + quote;
+  }
+  if (text.compare(*at, before.size(), before) != 0) return false;  // escapes, several lines
+  text.replace(*at, before.size(), with);
   return true;
 }
 
@@ -83,17 +89,18 @@ bool set_centre(std::string& text, const YamlNode& tree, const std::string& path
   return true;
 }
 
-std::optional<double> value_in(const YamlNode& tree, const std::string& name) {
-  const YamlNode* node = node_at(tree, name);
-  if (node && node->is_map()) node = node->find("value");
-  return node && node->is_scalar() ? std::optional(std::strtod(node->text.c_str(), nullptr)) : std::nullopt;
-}
-
 std::optional<double> number_of(const YamlNode& node) {
   if (!node.is_scalar() || node.quoted || node.text.empty()) return std::nullopt;
   char* end = nullptr;
   const double value = std::strtod(node.text.c_str(), &end);
   return *end == '\0' && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+/// Nothing where it is arithmetic or another text.
+std::optional<double> value_in(const YamlNode& tree, const std::string& name) {
+  const YamlNode* node = node_at(tree, name);
+  if (node && node->is_map()) node = node->find("value");
+  return node ? number_of(*node) : std::nullopt;
 }
 
 void list_numbers(const YamlNode& map, const std::string& above, std::vector<std::pair<std::string, double>>& numbers) {

@@ -53,7 +53,7 @@ Arrivals::Arrivals(fs::path folder, double patience) : folder_(std::move(folder)
     throw UserError({folder_.string()}, "is no folder", "--folder names the one that images are written to");
   listener_ = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
   if (listener_ < 0) return;
-  if (::inotify_add_watch(listener_, folder_.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO) < 0) {
+  if (::inotify_add_watch(listener_, folder_.c_str(), IN_MODIFY | IN_CLOSE_WRITE | IN_MOVED_TO) < 0) {
     ::close(listener_);
     listener_ = -1;
   }
@@ -63,7 +63,7 @@ Arrivals::~Arrivals() {
   if (listener_ >= 0) ::close(listener_);
 }
 
-/// Which files their writers have closed, or renamed to what they are called now.
+/// Which files are written to, and which their writers have closed, or renamed to what they are called now.
 void Arrivals::hear() {
   alignas(inotify_event) std::array<char, 1 << 16> buffer{};
   for (ssize_t n; listener_ >= 0 && (n = ::read(listener_, buffer.data(), buffer.size())) > 0;) {
@@ -72,8 +72,13 @@ void Arrivals::hear() {
       std::memcpy(&event, buffer.data() + at, sizeof event);
       const std::string name = event.len > 0 ? buffer.data() + at + sizeof event : "";
       at += static_cast<ssize_t>(sizeof event) + event.len;
+      if (event.mask & IN_Q_OVERFLOW)  // who closed what is not known any more
+        for (auto& [other, seen] : seen_) seen.open = false;
       if (name.empty() || !is_image_name(name)) continue;
-      if (const auto state = state_of(folder_ / name)) seen_[name] = {*state, seconds_now(), true, false};
+      if (const auto state = state_of(folder_ / name)) {
+        const bool open = (event.mask & IN_MODIFY) != 0;
+        seen_[name] = {*state, seconds_now(), !open, false, open};
+      }
     }
   }
 }
@@ -87,7 +92,7 @@ void Arrivals::look(double now) {
     if (!state) continue;
     there.insert(name);
     if (const auto [at, fresh] = seen_.try_emplace(name, Seen{*state, now}); !fresh && at->second.state != *state)
-      at->second = {*state, now};
+      at->second = {*state, now, false, false, at->second.open};
   }
   std::erase_if(seen_, [&](const auto& one) { return !there.contains(one.first); });
 }
@@ -102,7 +107,8 @@ std::vector<Arrival> Arrivals::next(double seconds) {
     for (const auto& [name, seen] : seen_) {
       if (const auto known = taken_.find(name); known != taken_.end() && known->second == seen.state) continue;
       const double still = now - seen.since;
-      if (seen.put_off ? still < patience_ : !seen.closed && still < kStandsStill) continue;
+      if (const bool wait = seen.put_off || seen.open; wait ? still < patience_ : !seen.closed && still < kStandsStill)
+        continue;
       Arrival arrival{name, seen.state, {}, seen.put_off};
       for (const auto& [other, state] : taken_)
         if (state == seen.state && !seen_.contains(other)) arrival.renamed_from = other;
@@ -118,8 +124,10 @@ std::vector<Arrival> Arrivals::next(double seconds) {
 }
 
 void Arrivals::take(const std::string& name, const FileState& state) {
-  // What it was called before is another file from now on.
-  std::erase_if(taken_, [&](const auto& one) { return one.first != name && one.second == state; });
+  // What it was called before is another file from now on. (Another name that still leads to it, a link, stays taken.)
+  std::erase_if(taken_, [&](const auto& one) {
+    return one.first != name && one.second == state && state_of(folder_ / one.first) != state;
+  });
   taken_[name] = state;
 }
 

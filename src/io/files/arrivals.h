@@ -51,6 +51,7 @@ class Arrivals {
     double since = 0;     ///< when it was first seen like that
     bool closed = false;  ///< its writer has closed it, or it came by a new name
     bool put_off = false;
+    bool open = false;  ///< somebody has written to it and not closed it yet
   };
   void hear();
   void look(double now);

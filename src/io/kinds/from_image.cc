@@ -121,6 +121,9 @@ DiscGuess disc_of(const LoadedImage& image, const Stated& stated) {
   if (const auto& circle = stated.circle) return {(*circle)[0], (*circle)[1], (*circle)[2], kLeastContrast};
   const PixelRect whole{0, 0, image.values.width(), image.values.height()};
   const PixelRect region = stated.region.value_or(whole);
+  if (region.x0 < 0 || region.y0 < 0 || region.x1 > whole.x1 || region.y1 > whole.y1 || region.width() < 1 ||
+      region.height() < 1)
+    throw UserError({}, "the region is not within the picture", "draw it anew");
   DiscGuess disc = find_disc(cropped(image.values, region), Mask(region.width(), region.height(), 1));
   disc.center_x_px += region.x0, disc.center_y_px += region.y0;
   return disc;

@@ -65,18 +65,20 @@ const describe = async () => {
   document.title = `${now.file} – birefit view`;
   at("file").textContent = now.file;
   if (!at("save-as").value || (before && before.file !== now.file)) at("save-as").value = now.save_as;
-  if (first || before.parameters.map((p) => p.name).join() !== now.parameters.map((p) => p.name).join()) makeSliders();
+  const shape = (of) => JSON.stringify(of.parameters.map((p) => [p.name, p.lower, p.upper, p.prior]));
+  if (first || shape(before) !== shape(now)) makeSliders();
   values = now.parameters.map((p) => p.value);
   if (first || before.items.map((i) => i.name + i.width).join() !== now.items.map((i) => i.name + i.width).join()) {
-    startChi = null;
     item = 0;
     makeItems();
   }
   seen = [];
+  startChi = null;
   showNotes();
   showResult();
   showRows();
   showSliders();
+  stale();
   await choose(item);
 };
 
@@ -164,6 +166,8 @@ const send = () => {
   return { asked, reply: reply.catch((error) => error), begin: performance.now() };
 };
 
+const headerOf = (bytes) => JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, new DataView(bytes).getUint32(0, true))));
+
 const pump = async () => {
   if (busy) return;
   busy = true;
@@ -179,9 +183,8 @@ const pump = async () => {
     }
     sent = send();  // the program makes the next while this one is painted
     if (!bytes || asked.beside !== seen[item]) continue;  // made for another picture, or for one that was described anew since
-    const length = new DataView(bytes).getUint32(0, true);
-    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
-    drawn = { header, values: asked.values, settle: asked.settle, model: new Float32Array(bytes, 4 + length) };
+    const header = headerOf(bytes), model = new Float32Array(bytes, 4 + new DataView(bytes).getUint32(0, true));
+    drawn = { header, values: asked.values, settle: asked.settle, model };
     recent = [...recent.slice(-2), header.render_seconds];
     slow = recent.every((s) => s > kSlow);  // one that other work has held up is none
     banner("");
@@ -190,21 +193,35 @@ const pump = async () => {
     ++counters.pictures;
     if (!sent) {
       await new Promise(requestAnimationFrame);
+      if (startChi === null) await weighStart();
       sent = send();
     }
   }
   busy = false;
 };
 
+/** Chi-square where the user began, under the weights of now: a fit has changed them. */
+const weighStart = async () => {
+  const start = now.parameters.map((p) => p.start), kept = seen;
+  let weighed = NaN;
+  try {
+    const bytes = await (await ask("draw", { item, values: start, settle: false })).arrayBuffer();
+    if (bytes.byteLength) weighed = headerOf(bytes).chi_square;
+  } catch { /* the next picture tells of it */ }
+  if (kept !== seen) return;  // described anew: asked for once more
+  startChi = weighed;
+  if (drawn) showFigures();
+};
+
 const seconds = (s) => s < 0.0995 ? `${(1000 * s).toPrecision(2)} ms` : `${s.toPrecision(2)} s`;
 
 const showFigures = () => {
   const { header } = drawn;
-  if (startChi === null) startChi = header.chi_square;
+  if (!Number.isFinite(startChi) && now.parameters.every((p, j) => p.start === drawn.values[j])) startChi = header.chi_square;
   at("reduced").textContent = number(header.reduced_chi_square, 4);
   at("chi").textContent = grouped(header.chi_square);
-  const change = header.chi_square - startChi;
-  at("change").textContent = Math.abs(change) <= 1e-9 * startChi ? "0" : (change > 0 ? "+" : "") + grouped(change);
+  const change = startChi === null ? NaN : header.chi_square - startChi;
+  at("change").textContent = Number.isNaN(change) ? "–" : Math.abs(change) <= 1e-9 * startChi ? "0" : (change > 0 ? "+" : "") + grouped(change);
   at("change").className = change < 0 ? "good" : change > 0 ? "bad" : "";
   at("linear").textContent = header.linear.length ? "solved: " + header.linear.map((p) => `${p.label} ${number(p.value)}`).join(", ") : "";
   at("speed").textContent = slow ? `${seconds(header.seconds)} a picture: made when the hand rests` : `${seconds(header.seconds)} a picture`;
@@ -258,6 +275,7 @@ const paintNow = () => {
       const canvas = at(id), ratio = Draw.fit(canvas, canvas.clientWidth * Math.min(1.25, one.height / one.width));
       canvas.style.height = `${canvas.height / ratio}px`;
       if (i === 0 || drawn) Draw.show(canvas, bitmaps[i], sight);
+      else canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
       Draw.marks(canvas, sight, line, i === 2 ? null : centreOf(), ratio);
       if (i === 0) Draw.scaleBar(canvas, sight, one.pixel_um, ratio);
       const [low, high] = canvas.parentNode.querySelectorAll(".bar span"), { range } = seen[item];
@@ -328,7 +346,7 @@ const makeSliders = () => {
       set(j, values[j] + by * step * (event.shiftKey ? 10 : 1));
     });
     range.addEventListener("input", () => set(j, short(Math.round(Number(range.value) / (step / 10)) * (step / 10))));
-    box.addEventListener("change", () => set(j, Number(box.value)));
+    box.addEventListener("change", () => box.value === "" ? showSliders() : set(j, Number(box.value)));
     const name = make("div", "name"), value = make("span", "value"), ends = make("div", "ends");
     value.append(box, unit);
     name.append(label, value);
@@ -364,19 +382,27 @@ const showSliders = () => {
 /** What was computed for other values is asked for anew when it is looked at. */
 const stale = () => {
   if (at("config-box").open) later("config", showConfig);
-  if (at("words-box").open) at("words").classList.add("stale");
+  if (at("words-box").open) {
+    ++asked.words;
+    at("words").textContent = "for other values: close and open this to ask anew";
+  }
 };
+/** Which question of each was the last: an earlier one's answer may come later. */
+const asked = { words: 0, config: 0 };
 const waiting = {};
 const later = (name, what) => {
   clearTimeout(waiting[name]);
   waiting[name] = setTimeout(what, 300);
 };
 const fill = async (id, path) => {
+  const mine = ++asked[id];
+  let text;
   try {
-    at(id).textContent = await (await ask(path, { values })).text();
+    text = await (await ask(path, { values })).text();
   } catch (error) {
-    at(id).textContent = error.message;
+    text = error.message;
   }
+  if (mine === asked[id]) at(id).textContent = text;
 };
 const showConfig = () => fill("config", "config");
 const showWords = () => {
@@ -588,7 +614,7 @@ const listen = async () => {
       if (error instanceof Refused && error.status === 409) return taken(error.message);
       return ended();
     }
-    const rows = now.ready ? news.rows !== now.rows.length : false;
+    const rows = now.ready && news.rows_set !== now.rows_set;
     state = news.state;
     heard = news.line;
     if (news.lines.length) {
@@ -601,8 +627,12 @@ const listen = async () => {
 };
 
 const ended = () => {
+  if (at("work").inert) return;
   banner("birefit has ended: start it again in the terminal and open the address that it prints.");
   at("work").inert = true;
+  // A line that was cut, a machine that slept: where it is there again, the page begins anew.
+  setInterval(() => fetch("description", { headers: { "X-Client": client } })
+    .then((reply) => (reply.ok || reply.status === 409) && location.reload(), () => {}), 3000);
 };
 const taken = (words) => {
   banner(`${words}.`);

@@ -10,10 +10,16 @@ self.begin = (() => {
   const answers = () => ({ kind, circle, region, numbers, pixel_um: Number(at("pixel-um").value) || 0 });
   const tool = () => document.querySelector("[name=draws]:checked").value;
 
-  const grow = async () => {
+  let turn = 0, growing = Promise.resolve();
+  const grow = () => {
+    growing = growNow();
+  };
+  const growNow = async () => {
     if (!kind) return;
+    const mine = ++turn;
     try {
       const grown = await (await ask("grow", answers())).json();
+      if (mine !== turn) return;  // an answer to what was asked before
       at("grown").value = grown.text;
       const item = (words, name) => Object.assign(document.createElement("li"), { textContent: words, className: name });
       at("told").replaceChildren(...grown.missing.map((w) => item(`missing: ${w}`, "missing")), ...grown.found.map((w) => item(`found: ${w}`, "")));
@@ -27,13 +33,22 @@ self.begin = (() => {
   let waiting = 0;
   const soon = () => {
     clearTimeout(waiting);
-    waiting = setTimeout(grow, 150);
+    waiting = setTimeout(() => {
+      waiting = 0;
+      grow();
+    }, 150);
   };
 
   /** The numbers that nobody has asked the user for, to be looked at. */
   const showNumbers = (list) => {
     const box = at("numbers");
-    if (box.dataset.kind === kind && box.children.length === list.length) return;
+    if (box.dataset.kind === kind && box.children.length === list.length) {
+      list.forEach(({ path, value }, i) => {
+        const input = box.children[i].querySelector("input");
+        if (!(path in numbers) && input !== document.activeElement) input.value = value;
+      });
+      return;
+    }
     box.dataset.kind = kind;
     box.replaceChildren(...list.map(({ path, value }) => {
       const label = document.createElement("label"), input = document.createElement("input");
@@ -119,6 +134,12 @@ self.begin = (() => {
     at("open").addEventListener("click", async () => {
       at("open").disabled = true;
       try {
+        if (waiting) {
+          clearTimeout(waiting);
+          waiting = 0;
+          grow();
+        }
+        await growing;
         await ask("open", { text: at("grown").value });
         await describe();
       } catch (error) {
@@ -157,7 +178,7 @@ self.begin = (() => {
         picture.fill(bytes, 0, 255, Draw.grey);
         canvas.getContext("2d").drawImage(picture.canvas, 0, 0);
       }
-    })();
+    })().catch(() => {});  // the words have to do
   };
 
   const show = async (is) => {
