@@ -50,20 +50,9 @@ bool in_joint_prior(const FitJob& job, const std::string& name) {
   return job.prior && std::find(job.prior->names.begin(), job.prior->names.end(), name) != job.prior->names.end();
 }
 
-}  // namespace
-
-std::string with_error(double value, double error) {
-  if (!std::isfinite(error) || !(error > 0)) return fmt::format("{:.6g}", value);
-  const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 12);
-  return fmt::format("{:.{}f} +- {:.2g}", value, digits, error);
-}
-
-void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns& unknowns,
-                           const Eigen::MatrixXd& factor, const Inverse& inverse) {
-  const int n = unknowns.size();
-  if (n == 0) return;
-  // Each parameter in units of what was asked: its bounds' width, or its own size. Offsets may be zero: theirs is the
-  // size of the largest linear parameter, gains that are known included.
+/// Each parameter in units of what was asked: its bounds' width, or its own size. Offsets may be zero: theirs is the
+/// size of the largest linear parameter, gains that are known included.
+Eigen::VectorXd scale_asked(const FitResult& result, const FitJob& job, int n) {
   Eigen::VectorXd scale(n);
   double linear_size = 0;
   for (int j = 0; j < n; ++j)
@@ -82,7 +71,16 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
     scale[j] = estimate.linear ? linear_size : std::isfinite(width) && width > 0 ? width : std::abs(estimate.value);
     if (!(scale[j] > 0)) scale[j] = 1;
   }
-  const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
+  return scale;
+}
+
+void not_known(ParameterEstimate& estimate) {
+  estimate.stderr_ = estimate.interval95_low = estimate.interval95_high = std::numeric_limits<double>::quiet_NaN();
+}
+
+/// The directions in which the data tell most and least, and what they leave unknown.
+void judge_directions(FitResult& result, const Eigen::MatrixXd& factor, const Eigen::VectorXd& scale) {
+  const int n = static_cast<int>(scale.size());
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(factor * scale.asDiagonal(), Eigen::ComputeFullV);
   // What the data cannot narrow below half the range asked for is not determined by them.
   constexpr double kHalfWidth = 0.5;
@@ -108,55 +106,68 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
             fmt::format("{} changes the image by less than its noise: only other combinations of them are known",
                         step_in_words(result, kHalfWidth * scale.cwiseProduct(v), v));
       for (int j = 0; j < n; ++j)
-        if (std::abs(v[j]) * std::min(direction.stderr_, 1e3) > kHalfWidth) {
-          result.parameters[j].stderr_ = result.parameters[j].interval95_low = result.parameters[j].interval95_high =
-              std::numeric_limits<double>::quiet_NaN();
-        }
+        if (std::abs(v[j]) * std::min(direction.stderr_, 1e3) > kHalfWidth) not_known(result.parameters[j]);
     }
     result.directions.push_back(std::move(direction));
   }
+}
+
+/// Two parameters that only act together: their own errors are those of a long valley, 50 times what each would have
+/// with the other known. Formally finite, but a small error of the model slides the estimate along the valley.
+void judge_pair(FitResult& result, const FitJob& job, const Unknowns& unknowns, const Inverse& inverse,
+                const Eigen::VectorXd& scale, double t, int a, int b) {
+  constexpr double kTogether = 0.9999, kValley = 50;
+  const ParameterEstimate &pa = result.parameters[a], &pb = result.parameters[b];
+  // By the data alone: what models err by moves all parameters together, too, and makes no valley.
+  const double of_data_a = std::sqrt(inverse.covariance(a, a)), of_data_b = std::sqrt(inverse.covariance(b, b)),
+               correlation = inverse.covariance(a, b) / (of_data_a * of_data_b);
+  if (!(std::abs(correlation) > kTogether)) return;
+  const auto is_nuisance = [&](int j) { return job.parameters[unknowns.table_index(j)].nuisance; };
+  if (is_nuisance(a) || is_nuisance(b)) return;                              // what it is known to ends the valley
+  if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) return;  // the prior's own correlation
+  if (!(of_data_a > kValley * inverse.conditional_sd[a] && of_data_b > kValley * inverse.conditional_sd[b])) return;
+  const double sa = std::sqrt(result.covariance(a, a)), sb = std::sqrt(result.covariance(b, b));
+  result.identifiable = false;
+  FisherDirection direction;
+  const double sign = correlation > 0 ? 1 : -1;
+  Eigen::Vector2d weights(sa / scale[a], sign * sb / scale[b]);
+  direction.stderr_ = weights.norm();
+  weights /= direction.stderr_;
+  direction.weights = {{pa.name, weights[0]}, {pb.name, weights[1]}};
+  direction.identifiable = false;
+  const double across = t * sa * std::sqrt(std::max(0.0, 1 - correlation * correlation));
+  direction.words = fmt::format(
+      "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the "
+      "two is determined. Along it the 95 % interval is {0} {7:.5g} to {8:.5g}{2} (with {3} {9:.5g} to {10:.5g}{6}); "
+      "across it, with {3} known, {0} would be known to +-{11:.2g}{2}",
+      name_of(result, a), t * sa, unit_suffix(pa), name_of(result, b), sign > 0 ? "up" : "down", t * sb,
+      unit_suffix(pb), pa.value - t * sa, pa.value + t * sa, pb.value - sign * t * sb, pb.value + sign * t * sb,
+      across);
+  result.directions.push_back(std::move(direction));
+}
+
+}  // namespace
+
+std::string with_error(double value, double error) {
+  if (!std::isfinite(error) || !(error > 0)) return fmt::format("{:.6g}", value);
+  const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 12);
+  return fmt::format("{:.{}f} +- {:.2g}", value, digits, error);
+}
+
+void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns& unknowns,
+                           const Eigen::MatrixXd& factor, const Inverse& inverse) {
+  const int n = unknowns.size();
+  if (n == 0) return;
+  const Eigen::VectorXd scale = scale_asked(result, job, n);
+  judge_directions(result, factor, scale);
   for (int j = 0; j < n; ++j)
     if (inverse.undetermined[j] && result.parameters[j].limit.empty()) {
       result.identifiable = false;
-      result.parameters[j].stderr_ = result.parameters[j].interval95_low = result.parameters[j].interval95_high =
-          std::numeric_limits<double>::quiet_NaN();
+      not_known(result.parameters[j]);
     }
-
-  // Two parameters that only act together: their own errors are those of a long valley, 50 times what each would have
-  // with the other known. Formally finite, but a small error of the model slides the estimate along the valley.
-  constexpr double kTogether = 0.9999, kValley = 50;
+  const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
   for (int a = 0; a < n; ++a)
-    for (int b = a + 1; b < n; ++b) {
-      const ParameterEstimate &pa = result.parameters[a], &pb = result.parameters[b];
-      // By the data alone: what models err by moves all parameters together, too, and makes no valley.
-      const double of_data_a = std::sqrt(inverse.covariance(a, a)), of_data_b = std::sqrt(inverse.covariance(b, b)),
-                   correlation = inverse.covariance(a, b) / (of_data_a * of_data_b);
-      if (!(std::abs(correlation) > kTogether)) continue;
-      const auto is_nuisance = [&](int j) { return job.parameters[unknowns.table_index(j)].nuisance; };
-      if (is_nuisance(a) || is_nuisance(b)) continue;  // what it is known to ends the valley
-      if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) continue;  // the prior's own correlation
-      if (!(of_data_a > kValley * inverse.conditional_sd[a] && of_data_b > kValley * inverse.conditional_sd[b]))
-        continue;
-      const double sa = std::sqrt(result.covariance(a, a)), sb = std::sqrt(result.covariance(b, b));
-      result.identifiable = false;
-      FisherDirection direction;
-      const double sign = correlation > 0 ? 1 : -1;
-      Eigen::Vector2d weights(sa / scale[a], sign * sb / scale[b]);
-      direction.stderr_ = weights.norm();
-      weights /= direction.stderr_;
-      direction.weights = {{pa.name, weights[0]}, {pb.name, weights[1]}};
-      direction.identifiable = false;
-      const double across = t * sa * std::sqrt(std::max(0.0, 1 - correlation * correlation));
-      direction.words = fmt::format(
-          "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the "
-          "two "
-          "is determined. Along it the 95 % interval is {0} {7:.5g} to {8:.5g}{2} (with {3} {9:.5g} to {10:.5g}{6}); "
-          "across it, with {3} known, {0} would be known to +-{11:.2g}{2}",
-          name_of(result, a), t * sa, unit_suffix(pa), name_of(result, b), sign > 0 ? "up" : "down", t * sb,
-          unit_suffix(pb), pa.value - t * sa, pa.value + t * sa, pb.value - sign * t * sb, pb.value + sign * t * sb,
-          across);
-      result.directions.push_back(std::move(direction));
-    }
+    for (int b = a + 1; b < n; ++b) judge_pair(result, job, unknowns, inverse, scale, t, a, b);
 }
 
 namespace {

@@ -251,37 +251,40 @@ std::optional<TextTable> load_signal(ConfigReader& reader, const SignalItem& ite
   }
 }
 
-void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable& text, std::size_t number,
-                   const Picture& base, std::size_t first,
-                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
-                   std::vector<Readings>& tables) {
-  // Where the rows are; a pattern of frames is no file that is read.
-  const std::string file = item.frames ? (reader.folder / item.frames->set_from.value_or(item.file)).string()
-                                       : reader.resolve(item.file).string();
-  std::vector<std::string> names;
-  for (const TableCell& cell : text.header) names.push_back(cell.text);
-  const auto column_of = [&](const std::string& name, const Where& where) {
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found != names.end()) return static_cast<int>(found - names.begin());
-    const std::string near = nearest_word(name, names);
-    reader.problems.add(where, item.file + " has no column " + name,
-                        near.empty() ? "it has " + list_words(names) : "did you mean " + near + "?");
+namespace {
+
+/// Places of names in the header of a table.
+class Header {
+ public:
+  Header(ConfigReader& reader, const SignalItem& item, const TextTable& text) : reader_(reader), item_(item) {
+    for (const TableCell& cell : text.header) names_.push_back(cell.text);
+  }
+  /// -1, and a problem, where there is none.
+  int at(const std::string& name, const Where& where) const {
+    const auto found = std::find(names_.begin(), names_.end(), name);
+    if (found != names_.end()) return static_cast<int>(found - names_.begin());
+    const std::string near = nearest_word(name, names_);
+    reader_.problems.add(where, item_.file + " has no column " + name,
+                         near.empty() ? "it has " + list_words(names_) : "did you mean " + near + "?");
     return -1;
-  };
-  reader.warnings.insert(reader.warnings.end(), text.notes.begin(), text.notes.end());
-  const int value_column = column_of(item.value_column, item.file_where);
-  if (value_column >= 0 && !text.units.empty() && item.quantity == Quantity::retardance_um &&
-      contradicts_unit(text.units[static_cast<std::size_t>(value_column)], "um"))
-    reader.problems.add(item.file_where,
-                        item.value_column + " is in " + text.units[static_cast<std::size_t>(value_column)] +
-                            " by the table's line of units, quantity retardance_um in um",
-                        "give the retardances in um");
-  struct Column {
-    int at;
-    ParameterRef shared;
-    const NumberSpec* spec;
-  };
-  std::vector<Column> columns;
+  }
+
+ private:
+  ConfigReader& reader_;
+  const SignalItem& item_;
+  std::vector<std::string> names_;
+};
+
+/// A column that sets a number of each row.
+struct SetColumn {
+  int at;
+  ParameterRef shared;
+  const NumberSpec* spec;
+};
+
+std::vector<SetColumn> set_columns(ConfigReader& reader, const SignalItem& item, const TextTable& text,
+                                   const Header& header) {
+  std::vector<SetColumn> columns;
   for (std::size_t i = 0; i < item.columns.size(); ++i) {
     const std::string& path = item.columns[i].path;
     const auto spec = reader.specs.find(path);
@@ -298,18 +301,56 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
     if (path == "micrograph.gain" || path == "micrograph.offset")
       reader.problems.add(item.columns[i].where, "a column cannot set " + path,
                           "rows of a table share the lamp and the detector: give it in micrograph");
-    columns.push_back({column_of(item.columns[i].name, item.columns[i].where), reader.refs.at(path), &spec->second});
+    columns.push_back({header.at(item.columns[i].name, item.columns[i].where), reader.refs.at(path), &spec->second});
     check_unit(reader, text, columns.back().at, item, i, spec->second.unit);
   }
+  return columns;
+}
+
+/// What a table's values are called.
+std::string words_of(Quantity quantity, const std::string& otherwise) {
+  switch (quantity) {
+    case Quantity::intensity:
+    case Quantity::ring_radius_cm:
+      break;
+    case Quantity::retardance_um:
+      return "retardance (\u00b5m)";
+    case Quantity::retardance_waves:
+      return "retardance (waves)";
+    case Quantity::birefringence:
+      return "birefringence";
+  }
+  return otherwise;
+}
+
+}  // namespace
+
+void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable& text, std::size_t number,
+                   const Picture& base, std::size_t first,
+                   const std::function<void(Scene&, ParameterRef, ParameterRef)>& replace, Config& config,
+                   std::vector<Readings>& tables) {
+  // Where the rows are; a pattern of frames is no file that is read.
+  const std::string file = item.frames ? (reader.folder / item.frames->set_from.value_or(item.file)).string()
+                                       : reader.resolve(item.file).string();
+  const Header header(reader, item, text);
+  reader.warnings.insert(reader.warnings.end(), text.notes.begin(), text.notes.end());
+  const int value_column = header.at(item.value_column, item.file_where);
+  if (value_column >= 0 && !text.units.empty() && item.quantity == Quantity::retardance_um &&
+      contradicts_unit(text.units[static_cast<std::size_t>(value_column)], "um"))
+    reader.problems.add(item.file_where,
+                        item.value_column + " is in " + text.units[static_cast<std::size_t>(value_column)] +
+                            " by the table's line of units, quantity retardance_um in um",
+                        "give the retardances in um");
+  const std::vector<SetColumn> columns = set_columns(reader, item, text, header);
   std::vector<int> only;
-  for (const SignalItem::Only& each : item.only) only.push_back(column_of(each.column, each.where));
+  for (const SignalItem::Only& each : item.only) only.push_back(header.at(each.column, each.where));
   if (value_column < 0 || columns.size() != item.columns.size() || columns.empty() ||
-      std::any_of(columns.begin(), columns.end(), [](const Column& c) { return c.at < 0; }) ||
+      std::any_of(columns.begin(), columns.end(), [](const SetColumn& c) { return c.at < 0; }) ||
       std::any_of(only.begin(), only.end(), [](int at) { return at < 0; }))
     return;
 
   std::vector<int> wanted_columns{value_column};
-  for (const Column& column : columns) wanted_columns.push_back(column.at);
+  for (const SetColumn& column : columns) wanted_columns.push_back(column.at);
   const std::size_t before = reader.problems.all().size();
   const std::vector<Row> rows = wanted_rows(reader, text, file, item, only, wanted_columns);
   if (reader.problems.all().size() > before) return;
@@ -321,20 +362,7 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
   noise.read_counts = item.noise ? *item.noise : std::max(noise_of(curve), 1e-6 * largest);
   SignalTable table{
       printable(std::filesystem::path(item.file).filename().string()), first, item.columns[0].path, {}, {}};
-  switch (item.quantity) {
-    case Quantity::intensity:
-    case Quantity::ring_radius_cm:
-      break;
-    case Quantity::retardance_um:
-      table.quantity = "retardance (\u00b5m)";
-      break;
-    case Quantity::retardance_waves:
-      table.quantity = "retardance (waves)";
-      break;
-    case Quantity::birefringence:
-      table.quantity = "birefringence";
-      break;
-  }
+  table.quantity = words_of(item.quantity, table.quantity);
   Readings readings;
   readings.name = table.name;
   readings.observable.quantity = item.quantity;

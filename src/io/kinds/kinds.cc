@@ -273,139 +273,84 @@ std::string demo_profile() {
   return text;
 }
 
+Kind of_fit(const char* name, const char* words, const char* config, int width, int height, double gain = 3200,
+            double offset = 150) {
+  return {name, words, config, "fit", width, height, gain, offset, {}, {}, {}};
+}
+
 std::vector<Kind> all_kinds() {
-  const std::vector<std::pair<std::string, double>> droplet = {{"sample.droplet.diameter_um", 9.12},
-                                                               {"sample.material.birefringence", 0.187}};
   const std::string polarizer = "microscope.polarizer_deg=", analyzer = "microscope.analyzer_deg=",
                     empty = "sample.material.birefringence=0",
                     bias = "sample.crystal.bias_v=", birefringence = "sample.material.birefringence=";
   std::vector<Kind> all;
-  all.push_back({"droplet",
-                 "liquid-crystal droplet, PDLC, emulsion, hedgehog, radial, bipolar, Maltese cross",
-                 kDroplet,
-                 "fit",
-                 240,
-                 240,
-                 3200,
-                 150,
-                 droplet,
-                 {{"droplet.png", {}}},
-                 {}});
-  all.push_back({"shell",
-                 "liquid-crystal shell, double emulsion, capsule, vesicle wall",
-                 kShell,
-                 "fit",
-                 176,
-                 176,
-                 3200,
-                 150,
-                 {{"sample.shell.diameter_um", 14.4}, {"sample.shell.wall_um", 2.3}},
-                 {{"shell.png", {}}},
-                 {}});
-  all.push_back({"cell",
-                 "film, LCD, twisted nematic, cholesteric, wave plate, retarder, mica, tape, Michel-Levy",
-                 kCell,
-                 "fit",
-                 32,
-                 32,
-                 3200,
-                 150,
-                 {{"sample.cell.director.twisted.twist_deg", 84}, {"sample.material.birefringence", 0.131}},
-                 {{"crossed.png", {polarizer + "0", analyzer + "90"}},
-                  {"parallel.png", {polarizer + "0", analyzer + "0"}},
-                  {"turned.png", {polarizer + "45", analyzer + "45"}},
-                  {"oblique.png", {polarizer + "20", analyzer + "80"}},
-                  {"empty_parallel.png", {polarizer + "0", analyzer + "0", empty}},
-                  {"empty_crossed.png", {polarizer + "0", analyzer + "90", empty}}},
-                 {}});
-  all.push_back({"freedericksz",
-                 "cell in a voltage, threshold, variable retarder, modulator, hysteresis, a table of signal",
-                 kFreedericksz,
-                 "fit",
-                 0,
-                 0,
-                 2.5,
-                 0.1,
-                 {{"sample.cell.thickness_um", 5.08},
-                  {"sample.cell.director.freedericksz.threshold_v", 0.96},
-                  {"sample.cell.director.freedericksz.pretilt_deg", 2}},
-                 {},
-                 {}});
-  all.push_back(
-      {"plate",
-       "conoscopy, interference figure, isogyres, isochromes, converging light, heated plate, ring radii on a screen",
-       kPlate,
-       "fit",
-       160,
-       160,
-       3200,
-       150,
-       {{"sample.plate.heat.fourier_number", 0.13}},
-       {{"conoscopy.png", {}}},
-       {}});
-  all.push_back({"crystal",
-                 "Pockels effect, electro-optic crystal, CdZnTe, field in a bar, half-wave voltage",
-                 kCrystal,
-                 "fit",
-                 160,
-                 60,
-                 3000,
-                 0,
-                 {{"sample.crystal.half_wave_voltage_v", 1640}},
-                 {{"300V.png", {bias + "300"}},
-                  {"600V.png", {bias + "600"}},
-                  {"900V.png", {bias + "900"}},
-                  {"1200V.png", {bias + "1200"}},
-                  {"crossed_0V.png", {bias + "0"}},
-                  {"parallel.png", {bias + "0", analyzer + "0"}},
-                  {"dark.png", {bias + "0"}, true}},
-                 {}});
-  all.push_back({"slab",
-                 "stratified medium, depth profile, multilayer, Jones matrices, chiral film",
-                 kSlab,
-                 "jones",
-                 0,
-                 0,
-                 0,
-                 0,
-                 {},
-                 {},
-                 {{"profile.csv", demo_profile()}}});
-  all.push_back({"disc",
-                 "photoelasticity, stress, isochromatics, granular discs, Brazilian test, polariscope",
-                 kDisc,
-                 "fit",
-                 160,
-                 160,
-                 3200,
-                 150,
-                 {{"sample.disc.load_n", 311}},
-                 {{"disc.png", {}}},
-                 {}});
-  all.push_back({"volume",
-                 "simulation, director field, Q tensor, open-Qmin, Nemaktis, VTK, NumPy",
-                 kVolume,
-                 "fit",
-                 96,
-                 96,
-                 3200,
-                 150,
-                 {{"sample.material.birefringence", 0.112}},
-                 {{"field.png", {}}},
-                 {{"field.vti", demo_field()}}});
-  all.push_back({"series",
-                 "time-lapse, video, frames, temperature or voltage ramp, stack",
-                 kSeries,
-                 "series",
-                 240,
-                 240,
-                 3200,
-                 150,
-                 {{"sample.droplet.diameter_um", 9.12}},
-                 {{"frames/t0.png", {birefringence + "0.190"}},
-                  {"frames/t1.png", {birefringence + "0.185"}},
-                  {"frames/t2.png", {birefringence + "0.179"}}},
-                 {}});
+  const auto add = [&](Kind kind) -> Kind& { return all.emplace_back(std::move(kind)); };
+
+  Kind& droplet =
+      add(of_fit("droplet", "liquid-crystal droplet, PDLC, emulsion, hedgehog, radial, bipolar, Maltese cross",
+                 kDroplet, 240, 240));
+  droplet.truth = {{"sample.droplet.diameter_um", 9.12}, {"sample.material.birefringence", 0.187}};
+  droplet.pictures = {{"droplet.png", {}}};
+
+  Kind& shell = add(of_fit("shell", "liquid-crystal shell, double emulsion, capsule, vesicle wall", kShell, 176, 176));
+  shell.truth = {{"sample.shell.diameter_um", 14.4}, {"sample.shell.wall_um", 2.3}};
+  shell.pictures = {{"shell.png", {}}};
+
+  Kind& cell = add(of_fit(
+      "cell", "film, LCD, twisted nematic, cholesteric, wave plate, retarder, mica, tape, Michel-Levy", kCell, 32, 32));
+  cell.truth = {{"sample.cell.director.twisted.twist_deg", 84}, {"sample.material.birefringence", 0.131}};
+  cell.pictures = {{"crossed.png", {polarizer + "0", analyzer + "90"}},
+                   {"parallel.png", {polarizer + "0", analyzer + "0"}},
+                   {"turned.png", {polarizer + "45", analyzer + "45"}},
+                   {"oblique.png", {polarizer + "20", analyzer + "80"}},
+                   {"empty_parallel.png", {polarizer + "0", analyzer + "0", empty}},
+                   {"empty_crossed.png", {polarizer + "0", analyzer + "90", empty}}};
+
+  Kind& freedericksz = add(of_fit(
+      "freedericksz", "cell in a voltage, threshold, variable retarder, modulator, hysteresis, a table of signal",
+      kFreedericksz, 0, 0, 2.5, 0.1));
+  freedericksz.truth = {{"sample.cell.thickness_um", 5.08},
+                        {"sample.cell.director.freedericksz.threshold_v", 0.96},
+                        {"sample.cell.director.freedericksz.pretilt_deg", 2}};
+
+  Kind& plate = add(of_fit(
+      "plate",
+      "conoscopy, interference figure, isogyres, isochromes, converging light, heated plate, ring radii on a screen",
+      kPlate, 160, 160));
+  plate.truth = {{"sample.plate.heat.fourier_number", 0.13}};
+  plate.pictures = {{"conoscopy.png", {}}};
+
+  Kind& crystal =
+      add(of_fit("crystal", "Pockels effect, electro-optic crystal, CdZnTe, field in a bar, half-wave voltage",
+                 kCrystal, 160, 60, 3000, 0));
+  crystal.truth = {{"sample.crystal.half_wave_voltage_v", 1640}};
+  crystal.pictures = {{"300V.png", {bias + "300"}},     {"600V.png", {bias + "600"}},
+                      {"900V.png", {bias + "900"}},     {"1200V.png", {bias + "1200"}},
+                      {"crossed_0V.png", {bias + "0"}}, {"parallel.png", {bias + "0", analyzer + "0"}},
+                      {"dark.png", {bias + "0"}, true}};
+
+  Kind& slab = add(
+      of_fit("slab", "stratified medium, depth profile, multilayer, Jones matrices, chiral film", kSlab, 0, 0, 0, 0));
+  slab.command = "jones";
+  slab.files = {{"profile.csv", demo_profile()}};
+
+  Kind& disc = add(of_fit("disc", "photoelasticity, stress, isochromatics, granular discs, Brazilian test, polariscope",
+                          kDisc, 160, 160));
+  disc.truth = {{"sample.disc.load_n", 311}};
+  disc.pictures = {{"disc.png", {}}};
+
+  Kind& volume =
+      add(of_fit("volume", "simulation, director field, Q tensor, open-Qmin, Nemaktis, VTK, NumPy", kVolume, 96, 96));
+  volume.truth = {{"sample.material.birefringence", 0.112}};
+  volume.pictures = {{"field.png", {}}};
+  volume.files = {{"field.vti", demo_field()}};
+
+  Kind& series =
+      add(of_fit("series", "time-lapse, video, frames, temperature or voltage ramp, stack", kSeries, 240, 240));
+  series.command = "series";
+  series.truth = {{"sample.droplet.diameter_um", 9.12}};
+  series.pictures = {{"frames/t0.png", {birefringence + "0.190"}},
+                     {"frames/t1.png", {birefringence + "0.185"}},
+                     {"frames/t2.png", {birefringence + "0.179"}}};
   return all;
 }
 

@@ -166,31 +166,13 @@ double parabola_peak(double left, double middle, double right) {
   return curvature < 0 ? std::clamp(0.5 * (left - right) / curvature, -1.0, 1.0) : 0.0;
 }
 
-}  // namespace
+/// The picture less its background, and how much is going on at each pixel.
+struct Activity {
+  cv::Mat1d signal, smooth, activity;  ///< smooth: signal, blurred
+  double noise = 0;                    ///< of activity
+};
 
-DiscGuess find_disc(const Image& values, const Mask& mask) {
-  if (const SubGrid grid = sub_grid(mask); grid.spacing > 1) {
-    DiscGuess guess = find_disc(on_grid(values, grid), on_grid(mask, grid));
-    guess.center_x_px = grid.x0 + grid.spacing * guess.center_x_px;
-    guess.center_y_px = grid.y0 + grid.spacing * guess.center_y_px;
-    guess.radius_px *= grid.spacing;
-    return guess;
-  }
-  DiscGuess guess;
-  guess.center_x_px = 0.5 * (values.width() - 1);
-  guess.center_y_px = 0.5 * (values.height() - 1);
-  guess.radius_px = 0.25 * std::min(values.width(), values.height());
-  const int factor = std::max(1, std::max(values.width(), values.height()) / kWorkingSide);
-  if (values.width() / factor < 12 || values.height() / factor < 12) return guess;
-
-  Field field = shrink(values, mask, factor);
-  if (cv::countNonZero(field.used) < 64) return guess;
-  double noise = noise_sd(field);
-  double low = 0, high = 0;
-  cv::minMaxLoc(field.value, &low, &high, nullptr, nullptr, field.used);
-  if (!(high > low)) return guess;
-  noise = std::max(noise, 1e-6 * (high - low));
-
+Activity activity_of(const Field& field, double noise) {
   const std::array<double, 3> plane = background_plane(field, noise);
   const int width = field.value.cols, height = field.value.rows;
   cv::Mat1d signal(height, width, 0.0), activity(height, width, 0.0), weight(height, width, 0.0);
@@ -210,14 +192,19 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       activity(y, x) = fine_weight(y, x) > 0.1 ? std::abs(smooth(y, x) / fine_weight(y, x)) : 0;
-  const double smooth_noise = noise / (2 * std::sqrt(CV_PI) * fine);
+  return {signal, smooth, activity, noise / (2 * std::sqrt(CV_PI) * fine)};
+}
 
+/// The pixels of what is seen: its components of activity, which the cross may leave apart; none: empty.
+cv::Mat1b seen_pixels(const Activity& of) {
+  const cv::Mat1d& activity = of.activity;
+  const int width = activity.cols, height = activity.rows;
   // Bright rings and noise separate at a level between: a share of the strong activity, well above the noise.
   std::vector<double> sorted(activity.begin(), activity.end());
   const auto strong_at = sorted.begin() + static_cast<std::ptrdiff_t>(0.98 * (sorted.size() - 1));
   std::nth_element(sorted.begin(), strong_at, sorted.end());
   const double strong = *strong_at;
-  const double threshold = std::max(0.12 * strong, 4 * smooth_noise);
+  const double threshold = std::max(0.12 * strong, 4 * of.noise);
   cv::Mat1b active(height, width, std::uint8_t{0});
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) active(y, x) = activity(y, x) > threshold ? 255 : 0;
@@ -237,7 +224,7 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
     for (int x = 0; x < width; ++x) total[labels(y, x)] += activity(y, x);
   total[0] = 0;
   const int best = static_cast<int>(std::max_element(total.begin(), total.end()) - total.begin());
-  if (components < 2 || best == 0) return guess;
+  if (components < 2 || best == 0) return {};
 
   // Lobes that the cross leaves apart belong together: components nearly as strong within reach of the best.
   const auto circle_of = [&](int label, double& x, double& y) {
@@ -253,13 +240,20 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
     member[label] = label == best || (total[label] > 0.15 * total[best] &&
                                       std::hypot(x - best_x, y - best_y) < 3 * (radius + best_radius));
   }
+  cv::Mat1b seen(height, width, std::uint8_t{0});
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) seen(y, x) = labels(y, x) > 0 && member[labels(y, x)];
+  return seen;
+}
 
-  // Outline: for every direction the outermost member pixel as seen from the middle; those on the image's edge or
-  // beside masked pixels are where the picture ends, not the droplet.
+/// A circle along the outline: for every direction the outermost pixel as seen from the middle; those on the image's
+/// edge or beside masked pixels are where the picture ends, not the droplet.
+Circle outline_of(const cv::Mat1b& seen, const Field& field) {
+  const int width = seen.cols, height = seen.rows;
   double middle_x = 0, middle_y = 0, mass = 0;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
-      if (member[labels(y, x)] && labels(y, x) > 0) middle_x += x, middle_y += y, mass += 1;
+      if (seen(y, x)) middle_x += x, middle_y += y, mass += 1;
   middle_x /= mass, middle_y /= mass;
   Circle circle{middle_x, middle_y, std::sqrt(mass / CV_PI)};
   constexpr int kDirections = 240;
@@ -268,7 +262,7 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
     std::array<cv::Point2d, kDirections> outermost{};
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
-        if (labels(y, x) == 0 || !member[labels(y, x)]) continue;
+        if (!seen(y, x)) continue;
         const double dx = x - circle.x, dy = y - circle.y, distance = std::hypot(dx, dy);
         const int direction = static_cast<int>((std::atan2(dy, dx) / (2 * CV_PI) + 0.5) * kDirections) % kDirections;
         if (distance > reach[direction]) reach[direction] = distance, outermost[direction] = {double(x), double(y)};
@@ -284,9 +278,12 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
     }
     circle = fit_circle(outline, circle);
   }
-  if (!(circle.radius > 2) || circle.radius > 2 * std::max(width, height)) return guess;
+  return circle;
+}
 
-  // Symmetry: a coarse to fine search around the outline's centre, on the half-pixel grid, then a parabola.
+/// The centre of symmetry near the circle's: a coarse to fine search on the half-pixel grid, then a parabola. Where
+/// there is no symmetry the outline knows better.
+cv::Point2d centre_of_symmetry(const cv::Mat1d& smooth, const Field& field, const Circle& circle) {
   int twice_x = static_cast<int>(std::lround(2 * circle.x)), twice_y = static_cast<int>(std::lround(2 * circle.y));
   const double reach = 1.05 * circle.radius;
   const auto score = [&](int u, int v, int stride = 1) {
@@ -314,8 +311,14 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
     x = 0.5 * (twice_x + parabola_peak(score(twice_x - 1, twice_y), middle, score(twice_x + 1, twice_y)));
     y = 0.5 * (twice_y + parabola_peak(score(twice_x, twice_y - 1), middle, score(twice_x, twice_y + 1)));
   }
+  return {x, y};
+}
 
-  // Radius: where the mean activity about that centre falls to the level of the background for good.
+/// Where the mean activity about the centre falls to the level of the background for good.
+double radius_about(const cv::Point2d& centre, const Circle& circle, const cv::Mat1d& signal, const Field& field,
+                    double noise) {
+  const double x = centre.x, y = centre.y;
+  const int width = signal.cols, height = signal.rows;
   const int bins = static_cast<int>(1.6 * circle.radius) + 2;
   std::vector<double> ring(bins, 0.0), ring_count(bins, 0.0);
   for (int v = 0; v < height; ++v)
@@ -335,18 +338,54 @@ DiscGuess find_disc(const Image& values, const Mask& mask) {
       edge = i;
       break;
     }
-  double radius = edge + 0.5;
-  if (std::abs(radius / circle.radius - 1) > 0.25) radius = circle.radius;
+  const double radius = edge + 0.5;
+  return std::abs(radius / circle.radius - 1) > 0.25 ? circle.radius : radius;
+}
+
+}  // namespace
+
+DiscGuess find_disc(const Image& values, const Mask& mask) {
+  if (const SubGrid grid = sub_grid(mask); grid.spacing > 1) {
+    DiscGuess guess = find_disc(on_grid(values, grid), on_grid(mask, grid));
+    guess.center_x_px = grid.x0 + grid.spacing * guess.center_x_px;
+    guess.center_y_px = grid.y0 + grid.spacing * guess.center_y_px;
+    guess.radius_px *= grid.spacing;
+    return guess;
+  }
+  DiscGuess guess;
+  guess.center_x_px = 0.5 * (values.width() - 1);
+  guess.center_y_px = 0.5 * (values.height() - 1);
+  guess.radius_px = 0.25 * std::min(values.width(), values.height());
+  const int factor = std::max(1, std::max(values.width(), values.height()) / kWorkingSide);
+  if (values.width() / factor < 12 || values.height() / factor < 12) return guess;
+
+  Field field = shrink(values, mask, factor);
+  if (cv::countNonZero(field.used) < 64) return guess;
+  double noise = noise_sd(field);
+  double low = 0, high = 0;
+  cv::minMaxLoc(field.value, &low, &high, nullptr, nullptr, field.used);
+  if (!(high > low)) return guess;
+  noise = std::max(noise, 1e-6 * (high - low));
+
+  const Activity of = activity_of(field, noise);
+  const cv::Mat1b seen = seen_pixels(of);
+  if (seen.empty()) return guess;
+  const Circle circle = outline_of(seen, field);
+  const int width = field.value.cols, height = field.value.rows;
+  if (!(circle.radius > 2) || circle.radius > 2 * std::max(width, height)) return guess;
+  const cv::Point2d centre = centre_of_symmetry(of.smooth, field, circle);
+  const double radius = radius_about(centre, circle, of.signal, field, noise);
 
   // Smoothed over the working resolution: a disc far weaker than one pixel's noise is still plain to see.
   double inside = 0, inside_count = 0;
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u)
-      if (field.used(v, u) && std::hypot(u - x, v - y) <= radius) inside += activity(v, u), inside_count += 1;
-  guess.center_x_px = (x + 0.5) * factor - 0.5;
-  guess.center_y_px = (y + 0.5) * factor - 0.5;
+      if (field.used(v, u) && std::hypot(u - centre.x, v - centre.y) <= radius)
+        inside += of.activity(v, u), inside_count += 1;
+  guess.center_x_px = (centre.x + 0.5) * factor - 0.5;
+  guess.center_y_px = (centre.y + 0.5) * factor - 0.5;
   guess.radius_px = radius * factor;
-  guess.contrast = inside_count > 0 ? inside / inside_count / smooth_noise : 0;
+  guess.contrast = inside_count > 0 ? inside / inside_count / of.noise : 0;
   return guess;
 }
 

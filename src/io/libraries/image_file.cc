@@ -230,6 +230,107 @@ std::string with_one_bit_stated(const ImageRequest& request) {
   return content;
 }
 
+/// How samples are stored.
+struct Stored {
+  int bits = 0;  ///< of a sample
+  bool is_float = false, tiff = false, palette = false;
+  int photometric = -1;  ///< of TIFF
+};
+constexpr int kWhiteIsZero = 0, kPalette = 3, kSubsampledColour = 6;
+
+Stored how_stored(const Signature& signature, const OIIO::ImageSpec& spec) {
+  Stored stored;
+  stored.is_float = spec.format.is_floating_point();
+  stored.bits = signature.stored_bits > 0 && signature.format != "bmp"
+                    ? signature.stored_bits
+                    : spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size()) * 8);
+  stored.tiff = signature.format == "tiff";
+  if (stored.tiff) stored.photometric = spec.get_int_attribute("tiff:PhotometricInterpretation", 1);
+  stored.palette = signature.palette || stored.photometric == kPalette;
+  return stored;
+}
+
+/// From the header, before anything of the image's size is allocated.
+void check_header(const ImageRequest& request, const Signature& signature, const OIIO::ImageSpec& spec,
+                  const Stored& stored) {
+  if (spec.width < 1 || spec.height < 1) refuse_damaged(request, signature, " (it has no pixels)");
+  check_image_size(request, spec.width, spec.height);
+  if (spec.depth > 1 || spec.deep)
+    refuse_image(request, spec.deep ? "is a deep image" : "is a volume, not an image", "export one plane of it");
+  if (stored.bits == 1 && !request.mask) refuse_one_bit(request);
+  if (stored.photometric == kCfaPhotometric && !request.cells)
+    refuse_image(request, "is a colour filter mosaic: its pixels see red, green and blue in cells of 2 x 2",
+                 "add `bayer: rggb` (or bggr, grbg, gbrg) and `channel: g`");
+  if (stored.tiff && stored.photometric > kPalette && stored.photometric != kSubsampledColour &&
+      stored.photometric != kCfaPhotometric && stored.photometric != kLinearRawPhotometric)
+    refuse_image(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
+  if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
+    refuse_image(request, "is stored in the print colour space " + space, "save it as grey or RGB");
+  if (stored.bits == 24 && !stored.is_float && stored.tiff)
+    refuse_image(request, "has 24 bits per sample", "save it as 16-bit integers or float");
+  if (!spec.channelformats.empty())
+    for (const TypeDesc& type : spec.channelformats)
+      if (!type.is_floating_point())
+        refuse_image(request, "has channels of different types", "save it as a grey image of 16-bit integers or float");
+}
+
+/// The page that is asked for, or the only one.
+int page_asked(const ImageRequest& request, OIIO::ImageInput& input, bool several) {
+  int page = 0;
+  if (several && !request.page) {
+    const int pages = count_pages(input);
+    refuse_image(request,
+                 fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
+                             list_pages(input, pages, request.path)),
+                 "add `page: 0` for the first; micrographs: {files: ..} takes each as an image");
+  }
+  if (request.page) {
+    page = *request.page;
+    if (page < 0 || !input.seek_subimage(page, 0)) {
+      (void)input.geterror();
+      const int pages = count_pages(input);
+      refuse_image(
+          request,
+          fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
+                      list_pages(input, pages, request.path)),
+          "pages count from 0");
+    }
+  }
+  return page;
+}
+
+/// Counts as the camera had them, and what is to be said of their codes.
+void settle_codes(const ImageRequest& request, const Signature& signature, const OIIO::ImageSpec& spec,
+                  const Stored& stored, bool several_channels, LoadedImage& loaded) {
+  const bool small_integer = spec.format == TypeDesc::UINT8 || spec.format == TypeDesc::UINT16;
+  if (small_integer) {
+    loaded.bits = static_cast<int>(spec.format.size()) * 8;
+    loaded.top_code = loaded.bits == 8 ? 255 : 65535;
+    if (stored.bits < loaded.bits && !stored.palette && (stored.tiff || signature.format == "png")) {
+      restore_packed_counts(stored.bits, loaded.top_code, loaded.values, several_channels);
+      loaded.top_code = std::exp2(stored.bits) - 1;
+      if (!request.mask)
+        loaded.notes.push_back(fmt::format("{}-bit samples: counts from 0 to {:.0f}", stored.bits, loaded.top_code));
+    }
+  } else {
+    loaded.bits = 32;
+    if (!stored.is_float)
+      loaded.notes.push_back(fmt::format("{}: read as float, the saturation code is not known", describe_type(spec)));
+    else if (spec.format == TypeDesc::HALF)
+      loaded.notes.push_back("16-bit float samples hold three decimal digits only");
+  }
+  if (stored.palette && !request.mask)
+    loaded.notes.push_back(
+        "palette image: its colours, not its indices, are the intensities; fit the original if you can");
+  if (signature.lossy || stored.photometric == kSubsampledColour)
+    loaded.notes.push_back("lossy compression has changed the counts and their noise; fit the original if you can");
+  if (stored.photometric == kWhiteIsZero) {
+    loaded.stored_zero = invert_white_is_zero(spec, loaded.top_code, loaded.values);
+    if (!request.mask)
+      loaded.notes.push_back("white is stored as zero: values inverted on reading, larger is brighter");
+  }
+}
+
 /// `content`: of the file, where it is to be read otherwise than it stands there; else empty.
 LoadedImage load_checked(const ImageRequest& request, const Signature& signature, std::string content = {}) {
   if (signature.animated)
@@ -260,95 +361,21 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   if (several && (signature.format == "gif" || spec.get_int_attribute("oiio:Movie", 0) != 0))
     refuse_image(request, "is animated (" + signature.format_name + ")",
                  "extract the frame to be fitted as a still image");
-  int page = 0;
-  if (several && !request.page) {
-    const int pages = count_pages(*input);
-    refuse_image(request,
-                 fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
-                             list_pages(*input, pages, request.path)),
-                 "add `page: 0` for the first; micrographs: {files: ..} takes each as an image");
-  }
-  if (request.page) {
-    page = *request.page;
-    if (page < 0 || !input->seek_subimage(page, 0)) {
-      (void)input->geterror();
-      const int pages = count_pages(*input);
-      refuse_image(
-          request,
-          fmt::format("has no page {}: it has {} ({})", page, pages == 1 ? "1 page" : fmt::format("{} pages", pages),
-                      list_pages(*input, pages, request.path)),
-          "pages count from 0");
-    }
-  }
+  const int page = page_asked(request, *input, several);
   if (!input->seek_subimage(page, 0)) refuse_damaged(request, signature, decoder_message(*input));
   spec = input->spec(page, 0);
-
-  // From the header, before anything of the image's size is allocated.
-  if (spec.width < 1 || spec.height < 1) refuse_damaged(request, signature, " (it has no pixels)");
-  check_image_size(request, spec.width, spec.height);
-  if (spec.depth > 1 || spec.deep)
-    refuse_image(request, spec.deep ? "is a deep image" : "is a volume, not an image", "export one plane of it");
-
-  const bool is_float = spec.format.is_floating_point();
-  const int bits = signature.stored_bits > 0 && signature.format != "bmp"
-                       ? signature.stored_bits
-                       : spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size()) * 8);
-  const bool tiff = signature.format == "tiff";
-  const int photometric = tiff ? spec.get_int_attribute("tiff:PhotometricInterpretation", 1) : -1;
-  constexpr int kWhiteIsZero = 0, kPalette = 3, kSubsampledColour = 6;
-  const bool palette = signature.palette || photometric == kPalette;
-  if (bits == 1 && !request.mask) refuse_one_bit(request);
-  if (photometric == kCfaPhotometric && !request.cells)
-    refuse_image(request, "is a colour filter mosaic: its pixels see red, green and blue in cells of 2 x 2",
-                 "add `bayer: rggb` (or bggr, grbg, gbrg) and `channel: g`");
-  if (tiff && photometric > kPalette && photometric != kSubsampledColour && photometric != kCfaPhotometric &&
-      photometric != kLinearRawPhotometric)
-    refuse_image(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
-  if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
-    refuse_image(request, "is stored in the print colour space " + space, "save it as grey or RGB");
-  if (bits == 24 && !is_float && tiff)
-    refuse_image(request, "has 24 bits per sample", "save it as 16-bit integers or float");
-  if (!spec.channelformats.empty())
-    for (const TypeDesc& type : spec.channelformats)
-      if (!type.is_floating_point())
-        refuse_image(request, "has channels of different types", "save it as a grey image of 16-bit integers or float");
+  const Stored stored = how_stored(signature, spec);
+  check_header(request, signature, spec, stored);
 
   LoadedImage loaded;
   const std::string description = spec.get_string_attribute("ImageDescription", "");
-  const std::vector<int> channels = chosen_channels(request, spec, palette, loaded.notes);
+  const std::vector<int> channels = chosen_channels(request, spec, stored.palette, loaded.notes);
   loaded.colour = spec.nchannels >= 3;
   const PixelRect part = part_asked(request, spec.width, spec.height);
   loaded.width = spec.width, loaded.height = spec.height;
   loaded.x0 = part.x0, loaded.y0 = part.y0;
   loaded.values = read_samples(request, signature, *input, page, spec, channels, part);
-
-  const bool small_integer = spec.format == TypeDesc::UINT8 || spec.format == TypeDesc::UINT16;
-  if (small_integer) {
-    loaded.bits = static_cast<int>(spec.format.size()) * 8;
-    loaded.top_code = loaded.bits == 8 ? 255 : 65535;
-    if (bits < loaded.bits && !palette && (tiff || signature.format == "png")) {
-      restore_packed_counts(bits, loaded.top_code, loaded.values, channels.size() > 1);
-      loaded.top_code = std::exp2(bits) - 1;
-      if (!request.mask)
-        loaded.notes.push_back(fmt::format("{}-bit samples: counts from 0 to {:.0f}", bits, loaded.top_code));
-    }
-  } else {
-    loaded.bits = 32;
-    if (!is_float)
-      loaded.notes.push_back(fmt::format("{}: read as float, the saturation code is not known", describe_type(spec)));
-    else if (spec.format == TypeDesc::HALF)
-      loaded.notes.push_back("16-bit float samples hold three decimal digits only");
-  }
-  if (palette && !request.mask)
-    loaded.notes.push_back(
-        "palette image: its colours, not its indices, are the intensities; fit the original if you can");
-  if (signature.lossy || photometric == kSubsampledColour)
-    loaded.notes.push_back("lossy compression has changed the counts and their noise; fit the original if you can");
-  if (photometric == kWhiteIsZero) {
-    loaded.stored_zero = invert_white_is_zero(spec, loaded.top_code, loaded.values);
-    if (!request.mask)
-      loaded.notes.push_back("white is stored as zero: values inverted on reading, larger is brighter");
-  }
+  settle_codes(request, signature, spec, stored, channels.size() > 1, loaded);
   if (const int orientation = spec.get_int_attribute("Orientation", 1); orientation > 1 && orientation <= 8)
     loaded.notes.push_back(fmt::format("orientation tag {} ignored: rows and columns are as stored", orientation));
   if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width ||
