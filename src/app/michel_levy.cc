@@ -141,6 +141,7 @@ int run_michel_levy(const Arguments& arguments) {
   if (!arguments.quiet) print_warnings(config.job.warnings);
   std::string said = fmt::format("{}: colours of retardances up to {:g} nm\n", printable(arguments.out),
                                  kNmPerUm * arguments.up_to_um);
+  bool described = true;
   if (maps) {
     const auto [channels, mask] = fractions_of_white(config);
     const RetardanceMap map = retardance_map(camera_curve(scenes, theta, arguments.up_to_um), channels, mask,
@@ -148,16 +149,25 @@ int run_michel_levy(const Arguments& arguments) {
     const std::pair<const char*, Image> pictures[] = {{"retardance_nm.tif", times(map.retardance_um, kNmPerUm)},
                                                       {"error_nm.tif", times(map.error_um, kNmPerUm)},
                                                       {"rival_nm.tif", times(map.rival_um, kNmPerUm)},
-                                                      {"rival_odds.tif", map.rival_odds}};
+                                                      {"rival_odds.tif", map.rival_odds},
+                                                      {"chi_square.tif", map.chi_square}};
     for (const auto& [name, picture] : pictures) files.push_back({out / name, encode_image(picture, out / name)});
     said += fmt::format(
         "retardances of {} pixels, {} of them without a rival of odds above 1 in 20 (noise of {:g} of white)\n",
         map.used, map.settled, arguments.noise);
+    if (map.unlike > 0)
+      said += fmt::format(
+          "the colours of {} pixels are those of no retardance within that noise (chi-square beyond 1 in 1000): errors "
+          "and rivals there allow for what is left. Are white and black right (exposure, white balance, transfer), the "
+          "lamp and the camera?\n",
+          map.unlike);
+    described = 2 * map.unlike <= map.used;
+    if (!described) said += "No answer: that is more than half of the picture.\n";
   }
   write_files(files);
   folder.keep();
   if (!arguments.quiet) std::cout << said;
-  return kExitDone;
+  return described ? kExitDone : kExitNoAnswer;
 }
 
 }  // namespace

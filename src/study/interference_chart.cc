@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/threads.h"
+#include "fit/errors/statistics.h"
 #include "instrument/channel_light.h"
 #include "medium/indices.h"
 #include "medium/validity.h"
@@ -63,8 +64,8 @@ ColourCurve camera_curve(const std::vector<Scene>& scenes, const Theta& theta, d
 std::vector<ChartColour> interference_chart(const std::vector<Scene>& scenes, const Theta& theta, double up_to_um,
                                             double step_um) {
   const Scene& scene = scenes.front();
-  const Channels observer = channels_of(*scene.microscope.channel_light, theta,
-                                        {colour_matching(0), colour_matching(1), colour_matching(2)});
+  const Channels observer =
+      channels_of(*scene.microscope.channel_light, theta, {colour_matching(0), colour_matching(1), colour_matching(2)});
   const ColourCurve eye = curve_of(scene, theta, observer, up_to_um), camera = camera_curve(scenes, theta, up_to_um);
   const std::vector<double>& w = observer.white();
   const Xyz white{w[0] / w[1], 1, w[2] / w[1]};
@@ -92,15 +93,21 @@ std::vector<ChartColour> interference_chart(const std::vector<Scene>& scenes, co
 RetardanceMap retardance_map(const ColourCurve& curve, const std::vector<Image>& channels, const Mask& mask,
                              double noise, int threads) {
   const int w = channels.front().width(), h = channels.front().height();
-  RetardanceMap map{Image(w, h, kNaN), Image(w, h, kNaN), Image(w, h, kNaN), Image(w, h, 0)};
+  RetardanceMap map{Image(w, h, kNaN), Image(w, h, kNaN), Image(w, h, kNaN), Image(w, h, 0), Image(w, h, kNaN)};
+  const double free = static_cast<double>(channels.size()) - 1;  // one channel has a retardance for whatever it shows
+  const double most = free > 0 ? estimation::chi_square_quantile(0.999, free) : std::numeric_limits<double>::infinity();
   const std::vector<double> noises(channels.size(), noise);
   parallel_for(h, threads, [&](int row) {
     std::vector<double> recorded(channels.size());
     for (int column = 0; column < w; ++column) {
       if (!mask(column, row)) continue;
       for (std::size_t c = 0; c < channels.size(); ++c) recorded[c] = channels[c](column, row);
-      const std::vector<RetardanceOfColour> found = retardances_of(curve, recorded, noises);
+      std::vector<RetardanceOfColour> found = retardances_of(curve, recorded, noises);
       if (found.empty()) continue;
+      map.chi_square(column, row) = found[0].chi_square;
+      if (found[0].chi_square > most)
+        found = retardances_of(curve, recorded,
+                               std::vector<double>(channels.size(), noise * std::sqrt(found[0].chi_square / free)));
       map.retardance_um(column, row) = found[0].g_um, map.error_um(column, row) = found[0].error_um;
       if (found.size() > 1) map.rival_um(column, row) = found[1].g_um, map.rival_odds(column, row) = found[1].odds;
     }
@@ -110,6 +117,7 @@ RetardanceMap retardance_map(const ColourCurve& curve, const std::vector<Image>&
     if (!mask.values()[i]) continue;
     ++map.used;
     map.settled += map.rival_odds.values()[i] < kUnlikely;
+    map.unlike += map.chi_square.values()[i] > most;
   }
   return map;
 }

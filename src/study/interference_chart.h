@@ -34,9 +34,13 @@ ColourCurve camera_curve(const std::vector<Scene>& scenes, const Theta& theta, d
 
 /// Of every pixel; NaN where it is not used.
 struct RetardanceMap {
-  Image retardance_um, error_um;      ///< the likeliest, its standard error
-  Image rival_um, rival_odds;         ///< the next likely and its odds against it; NaN and 0 without
+  Image retardance_um, error_um;  ///< the likeliest, its standard error
+  Image rival_um, rival_odds;     ///< the next likely and its odds against it; NaN and 0 without
+  /// What the likeliest leaves of the channels, in units of the noise. Where that is less likely than 1 in 1000 the
+  /// colour is that of no retardance, and errors and odds are those of a noise as large as what is left.
+  Image chi_square;
   std::size_t used = 0, settled = 0;  ///< pixels; those whose rival is less likely than one in twenty
+  std::size_t unlike = 0;             ///< pixels of such colours
 };
 /// `channels`: pictures of one size as fractions of white; `mask`: 1 = used; `noise`: standard deviation of each.
 RetardanceMap retardance_map(const ColourCurve& curve, const std::vector<Image>& channels, const Mask& mask,

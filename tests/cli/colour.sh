@@ -47,6 +47,11 @@ Y
 "$birefit" render cell.yaml --out cell.png --quiet && file cell.png | grep -q '6 x 4, 16-bit/color RGB' || fail "render: png: $(file cell.png)"
 "$birefit" michel-levy cell.yaml --image cell.tif --out map > map.txt || fail 'michel-levy: no map'
 grep -q '24 pixels, 24 of them' map.txt || fail "michel-levy: $(cat map.txt)"
+# Half as bright as is stated, and white balanced for another lamp: no retardance has these colours.
+"$birefit" michel-levy cell.yaml --image cell.tif --set micrograph.gain=2 --out dim > dim.txt
+[ $? -eq 1 ] && grep -q 'of 24 pixels are those of no retardance' dim.txt || fail "michel-levy: a wrong white: $(cat dim.txt)"
+"$birefit" michel-levy cell.yaml --image cell.tif --set 'microscope.light.lamp={planck_k: 5500}' --out cold > cold.txt
+[ $? -eq 1 ] && grep -q 'those of no retardance' cold.txt || fail "michel-levy: another lamp: $(cat cold.txt)"
 "$birefit" michel-levy cell.yaml --out chart > /dev/null || fail 'michel-levy: no chart'
 for f in michel_levy.svg michel_levy.png michel_levy.csv; do [[ -s chart/$f ]] || fail "michel-levy: no $f"; done
 # Of the table: nothing passes at 0, and at 1 um what the cell's picture shows.
