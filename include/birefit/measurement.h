@@ -81,6 +81,7 @@ struct Readings {
   Eigen::VectorXd values;           ///< one a row, or one a ring
   ParameterRef gain, offset;        ///< linear: value = gain * observable + offset
   std::optional<NoiseModel> noise;  ///< in units of the values; needed where rows are measurements of their own
+  bool noise_at_most = false;       ///< read off neighbouring rows, which differ by their signal, too
 };
 
 /// What one gain and offset belong to.

@@ -32,8 +32,6 @@ Image image_by_march(const Scene& scene, const Theta& theta, int threads = 0);
 /// difference over the RMS of the picture; light reflected twice is left out. Throws UserError where there is none.
 double march_error(const Scene& scene, const Theta& theta, int threads = 0);
 
-/// The grids of `before` no longer hold what `now` was made for (wave optics, parts of a disc).
-bool outgrown(const RenderPlan& now, const RenderPlan& before);
 /// A plan that resolves more than the one a solver worked with, or resolves it elsewhere.
 bool asks_for_more(const RenderPlan& now, const RenderPlan& before);
 /// The light is read from a table over the radius; else a point of the picture may be a ray of its own.

@@ -10,6 +10,7 @@
 
 #include "birefit/memo.h"
 #include "fit/errors/left_out.h"
+#include "fit/errors/statistics.h"
 #include "fit/zone.h"
 #include "samples/waves/wave.h"
 
@@ -229,13 +230,69 @@ FitResult fit_by_chosen_waves(const FitJob& job) {
   return better;
 }
 
+/// What a table's noise was read off, its neighbouring rows, may differ by far more than noise: where several columns
+/// vary, or one in large steps. Scales such noise to what the model leaves over, where that is clearly less; says
+/// whether it did.
+bool lower_noise_of_rows(const FitResult& result, FitJob& job, std::vector<std::string>& words) {
+  struct Table {
+    Readings* readings;
+    double chi_square = 0, rows = 0;
+  };
+  std::vector<Table> tables;
+  double rows = 0;
+  std::size_t frame = 0;
+  for (Measurement& measurement : job.measurements) {
+    Readings* readings = std::get_if<Readings>(&measurement);
+    Table table{readings};
+    for (std::size_t i = 0; i < (readings ? readings->rows.size() : 1) && frame < result.micrographs.size(); ++i) {
+      const MicrographResult& m = result.micrographs[frame++];
+      table.chi_square += m.chi_square, table.rows += m.used;
+    }
+    rows += table.rows;
+    if (readings && readings->noise && readings->noise_at_most) tables.push_back(table);
+  }
+  const double free = rows - static_cast<double>(result.parameters.size());
+  bool lower = false;
+  for (const Table& table : tables) {
+    constexpr double kClearly = 0.5, kByChance = 1e-3, kRounding = 1e-6;
+    const double own = table.rows * free / rows;  // degrees of freedom
+    double& noise = table.readings->noise->read_counts;
+    const double least = kRounding * table.readings->values.cwiseAbs().maxCoeff();
+    if (!(own >= 1) || !(noise > 2 * least) || table.chi_square > kClearly * own ||
+        table.chi_square > chi_square_quantile(kByChance, own))
+      continue;
+    noise = std::max(least, noise * std::sqrt(table.chi_square / own));
+    lower = true;
+    words.push_back(
+        fmt::format("{}: neighbouring rows differ by more than noise, which is taken from what the model "
+                    "leaves over, {:.3g}: chi-square does not tell whether the model is right.",
+                    table.readings->name, noise));
+  }
+  return lower;
+}
+
+FitResult fit_by_settled_noise(const FitJob& job) {
+  FitResult result = fit_by_chosen_waves(job);
+  FitJob again = job;
+  constexpr int kRounds = 3;  // the first may have ended in another valley
+  for (int round = 0; round < kRounds && !result.interrupted; ++round) {
+    std::vector<std::string> words;
+    if (!lower_noise_of_rows(result, again, words)) break;
+    FitResult better = fit_by_chosen_waves(again);
+    add_effort(better, result);
+    result = std::move(better);
+    result.warnings.insert(result.warnings.end(), words.begin(), words.end());
+  }
+  return result;
+}
+
 }  // namespace
 
 FitResult fit(const FitJob& job) {
-  if (job.demand.memo) return fit_following_zones(job, fit_by_chosen_waves);
+  if (job.demand.memo) return fit_following_zones(job, fit_by_settled_noise);
   FitJob remembering = job;
   remembering.demand.memo = std::make_shared<Memo>();
-  return fit_following_zones(remembering, fit_by_chosen_waves);
+  return fit_following_zones(remembering, fit_by_settled_noise);
 }
 
 }  // namespace birefit

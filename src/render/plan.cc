@@ -185,6 +185,9 @@ RenderPlan plan(const Scene& scene, const Demand& asked, const Theta& theta, con
   return with_directions(std::move(result));
 }
 
+namespace {
+
+/// The grids of `before` no longer hold what `now` was made for (wave optics, parts of a disc).
 bool outgrown(const RenderPlan& now, const RenderPlan& before) {
   if (now.means.edge_points > before.means.edge_points || now.means.defect_points > before.means.defect_points)
     return true;
@@ -195,6 +198,8 @@ bool outgrown(const RenderPlan& now, const RenderPlan& before) {
   // The pupil's grid ends 5 % beyond the aperture that it was made for.
   return ratio > 1.04 || ratio < 0.8 || now.wave->objective_na > 1.04 * before.wave->objective_na;
 }
+
+}  // namespace
 
 bool asks_for_more(const RenderPlan& now, const RenderPlan& before) {
   const PixelMeans &means = now.means, &had = before.means;

@@ -41,7 +41,7 @@ struct SampleChoices {
 const SampleChoices& choices(const RenderPlan& plan);
 SampleChoices& choices(RenderPlan& plan);
 
-/// A table of `now` is finer than that of `before`; squares of a disc are compared by outgrown() (birefit/render.h).
+/// A table of `now` is finer than that of `before`; squares of a disc are compared by outgrown_disc().
 bool has_finer_tables(const SampleChoices& now, const SampleChoices& before);
 
 }  // namespace birefit

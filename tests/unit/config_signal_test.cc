@@ -1,6 +1,8 @@
 // What load_config makes of tables of signals, and where it says they are wrong.
 
 #include <cmath>
+#include <complex>
+#include <random>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -73,6 +75,56 @@ microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: )" +
   EXPECT_EQ(known_to("0"), 1);
   EXPECT_EQ(known_to("{value: 0, exact: true}"), 0);
   EXPECT_EQ(known_to("{value: 0, prior_sd: 0.2}"), 0.2);
+}
+
+// Polarizer and analyser turned to angles in no order: neighbouring rows have nothing to do with each other, and what
+// they differ by is no noise. Truth: Malus's law of a retarder, by hand.
+TEST_F(ConfigSignal, TheNoiseOfATableOfSeveralColumnsIsWhatTheModelLeavesOver) {
+  constexpr int kTables = 12, kRows = 40;
+  constexpr double kNoise = 4, kThicknessUm = 5, kWavelengthUm = 0.55;
+  int inside = 0;
+  for (unsigned seed = 1; seed <= kTables; ++seed) {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> angle(0, 180);
+    std::normal_distribution<double> noise(0, kNoise);
+    const double azimuth = angle(random) / 4 + 22.5, birefringence = 0.118 + angle(random) / 180 * 0.02;
+    std::string rows = "polarizer,analyser,signal\n";
+    for (int i = 0; i < kRows; ++i) {
+      const double polarizer = angle(random), analyser = angle(random), deg = M_PI / 180,
+                   p = (polarizer - azimuth) * deg, a = (analyser - azimuth) * deg;
+      const std::complex<double> turned =
+          std::cos(p) * std::cos(a) +
+          std::sin(p) * std::sin(a) * std::polar(1.0, 2 * M_PI * kThicknessUm * birefringence / kWavelengthUm);
+      rows += std::to_string(polarizer) + "," + std::to_string(analyser) + "," +
+              std::to_string(50 + 1000 * std::norm(turned) + noise(random)) + "\n";
+    }
+    write("turned.csv", rows);
+    const auto config = load(R"(signal:
+  file: turned.csv
+  value: signal
+  columns: {microscope.polarizer_deg: polarizer, microscope.analyzer_deg: analyser}
+micrograph: {gain: {fit: auto}, offset: {fit: auto}}
+sample:
+  cell: {thickness_um: {value: 5, exact: true}, director: {uniform: {azimuth_deg: {value: 45, fit: [10, 80]}}}}
+  material: {ordinary: 1.5, birefringence: {value: 0.125, fit: [0.113, 0.15]}}
+  surround: {index: 1.5}
+microscope: {light: {wavelength_nm: {value: 550, exact: true}}}
+physics: {ceiling: e_only}
+)",
+                             ConfigUse::fit);
+    const FitResult result = fit(config.job);
+    ASSERT_TRUE(result.has_answer()) << seed << ": " << result.verdict;
+    for (const auto& [name, truth] : {std::pair("azimuth_deg", azimuth), {"birefringence", birefringence}})
+      for (const ParameterEstimate& e : result.parameters)
+        if (e.name.ends_with(name)) {
+          inside += e.interval95_low <= truth && truth <= e.interval95_high;
+          // sqrt(2 / 36): how well 36 degrees of freedom know it; the light is known to 0.3 % beside it.
+          if (e.name.ends_with("birefringence")) EXPECT_LT(e.stderr_, 0.003 * e.value) << seed;
+        }
+    EXPECT_NEAR(result.micrographs[0].noise.read_counts / kNoise, 1, 4 * std::sqrt(0.5 / 36)) << seed;
+  }
+  // 19 in 20 of 24, and three sd of that many.
+  EXPECT_GE(inside, 24 * 0.95 - 3 * std::sqrt(24 * 0.95 * 0.05));
 }
 
 TEST_F(ConfigSignal, SaysWhereASignalIsWrong) {

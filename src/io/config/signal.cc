@@ -368,6 +368,7 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
   readings.observable.quantity = item.quantity;
   readings.gain = base.gain, readings.offset = base.offset;
   readings.noise = noise;
+  readings.noise_at_most = !item.noise;
   std::vector<double> values;
   // In the order of the first column: what neighbouring rows share is told from their order.
   std::vector<std::size_t> order(rows.size());

@@ -85,7 +85,7 @@ class DiscMap {
   std::vector<int> at_;
 };
 
-/// See outgrown() of birefit/render.h.
+/// The parts of `before` no longer hold what `now` was made for.
 inline bool outgrown_disc(const std::vector<DiscSquare>& now, const std::vector<DiscSquare>& before) {
   if (now.empty() || before.empty()) return now.empty() != before.empty();
   for (const bool of_core : {false, true}) {
