@@ -224,3 +224,13 @@ def test_what_follows_from_a_limit_is_not_known(droplet):
             break
     else:
         pytest.fail("no limit in four pictures of nothing")
+
+
+def test_what_is_at_an_extremum_has_errors_all_the_same(droplet, photograph):
+    """To first order a square is exact at 0; of a wavelength known to 0.3 % it is a chi-square of one degree of freedom."""
+    droplet["report"] = {"square": "(microscope.light.wavelength_nm / nm - 590) ^ 2"}
+    found = birefit.Job(droplet, image=photograph).fit().to_dict()["derived"][0]
+    variance = (0.003 * 590) ** 2
+    # 4000 draws know its quantiles at 68 and 97.5 % to 3 and 5 %.
+    assert found["value"] == 0 and found["stderr"] == pytest.approx(variance, rel=0.12)
+    assert found["interval_95"] == [0, pytest.approx(5.02 * variance, rel=0.2)]

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
+#include <optional>
+#include <random>
 #include <utility>
 
 #include "birefit/expression.h"
@@ -38,7 +41,8 @@ bool all_known(const Task& task, const FitResult& result, const Tie& tie) {
 Owed owed(const Task& task, const Covariances& covariances, const FitResult& result,
           const std::vector<TieSlope>& slopes, const ValueAt& value_at) {
   const Stated& stated = covariances.stated;
-  Owed owed{Eigen::VectorXd::Zero(task.unknowns.size())};
+  Owed owed;
+  owed.by = Eigen::VectorXd::Zero(task.unknowns.size());
   double alone = 0;  // what nothing fitted depends on
   for (const TieSlope& slope : slopes) {
     bool found = false;
@@ -66,11 +70,100 @@ Owed owed(const Task& task, const Covariances& covariances, const FitResult& res
   return owed;
 }
 
+/// What a tie follows from and nothing fitted depends on, and how well it is known: entry, sd. A slope of 0 counts.
+std::vector<std::pair<int, double>> known_alone(const Task& task, const Stated& stated, const Tie& tie) {
+  std::map<int, double> alone;
+  for (const int of : tie.of)
+    for (const int root : task.job.parameters.roots(of)) {
+      const Parameter& parameter = task.job.parameters[root];
+      bool found = std::find(stated.index.begin(), stated.index.end(), root) != stated.index.end();
+      for (int j = 0; j < task.unknowns.size() && !found; ++j) found = task.unknowns.table_index(j) == root;
+      if (const double sd = parameter.known_to.of(parameter.value); !found && sd > 0) alone[root] = sd;
+    }
+  return {alone.begin(), alone.end()};
+}
+
+/// What the numbers may as well be: draws from their normal distribution, for what is not straight over their errors
+/// (at an extremum the first order is nothing at all).
+class Draws {
+ public:
+  Draws(const Task& task, const Covariances& covariances, const FitResult& result)
+      : task_(task), count_(task.job.parameters.tied().size() > kManyTies ? kFew : kMany) {
+    const Stated& stated = covariances.stated;
+    const bool shifts = stated.shift.size() > 0;
+    Eigen::MatrixXd apart = result.covariance;
+    if (shifts) apart -= stated.shift * stated.shift.transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(apart);
+    const Eigen::MatrixXd root = of.eigenvectors() * of.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    std::normal_distribution<double> normal;
+    for (int k = 0; k < count_; ++k) {
+      Theta theta = result.theta;
+      Eigen::VectorXd z(task.unknowns.size());
+      for (double& one : z) one = normal(random_);
+      Eigen::VectorXd moved = root * z;
+      for (Eigen::Index i = 0; i < stated.sd.size() && shifts; ++i) {
+        const double by = normal(random_);
+        theta[static_cast<std::size_t>(stated.index[static_cast<std::size_t>(i)])] += by * stated.sd[i];
+        moved += by * stated.shift.col(i);
+      }
+      for (int j = 0; j < task.unknowns.size(); ++j) {
+        const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
+        double& value = theta[static_cast<std::size_t>(task.unknowns.table_index(j))];
+        value = std::clamp(value + moved[j], std::min(p.lower, value), std::max(p.upper, value));
+      }
+      task.job.parameters.follow(theta);
+      thetas_.push_back(std::move(theta));
+    }
+  }
+  /// Deviations of a number from `value`, sorted. `alone`: what nothing fitted depends on, and how well it is known.
+  std::vector<double> deviations(const ValueAt& value_at, double value,
+                                 const std::vector<std::pair<int, double>>& alone) {
+    std::vector<double> all;
+    std::normal_distribution<double> normal;
+    for (const Theta& drawn : thetas_) {
+      Theta theta = drawn;
+      for (const auto& [index, sd] : alone) theta[static_cast<std::size_t>(index)] += sd * normal(random_);
+      if (!alone.empty()) task_.job.parameters.follow(theta);
+      if (const double by = value_at(theta) - value; std::isfinite(by)) all.push_back(by);
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+
+ private:
+  static constexpr std::size_t kManyTies = 50;
+  static constexpr int kMany = 4000, kFew = 1000;
+  const Task& task_;
+  const int count_;
+  std::mt19937_64 random_{20231};
+  std::vector<Theta> thetas_;
+};
+
+double quantile(const std::vector<double>& sorted, double q) {
+  return sorted[static_cast<std::size_t>(std::lround(q * static_cast<double>(sorted.size() - 1)))];
+}
+
+/// Errors by draws, where these spread clearly farther than to first order. `half`: of the interval to first order.
+void widen_to_draws(const std::vector<double>& deviations, double half, DerivedEstimate& estimate) {
+  constexpr std::size_t kEnough = 500;
+  constexpr double kOne = 0.6827, kSpread = 1.1, kReach = 1.15;  // beyond what so many draws scatter by
+  if (deviations.size() < kEnough) return;
+  std::vector<double> sizes;
+  for (const double by : deviations) sizes.push_back(std::abs(by));
+  std::sort(sizes.begin(), sizes.end());
+  const double spread = quantile(sizes, kOne);
+  if (!(spread > kSpread * estimate.stderr_) && !(quantile(sizes, 0.95) > kReach * half)) return;
+  estimate.stderr_ = std::max(estimate.stderr_, spread);
+  estimate.interval95_low = estimate.value + std::min(0.0, quantile(deviations, 0.025));
+  estimate.interval95_high = estimate.value + std::max(0.0, quantile(deviations, 0.975));
+}
+
 }  // namespace
 
 void report_derived(const Task& task, const Covariances& covariances, FitResult& result) {
   const ParameterTable& table = task.job.parameters;
   const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom), normal = normal_quantile(0.975);
+  std::optional<Draws> draws;
   const auto add = [&](const std::string& name, const std::string& unit, const Tie& tie, bool tied, double value,
                        const std::vector<TieSlope>& slopes, const ValueAt& value_at) {
     const Owed of = owed(task, covariances, result, slopes, value_at);
@@ -85,6 +178,10 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
     const double reach = std::isfinite(estimate.stderr_) ? half : estimate.stderr_;
     estimate.interval95_low = value - reach;
     estimate.interval95_high = value + reach;
+    if (std::isfinite(estimate.stderr_) && std::isfinite(half) && !result.interrupted) {
+      if (!draws) draws.emplace(task, covariances, result);
+      widen_to_draws(draws->deviations(value_at, value, known_alone(task, covariances.stated, tie)), half, estimate);
+    }
     // Of one fitted number alone: what that number's own interval says, which need not be symmetric.
     for (int j = 0; j < task.unknowns.size() && slopes.size() == 1 && of.by_stated == 0; ++j) {
       const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
