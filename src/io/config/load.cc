@@ -322,6 +322,9 @@ void Loading::note_taken_as_exact() {
   if (sample && sample->is_map() && !sample->find("surround") && reader_.specs.count("sample.surround.index"))
     config_.job.taken_as_exact.push_back(
         "sample.surround is not given: air, an index of 1.0, is taken around the sample.");
+  if (!tables_.empty() && quantity_ != Quantity::intensity && !reader_.table[tables_[0].gain].free)
+    config_.job.taken_as_exact.push_back(
+        "the scale of the table's values: an instrument that drifts along its rows looks like a law of the material.");
   if (std::holds_alternative<Droplet>(config_.scene.sample) && !config_.scene.microscope.objective_na)
     config_.job.taken_as_exact.push_back(
         "microscope.objective_na is not given: every ray that leaves the droplet is "
