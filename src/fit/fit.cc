@@ -133,10 +133,28 @@ std::unique_ptr<Refit> with_all_departures(const Task& task, const Optimum& opti
   return wider;
 }
 
+/// Without specks, of any sample in any number of pictures, where they are most of what is left over.
+std::unique_ptr<Refit> without_specks(const Task& task, const Optimum& optimum, const Minima& minima) {
+  if (!are_specks_most(task, optimum)) return nullptr;
+  task.say("specks are most of what is left over: once more without them");
+  FitJob job = task.job;
+  job.options.leave_out_outliers = true;
+  auto fitted = std::make_unique<Refit>(std::move(job));
+  fitted->optimum = settle(fitted->task, best_with_nuisances(fitted->task, task, optimum, minima));
+  if (fitted->optimum.stopped || !is_worth_leaving_out(excess_of(optimum), excess_of(fitted->optimum))) return nullptr;
+  return fitted;
+}
+
 /// Where something is left over, its causes are asked for; where these do not explain all of it, what is foreign to the
 /// object is left out and the rest asked again. `minima` are of this task.
 Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
-  if (beaten || !asks_catalogue(task, optimum)) return concluded(task, minima, std::move(optimum), beaten);
+  if (beaten || optimum.stopped) return concluded(task, minima, std::move(optimum), beaten);
+  if (!asks_catalogue(task, optimum)) {
+    const std::unique_ptr<Refit> less = without_specks(task, optimum, minima);
+    if (!less) return concluded(task, minima, std::move(optimum), false);
+    const Minima places = widened(less->task, task, less->optimum.theta, minima);
+    return concluded(less->task, places, std::move(less->optimum), false);
+  }
   std::unique_ptr<Refit> last = with_all_departures(task, optimum, minima), less;
   if (!last || leaves_discrepancy(last->task, last->optimum)) {
     less = without_foreign(task, optimum, minima);

@@ -16,9 +16,9 @@ constexpr double kShare = 0.2;
 
 /// Of pixels that `belongs(x, y)` chooses: how many, and chi-square beyond theirs.
 template <class Belongs>
-std::pair<double, double> theirs(const Optimum& optimum, const Belongs& belongs) {
-  const PixelSet& set = optimum.problem->pixels(0);
-  const Eigen::VectorXd residual = optimum.problem->noise_whitened_residual(0);
+std::pair<double, double> theirs(const Optimum& optimum, const Belongs& belongs, std::size_t frame = 0) {
+  const PixelSet& set = optimum.problem->pixels(frame);
+  const Eigen::VectorXd residual = optimum.problem->noise_whitened_residual(frame);
   double count = 0, excess = 0;
   for (std::size_t i = 0; i < set.pixels.size(); ++i)
     if (belongs(set.pixels[i][0], set.pixels[i][1])) {
@@ -31,11 +31,39 @@ std::pair<double, double> theirs(const Optimum& optimum, const Belongs& belongs)
 }  // namespace
 
 double excess_of(const Optimum& optimum) {
-  return theirs(optimum, [](int, int) { return true; }).second;
+  double excess = 0;
+  for (std::size_t g = 0; g < optimum.frames.size(); ++g)
+    excess += theirs(
+                  optimum, [](int, int) { return true; }, g)
+                  .second;
+  return excess;
 }
 
 bool is_worth_leaving_out(double excess_before, double excess_after) {
   return excess_after < (1 - kShare) * excess_before;
+}
+
+bool are_specks_most(const Task& task, const Optimum& optimum) {
+  // What a model leaves over without them is no less than noise; and so little would widen no interval.
+  constexpr double kMost = 0.5, kMatters = 0.2;
+  if (task.job.options.leave_out_outliers || !is_asked(task.job.options, "specks") || are_rows(optimum.frames))
+    return false;
+  double all = 0, excess = 0, of_specks = 0;
+  for (int g = 0; g < task.frames(); ++g) {
+    const auto frame = static_cast<std::size_t>(g);
+    const auto [pixels, beyond] = theirs(
+        optimum, [](int, int) { return true; }, frame);
+    all += pixels, excess += beyond;
+  }
+  if (!(excess > kMatters * all)) return false;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Outliers specks = outliers_of(task, optimum, g);
+    const auto frame = static_cast<std::size_t>(g);
+    const auto [count, beyond] = theirs(
+        optimum, [&](int x, int y) { return specks.pixels(x, y) != 0; }, frame);
+    if (count < kMostOutliers * static_cast<double>(optimum.problem->pixels(frame).pixels.size())) of_specks += beyond;
+  }
+  return of_specks > kMost * excess;
 }
 
 std::vector<FitJob> narrower_jobs(const Task& task, const Optimum& optimum) {
