@@ -143,8 +143,23 @@ double quantile(const std::vector<double>& sorted, double q) {
   return sorted[static_cast<std::size_t>(std::lround(q * static_cast<double>(sorted.size() - 1)))];
 }
 
+/// What the parts of a number would make of its error one by one, to first order.
+double error_of_parts(const Task& task, const FitResult& result, const std::vector<TieSlope>& slopes) {
+  double squares = 0;
+  for (const TieSlope& slope : slopes) {
+    const Parameter& parameter = task.job.parameters[slope.index];
+    double sd = parameter.known_to.of(parameter.value);
+    for (int j = 0; j < task.unknowns.size(); ++j)
+      if (task.unknowns.table_index(j) == slope.index) sd = std::sqrt(result.covariance(j, j));
+    squares += std::pow(slope.by * sd, 2);
+  }
+  return std::sqrt(squares);
+}
+
 /// Errors by draws, where these spread clearly farther than to first order. `half`: of the interval to first order.
-void widen_to_draws(const std::vector<double>& deviations, double half, DerivedEstimate& estimate) {
+/// `parts`: where parts make up for each other (a thickness and a birefringence, of which the picture knows the
+/// product), the little that is left is not for draws to say: they go straight on where the valley bends.
+void widen_to_draws(const std::vector<double>& deviations, double half, double parts, DerivedEstimate& estimate) {
   constexpr std::size_t kEnough = 500;
   constexpr double kOne = 0.6827, kSpread = 1.1, kReach = 1.15;  // beyond what so many draws scatter by
   if (deviations.size() < kEnough) return;
@@ -152,6 +167,8 @@ void widen_to_draws(const std::vector<double>& deviations, double half, DerivedE
   for (const double by : deviations) sizes.push_back(std::abs(by));
   std::sort(sizes.begin(), sizes.end());
   const double spread = quantile(sizes, kOne);
+  constexpr double kLittle = 0.2;
+  if (spread < kLittle * parts) return;
   if (!(spread > kSpread * estimate.stderr_) && !(quantile(sizes, 0.95) > kReach * half)) return;
   estimate.stderr_ = std::max(estimate.stderr_, spread);
   estimate.interval95_low = estimate.value + std::min(0.0, quantile(deviations, 0.025));
@@ -180,7 +197,8 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
     estimate.interval95_high = value + reach;
     if (std::isfinite(estimate.stderr_) && std::isfinite(half) && !result.interrupted) {
       if (!draws) draws.emplace(task, covariances, result);
-      widen_to_draws(draws->deviations(value_at, value, known_alone(task, covariances.stated, tie)), half, estimate);
+      widen_to_draws(draws->deviations(value_at, value, known_alone(task, covariances.stated, tie)), half,
+                     error_of_parts(task, result, slopes), estimate);
     }
     // Of one fitted number alone: what that number's own interval says, which need not be symmetric.
     for (int j = 0; j < task.unknowns.size() && slopes.size() == 1 && of.by_stated == 0; ++j) {
