@@ -234,3 +234,12 @@ def test_what_is_at_an_extremum_has_errors_all_the_same(droplet, photograph):
     # 4000 draws know its quantiles at 68 and 97.5 % to 3 and 5 %.
     assert found["value"] == 0 and found["stderr"] == pytest.approx(variance, rel=0.12)
     assert found["interval_95"] == [0, pytest.approx(5.02 * variance, rel=0.2)]
+
+
+def test_units_of_counts_do_not_matter_to_what_follows(droplet, photograph):
+    """A camera that counts a million times as many has the same birefringence, and what follows from it."""
+    droplet["report"] = {"same": "2 * sample.material.birefringence"}
+    droplet["micrograph"]["noise"]["read_counts"] = 4e7
+    result = birefit.Job(droplet, image=1e7 * photograph).fit()
+    found = result.to_dict()["derived"][0]
+    assert found["stderr"] == pytest.approx(2 * result.stderr["sample.material.birefringence"], rel=1e-3)

@@ -93,8 +93,12 @@ class Draws {
     const bool shifts = stated.shift.size() > 0;
     Eigen::MatrixXd apart = result.covariance;
     if (shifts) apart -= stated.shift * stated.shift.transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(apart);
-    const Eigen::MatrixXd root = of.eigenvectors() * of.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    // In units of each one's error: counts and indices beside each other would drown in rounding.
+    const Eigen::VectorXd sd = result.covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(sd.cwiseInverse().asDiagonal() * apart *
+                                                            sd.cwiseInverse().asDiagonal());
+    const Eigen::MatrixXd root =
+        sd.asDiagonal() * of.eigenvectors() * of.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
     std::normal_distribution<double> normal;
     for (int k = 0; k < count_; ++k) {
       Theta theta = result.theta;
