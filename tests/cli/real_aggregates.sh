@@ -2,22 +2,12 @@
 # Micrographs from which no birefringence follows: crystal aggregates of unknown material, thickness, wavelength and camera, clipped in
 # parts. Whatever a user takes them for, there must be no answer (exit code 1), or the data are refused (2).
 # usage: real_aggregates.sh BIREFIT SOURCE_DIR      BIREFIT_REAL_DATA = the folder of tools/fetch_real, default out/real
-set -u
-birefit=$(realpath "$1")
-source=$(realpath "$2")
-data=$(realpath -m "${BIREFIT_REAL_DATA:-$source/out/real}")
-if [ ! -f "$data/crystal_aggregates/sample_1.tif" ]; then
-  echo "skipped: no crystal aggregates at $data: tools/fetch_real fetches them"
-  exit 77
-fi
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failures=0
+# shellcheck source=../support/real_data.sh
+source "$2/tests/support/real_data.sh" "$1" "$2" crystal_aggregates sample_1.tif 'crystal aggregates (tools/fetch_real fetches them)'
 # refuse IMAGE ROI WHAT EXIT_CODE WORDS, the sample on standard input: one of the words must be said
 refuse() {
   {
-    printf 'micrograph:\n  image: %s/crystal_aggregates/%s\n  channel: g\n  roi_px: %s\n  pixel_size_um: 0.32\n  saturation_counts: 255\n' "$data" "$1" "$2"
+    printf 'micrograph:\n  image: %s/%s\n  channel: g\n  roi_px: %s\n  pixel_size_um: 0.32\n  saturation_counts: 255\n' "$data" "$1" "$2"
     printf '  gain: {fit: auto}\n  offset: {fit: auto}\n'
     printf 'microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}\n'
     cat
