@@ -366,6 +366,40 @@ TEST(ScanInAFit, KeepsMinimaThatLieWithinAStep) {
   for (const int problem : {45, 538}) EXPECT_EQ(solve(family("TwistedCell"), 1, problem).undecided, 1) << problem;
 }
 
+// Of small droplets pictures know diameter times birefringence a hundred times better than either: the solver goes
+// along a bent valley, and ends where a step gains next to nothing of chi-square. All that may be left of the way, a
+// hundred such steps, is a thirtieth of a standard error.
+TEST(SolverInAFit, EndsWhereAFitFromThereEnds) {
+  const Family small{
+      "Small", [](RandomProblem& p) {
+        Scene s = seen(p, 40, 0.08);
+        s.view.center_x_px = p.anywhere("center_x", 18, 22);
+        s.view.center_y_px = p.anywhere("center_y", 18, 22);
+        Droplet sample;
+        sample.diameter_um = p.anywhere("diameter_um", 1.2, 2.6);
+        s.sample = sample;
+        s.material = ConstantIndices{p.b.fixed("ordinary", 1.52), p.anywhere("birefringence", 0.03, 0.2)};
+        s.surround_index = p.b.fixed("surround", 1.5);
+        p.least_noise = 0.02;
+        p.scenes.push_back(s);
+      }};
+  int compared = 0;
+  for (int number = 1; number <= 8; ++number) {
+    RandomProblem p = draw(small, number);
+    Posed posed = pose(p, small.name);
+    const FitResult first = fit(posed.job);
+    for (int k = 0; k < posed.job.parameters.size(); ++k)
+      posed.job.parameters[k].value = first.theta[static_cast<std::size_t>(k)];
+    const FitResult again = fit(posed.job);
+    for (const ParameterEstimate& e : first.parameters) {
+      if (e.linear || e.at_bound || !std::isfinite(e.stderr_)) continue;
+      EXPECT_NEAR(find_estimate(again, e.name)->value, e.value, 0.03 * e.stderr_) << number << " " << e.name;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 20);
+}
+
 class LongGlobalSearch : public GlobalSearch {};
 TEST_P(LongGlobalSearch, IsNeverConfidentlyWrong) {
   const Count count = solve(GetParam(), problems_or(GetParam().many), first_problem());

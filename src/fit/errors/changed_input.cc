@@ -17,10 +17,13 @@ class ChangedInput {
     std::vector<PixelSet> sets;
     std::size_t all = 0;
     for (const Frame& frame : optimum.frames) all += frame.pixels.size();
+    all_ = static_cast<double>(all);
+    const Frames frames = as_rough_as_they_may_be(task, optimum);
     for (int g = 0; g < task.frames(); ++g) {
-      const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
-      const std::size_t share = std::max<std::size_t>(1, kPixels * frame.pixels.size() / std::max<std::size_t>(all, 1));
-      const Image picture = fitted_image(task, optimum.frames, g, optimum.theta);
+      const Frame& frame = frames[static_cast<std::size_t>(g)];
+      const std::size_t most = has_own_rays(task, frame, g) ? kPixelsOfOwnRays : kPixels,
+                        share = std::max<std::size_t>(1, most * frame.pixels.size() / std::max<std::size_t>(all, 1));
+      const Image picture = fitted_image(task, frames, g, optimum.theta);
       PixelSet set = pixel_set(task.picture(g), frame.sigma, subsample(frame.pixels, share));
       for (std::size_t i = 0; i < set.pixels.size(); ++i)
         set.value[static_cast<Eigen::Index>(i)] = picture(set.pixels[i][0], set.pixels[i][1]);
@@ -41,6 +44,7 @@ class ChangedInput {
     SolveOptions few;
     few.max_iterations = 15;
     few.function_tolerance = 1e-6;
+    few.least_gain = 1e-3 * static_cast<double>(problem_->pixel_rows()) / all_;  // a thirtieth of a standard error
     few.interrupted = task.job.options.interrupted;
     problem_->solve(searched, few);
     Eigen::VectorXd change(linear.size());
@@ -58,11 +62,26 @@ class ChangedInput {
     return job;
   }
 
-  static constexpr std::size_t kPixels = 4000;  // as of a scan
+  /// Both pictures, with the input and without, are made alike: what a plan is off by cancels.
+  static Frames as_rough_as_they_may_be(const Task& task, const Optimum& optimum) {
+    constexpr double kRough = 3e-3;
+    Frames frames = optimum.frames;
+    Demand demand = task.job.demand;
+    demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
+    for (int g = 0; g < task.frames(); ++g) {
+      Frame& frame = frames[static_cast<std::size_t>(g)];
+      if (has_own_rays(task, frame, g)) frame.plan = plan(task.picture(g).scene, demand, optimum.theta);
+    }
+    return frames;
+  }
+
+  // As of a scan. There is no noise in them that many would average.
+  static constexpr std::size_t kPixels = 4000, kPixelsOfOwnRays = 600;
   const Optimum& optimum_;
   FitJob job_;
   Task task_;
   std::unique_ptr<LeastSquares> problem_;
+  double all_ = 1;  ///< pixels of the fit
 };
 
 }  // namespace

@@ -33,6 +33,7 @@ struct Misfit {
 struct SolveOptions {
   int max_iterations = 100;
   double function_tolerance = 1e-12;  ///< relative change of the objective
+  double least_gain = 0;              ///< of chi-square, that a step has to be worth for another to follow
   int held = -1;                      ///< a searched unknown that stays where it is
   const std::atomic<bool>* interrupted = nullptr;
   std::function<void(const std::string&)> progress;

@@ -98,9 +98,17 @@ class Watch : public ceres::IterationCallback {
       stopped = true;
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     }
+    // Along a bent valley steps go on for hundreds, each for a millionth of a unit: the valley's floor is level there.
+    // At a minimum that rounding has roughened no step succeeds, and none of them promises more.
+    const double gain = 2 * summary.cost_change, promised = gain / summary.relative_decrease;
+    if (summary.iteration > 0 && summary.step_is_valid &&
+        (summary.step_is_successful ? gain : promised) < options_.least_gain) {
+      settled = true;
+      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    }
     return ceres::SOLVER_CONTINUE;
   }
-  bool stopped = false;
+  bool stopped = false, settled = false;
 
  private:
   const SolveOptions& options_;
@@ -160,7 +168,7 @@ SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& 
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   if (summary.termination_type == ceres::FAILURE && evaluation.failure) std::rethrow_exception(evaluation.failure);
-  result.converged = summary.termination_type == ceres::CONVERGENCE;
+  result.converged = summary.termination_type == ceres::CONVERGENCE || watch.settled;
   result.interrupted = watch.stopped;
   result.report = summary.FullReport();
   searched = scaling.to_theta(x.data());

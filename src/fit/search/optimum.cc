@@ -16,6 +16,9 @@ SolveSummary solve(const Task& task, Optimum& optimum, Eigen::VectorXd& searched
   options.label = label;
   // Propagation takes a tenth of a second and more an image: to a thousandth of a chi-square unit, not to rounding.
   if (by_waves(optimum.frames)) options.function_tolerance = 3e-8;
+  // A valley is level where a step gains so little: a hundred of them are a thirtieth of a standard error.
+  constexpr double kLevel = 1e-5;
+  options.least_gain = kLevel * std::max(1.0, optimum.per_pixel);
   // Of what is not described, to a thirtieth of the unit that its misfit makes of chi-square.
   constexpr double kMissed = 4, kOfUnit = 3e-2;
   const double rows = static_cast<double>(optimum.problem->pixel_rows());

@@ -108,23 +108,25 @@ std::vector<Axis> fine_axes_of(const Task& task, const std::vector<PicturePhase>
   return axes;
 }
 
-/// Solves from every start, a few steps for all and the rest for those that may still be the best, and adds the minima
-/// found to the result. What is the `same` as a minimum that is known is left out; of starts that lead to places near
-/// by the best goes on before others do, and the rest after all others: minima may lie as close. Either may be empty.
-/// Returns the lowest objective.
-double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& options,
+/// Solves from every start, a few steps at a glance for all and the rest for those that may still be the best, and adds
+/// the minima found to the result. What is the `same` as a minimum that is known is left out; of starts that lead to
+/// places near by the best goes on before others do, and the rest after all others: minima may lie as close. Those that
+/// have `arrived` at one place, at a glance, go on as one. `same` and `near_by` may be empty. Returns the lowest
+/// objective.
+double polish_into(ScanResult& result, LeastSquares& glance, LeastSquares& problem, const FitOptions& options,
                    std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists, int steps,
-                   double hopeless_above, const SameMinimum& same, const SameMinimum& near_by) {
+                   double hopeless_above, const SameMinimum& same, const SameMinimum& near_by,
+                   const SameMinimum& arrived) {
   const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
   SolveOptions polish;
   polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
   polish.interrupted = options.interrupted;
-  const auto walk = [&](int iterations) {
+  const auto walk = [&](LeastSquares& by, int iterations) {
     polish.max_iterations = iterations;
     for (auto& [objective, x] : starts) {
       if (result.interrupted) return;
-      result.interrupted = problem.solve(x, polish).interrupted;
-      objective = std::isfinite(problem.objective()) ? problem.objective() : std::numeric_limits<double>::infinity();
+      result.interrupted = by.solve(x, polish).interrupted;
+      objective = std::isfinite(by.objective()) ? by.objective() : std::numeric_limits<double>::infinity();
     }
     std::stable_sort(starts.begin(), starts.end(), by_objective);
   };
@@ -132,7 +134,7 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
   // where few numbers tell all.
   constexpr double kHopeless = 4, kReach = 60;
   if (starts.size() > finalists + 1) {
-    walk(kFirstSteps);
+    walk(glance, kFirstSteps);
     // Where most lead into one valley they would leave no room for the others.
     std::vector<std::pair<double, Eigen::VectorXd>> apart, besides;
     for (auto& start : starts)
@@ -145,7 +147,16 @@ double polish_into(ScanResult& result, LeastSquares& problem, const FitOptions& 
     std::move(besides.begin(), besides.end(), std::back_inserter(starts));
     starts.resize(finalists);
   }
-  walk(steps);
+  if (&glance != &problem) {
+    walk(glance, steps);
+    // What has come together goes on as one.
+    std::vector<std::pair<double, Eigen::VectorXd>> apart;
+    for (auto& start : starts)
+      if (std::none_of(apart.begin(), apart.end(), [&](const auto& a) { return arrived(a.second, start.second); }))
+        apart.push_back(std::move(start));
+    starts = std::move(apart);
+  }
+  walk(problem, steps);
   const double best = starts.front().first;
   const bool beaten = best > hopeless_above;
   for (const auto& [objective, from] : starts) {
@@ -379,7 +390,7 @@ Eigen::MatrixXd projected_information(const LeastSquares& problem) {
   return problem.projected_factor(Eigen::VectorXd::Ones(p)).topLeftCorner(p, p);
 }
 
-ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
+ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
                 const std::vector<PicturePhase>& phases, double hopeless_above) {
   ScanResult result;
   const FitOptions& options = task.job.options;
@@ -389,7 +400,7 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
   const std::size_t most = cheap ? kMostPlacesOfCells : kMostPlaces, product = product_of(axes);
   if (product > 0) task.say("scanning for the fringe order");
   Places starts;
-  Survey survey(problem, task, axes, start, result);
+  Survey survey(glance, task, axes, start, result);
   const std::size_t wanted = static_cast<std::size_t>(candidates);
   if (product > 0)
     starts = product <= most ? survey.minima_of_grid(cheap ? kBesideMinima : 0)
@@ -397,6 +408,10 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
   const Effort effort = effort_of(problem, result.points, candidates);
   const SameMinimum near_by = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
     return !axes.empty() && near(axes, a, b);
+  };
+  constexpr double kArrived = 0.1;  // steps of the grid
+  const SameMinimum arrived = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+    return !axes.empty() && near(axes, a, b, kArrived);
   };
   // The most promising, and the user's start whatever the grid says. What describes the image badly is not yet
   // believed: the next ones, then, as long as there are any.
@@ -409,8 +424,8 @@ ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& 
                 starts.begin() + static_cast<std::ptrdiff_t>(last));
     if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
-    best = std::min(best, polish_into(result, problem, options, std::move(some), effort.finalists, kSteps,
-                                      hopeless_above, {}, near_by));
+    best = std::min(best, polish_into(result, glance, problem, options, std::move(some), effort.finalists, kSteps,
+                                      hopeless_above, {}, near_by, arrived));
     // Where pictures cost next to nothing, all of them: minima may be as good as each other.
     if ((best < rows + kDoubtful * std::sqrt(2 * rows) && !cheap) || best > hopeless_above) break;
   }
@@ -447,8 +462,8 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
     throw UserError(Where{}, "wave optics gives no finite picture at the start values, nor where rays would put them",
                     "check the start values and bounds of indices, diameter_um and wavelength_nm");
   const Eigen::VectorXd first = starts.front().second;
-  polish_into(result, problem, job.options, std::move(starts), most, steps, std::numeric_limits<double>::infinity(),
-              same, {});
+  polish_into(result, problem, problem, job.options, std::move(starts), most, steps,
+              std::numeric_limits<double>::infinity(), same, {}, {});
   keep_distinct(result, problem, first);
   return result;
 }

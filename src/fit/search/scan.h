@@ -24,11 +24,12 @@ struct ScanResult {
   bool interrupted = false;
 };
 
-/// `problem` holds the subsample; `start` is the user's. Every unknown along which pictures have several minima is
-/// scanned as finely as they lie (docs/methods.md, "Scan"), on a grid or, where that has too many points, on points
-/// spread over the box of all of them. Minima whose objective stays above `hopeless_above` are not polished further:
-/// another branch has beaten them.
-ScanResult scan(LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
+/// `problem` holds the subsample, `glance` the same or a part of it, more roughly: places, and the first steps from
+/// them, are told by it. `start` is the user's. Every unknown along which pictures have several minima is scanned as
+/// finely as they lie (docs/methods.md, "Scan"), on a grid or, where that has too many points, on points spread over the
+/// box of all of them. Minima whose objective stays above `hopeless_above` are not polished further: another branch has
+/// beaten them.
+ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
                 const std::vector<PicturePhase>& phases, double hopeless_above);
 
 /// The lowest objective at `start` and at a few places spread over what scan() would look at: to compare two starts of

@@ -45,20 +45,23 @@ std::optional<Eigen::VectorXd> start_at_symmetry(const Task& task, const Start& 
   return centred;
 }
 
-bool has_own_rays(const Task& task, const Frame& frame, int g) {
-  return traits_of(task.picture(g).scene).sphere_diameter_um && !has_radial_table(frame.plan) && !frame.plan.wave;
-}
+/// How closely the search looks, all pictures together: at the places of its grid, and where it goes on from the best
+/// of them. They differ where every pixel is rays of its own.
+struct Closeness {
+  double enough = 0;  ///< units of chi-square by which a constant image is off; a wrong order is by a good part of that
+  double fewest = 0;  ///< pixels that lie where the image is not flat, however much of it is background
+  double accuracy = 0;       ///< of the pictures
+  bool edges_alike = false;  ///< the means over pixels at edges and defects are made as roughly as those of others
+};
+// Of hundreds of pixels, each with noise of its own, a third of a percent tells valleys; a percent, where they may be.
+constexpr Closeness kOfAGlance{5000, 25, 1e-2, true}, kOfMinima{20000, 100, 3e-3, false};
 
 /// How many pixels of a frame the search looks at: where every pixel is rays of its own, no more than it takes.
-std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
+std::size_t scanned_pixels(const Task& task, const Frames& frames, int g, const Closeness& close) {
   const std::size_t share =
       static_cast<std::size_t>(std::max(50, task.job.options.scan_pixels / std::max(1, task.frames())));
   const Frame& frame = frames[static_cast<std::size_t>(g)];
-  const bool own_rays = traits_of(task.picture(g).scene).sphere_diameter_um && !has_radial_table(frame.plan);
-  if (!own_rays) return share;
-  // kEnough: units of chi-square by which a constant image is then off; a wrong order is by a good part of that.
-  // kFewest: pixels that lie where the image is not flat, however much of it is background.
-  constexpr double kEnough = 20000, kFewest = 100;
+  if (!has_own_rays(task, frame, g)) return share;
   const Image& values = task.picture(g).values;
   double mean = 0, square = 0, fourth = 0;
   const double n = static_cast<double>(frame.pixels.size());
@@ -69,7 +72,10 @@ std::size_t scanned_pixels(const Task& task, const Frames& frames, int g) {
   }
   if (!(fourth > 0)) return share;
   const double showing = square * square / fourth;  // their share: 1 where all are as far off as each other
-  const double needed = std::max(kFewest / showing, kEnough / std::max(square - 1, 1e-9));
+  constexpr double kFewestOfOne = 10;               // as far as centres and edges are a picture's own
+  const double pictures = std::max(1, task.frames()),
+               needed = std::max(std::max(close.fewest / pictures, kFewestOfOne) / showing,
+                                 close.enough / pictures / std::max(square - 1, 1e-9));
   return needed < static_cast<double>(share) ? static_cast<std::size_t>(needed) : share;
 }
 
@@ -94,32 +100,57 @@ RenderPlan rough_plan(const Task& task, int g, const Theta& theta) {
   demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
   return plan(task.picture(g).scene, demand, theta, task.observable(g));
 }
-/// Of hundreds of pixels, each with noise of its own, that are rays of their own: a third of a percent tells valleys.
-RenderPlan rougher_plan(const Task& task, int g, const Theta& theta) {
-  constexpr double kRough = 3e-3;
+/// Of pixels that are rays of their own.
+RenderPlan rougher_plan(const Task& task, int g, const Theta& theta, const Closeness& close) {
   Demand demand = task.job.demand;
-  demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
-  return plan(task.picture(g).scene, demand, theta);
+  demand.intensity_accuracy = std::max(demand.intensity_accuracy, close.accuracy);
+  RenderPlan rough = plan(task.picture(g).scene, demand, theta);
+  if (close.edges_alike) {
+    std::fill(rough.means.samples.begin(), rough.means.samples.end(), 1);
+    rough.means.edge_points = rough.means.defect_points = 2;
+  }
+  return rough;
 }
 
-/// The problem of what the grid looks at.
-std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, const Theta& theta) {
+/// The problem of what is looked at so closely.
+std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, const Theta& theta,
+                                      const Closeness& close) {
   std::vector<PixelSet> sets;
   std::vector<RenderPlan> plans;
   for (int g = 0; g < task.frames(); ++g) {
     const Picture& micrograph = task.picture(g);
     const Frame& frame = frames[static_cast<std::size_t>(g)];
-    sets.push_back(is_one_number(micrograph)
-                       ? mean_of(micrograph, frame)
-                       : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g))));
+    sets.push_back(
+        is_one_number(micrograph)
+            ? mean_of(micrograph, frame)
+            : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g, close))));
     plans.push_back(is_one_number(micrograph)      ? rough_plan(task, g, theta)
-                    : has_own_rays(task, frame, g) ? rougher_plan(task, g, theta)
+                    : has_own_rays(task, frame, g) ? rougher_plan(task, g, theta, close)
                                                    : frame.plan);
   }
   auto problem = std::make_unique<LeastSquares>(task, std::move(plans), std::move(sets));
   problem->set_misfit(misfit_expected(task, frames, theta));
   return problem;
 }
+
+/// What the search looks at.
+class Looks {
+ public:
+  Looks(const Task& task, const Frames& frames, const Theta& theta)
+      : closely_(sampled(task, frames, theta, kOfMinima)),
+        glance_(any_has_own_rays(task, frames) ? sampled(task, frames, theta, kOfAGlance) : nullptr) {}
+  LeastSquares& closely() { return *closely_; }
+  LeastSquares& at_a_glance() { return glance_ ? *glance_ : *closely_; }
+  int evaluations() const { return closely_->evaluations() + (glance_ ? glance_->evaluations() : 0); }
+
+ private:
+  static bool any_has_own_rays(const Task& task, const Frames& frames) {
+    for (int g = 0; g < task.frames(); ++g)
+      if (has_own_rays(task, frames[static_cast<std::size_t>(g)], g)) return true;
+    return false;
+  }
+  std::unique_ptr<LeastSquares> closely_, glance_;
+};
 
 bool all_are_one_number(const Task& task) {
   return std::all_of(task.sights.begin(), task.sights.end(), [](const Sight& s) { return is_one_number(*s.picture); });
@@ -159,25 +190,26 @@ Minima search(const Task& task, const Start& start, double hopeless_above) {
   minima.frames = start.frames;
   minima.theta = start.theta;
   Eigen::VectorXd from = start.searched;
-  std::unique_ptr<LeastSquares> sample = sampled(task, minima.frames, minima.theta);
-  const std::vector<PicturePhase> phases = picture_phases(*sample, task, minima.theta);
+  auto looks = std::make_unique<Looks>(task, minima.frames, minima.theta);
+  const std::vector<PicturePhase> phases = picture_phases(looks->at_a_glance(), task, minima.theta);
   // The picture's own middle, where fringes fit better around it: the grid takes the centre as known.
   if (const std::optional<Eigen::VectorXd> centred = start_at_symmetry(task, start)) {
-    const double by_given = lowest_of_few(*sample, task, from, phases);
+    const double by_given = lowest_of_few(looks->at_a_glance(), task, from, phases);
     const Theta theta = task.with(minima.theta, *centred);
     Frames frames = replanned(task, minima.frames, theta);
-    std::unique_ptr<LeastSquares> around_centre = sampled(task, frames, minima.theta);
-    minima.evaluations += sample->evaluations();
-    if (lowest_of_few(*around_centre, task, *centred, phases) < by_given) {
+    auto around_centre = std::make_unique<Looks>(task, frames, minima.theta);
+    minima.evaluations += looks->evaluations();
+    if (lowest_of_few(around_centre->at_a_glance(), task, *centred, phases) < by_given) {
       from = *centred, minima.theta = theta, minima.frames = std::move(frames);
-      sample = std::move(around_centre);
+      looks = std::move(around_centre);
     } else {
       minima.evaluations += around_centre->evaluations();
     }
   }
-  minima.rows = static_cast<double>(sample->pixel_rows());
-  minima.scan = scan(*sample, task, from, phases, hopeless_above * std::max(1.0, minima.rows));
-  minima.evaluations += sample->evaluations();
+  minima.rows = static_cast<double>(looks->closely().pixel_rows());
+  const double hopeless = hopeless_above * std::max(1.0, minima.rows);
+  minima.scan = scan(looks->at_a_glance(), looks->closely(), task, from, phases, hopeless);
+  minima.evaluations += looks->evaluations();
   // Plans are made for where the search begins. Pictures that are one number each turn on the third decimal of it: what
   // is described badly by plans for the start (a field below its threshold needs few steps) is looked for once more by
   // those for either end of what may be.
@@ -188,16 +220,16 @@ Minima search(const Task& task, const Start& start, double hopeless_above) {
         !(lowest() > minima.rows + kDoubtful * std::sqrt(2 * minima.rows)))
       break;
     const Theta end = at_bounds(task, minima.theta, upper);
-    std::unique_ptr<LeastSquares> other = sampled(task, minima.frames, end);
-    ScanResult scanned = scan(*other, task, from, phases, hopeless_above * std::max(1.0, minima.rows));
+    auto other = std::make_unique<Looks>(task, minima.frames, end);
+    ScanResult scanned = scan(other->at_a_glance(), other->closely(), task, from, phases, hopeless);
     minima.evaluations += other->evaluations();
     if (scanned.interrupted || !(scanned.candidates.front().objective < lowest())) continue;
     minima.scan = std::move(scanned);
     minima.theta = task.with(minima.theta, minima.scan.candidates.front().searched);
     minima.frames = replanned(task, minima.frames, minima.theta);
-    sample = std::move(other);
+    looks = std::move(other);
   }
-  minima.hopeless = is_hopeless(task, *sample, minima.scan);
+  minima.hopeless = is_hopeless(task, looks->closely(), minima.scan);
   minima.stopped = minima.scan.interrupted;
   return minima;
 }
