@@ -26,9 +26,9 @@ struct ScanResult {
 
 /// `problem` holds the subsample, `glance` the same or a part of it, more roughly: places, and the first steps from
 /// them, are told by it. `start` is the user's. Every unknown along which pictures have several minima is scanned as
-/// finely as they lie (docs/methods.md, "Scan"), on a grid or, where that has too many points, on points spread over the
-/// box of all of them. Minima whose objective stays above `hopeless_above` are not polished further: another branch has
-/// beaten them.
+/// finely as they lie (docs/methods.md, "Scan"), on a grid or, where that has too many points, on points spread over
+/// the box of all of them. Minima whose objective stays above `hopeless_above` are not polished further: another branch
+/// has beaten them.
 ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
                 const std::vector<PicturePhase>& phases, double hopeless_above);
 
