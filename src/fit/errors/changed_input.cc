@@ -66,11 +66,9 @@ class ChangedInput {
   static Frames as_rough_as_they_may_be(const Task& task, const Optimum& optimum) {
     constexpr double kRough = 3e-3;
     Frames frames = optimum.frames;
-    Demand demand = task.job.demand;
-    demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
     for (int g = 0; g < task.frames(); ++g) {
       Frame& frame = frames[static_cast<std::size_t>(g)];
-      if (has_own_rays(task, frame, g)) frame.plan = plan(task.picture(g).scene, demand, optimum.theta);
+      if (has_own_rays(task, frame, g)) frame.plan = task.planned(g, optimum.theta, kRough);
     }
     return frames;
   }

@@ -1,6 +1,7 @@
 #pragma once
 // What every stage of a fit reads and none changes.
 
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -54,8 +55,11 @@ struct Task {
   int frames() const { return static_cast<int>(sights.size()); }
   const Picture& picture(int frame) const { return *sights[static_cast<std::size_t>(frame)].picture; }
   const Observable& observable(int frame) const { return sights[static_cast<std::size_t>(frame)].observable; }
-  RenderPlan planned(int frame, const Theta& theta) const {
-    return plan(picture(frame).scene, job.demand, theta, observable(frame));
+  /// As the job demands, but no more exactly than `accuracy` (of the incident intensity).
+  RenderPlan planned(int frame, const Theta& theta, double accuracy = 0) const {
+    Demand demand = job.demand;
+    demand.intensity_accuracy = std::max(demand.intensity_accuracy, accuracy);
+    return plan(picture(frame).scene, demand, theta, observable(frame));
   }
   const Parameter& searched(std::size_t j) const { return job.parameters[unknowns.searched[j]]; }
   /// `searched` in the table's places.

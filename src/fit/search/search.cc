@@ -96,15 +96,11 @@ PixelSet mean_of(const Picture& micrograph, const Frame& frame) {
 /// another minimum's advantage.
 RenderPlan rough_plan(const Task& task, int g, const Theta& theta) {
   constexpr double kRough = 1e-4;
-  Demand demand = task.job.demand;
-  demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
-  return plan(task.picture(g).scene, demand, theta, task.observable(g));
+  return task.planned(g, theta, kRough);
 }
 /// Of pixels that are rays of their own.
 RenderPlan rougher_plan(const Task& task, int g, const Theta& theta, const Closeness& close) {
-  Demand demand = task.job.demand;
-  demand.intensity_accuracy = std::max(demand.intensity_accuracy, close.accuracy);
-  RenderPlan rough = plan(task.picture(g).scene, demand, theta);
+  RenderPlan rough = task.planned(g, theta, close.accuracy);
   if (close.edges_alike) {
     std::fill(rough.means.samples.begin(), rough.means.samples.end(), 1);
     rough.means.edge_points = rough.means.defect_points = 2;
