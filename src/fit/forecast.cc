@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/threads.h"
+#include "fit/problem/frame.h"
 #include "fit/problem/task.h"
 #include "medium/references.h"
 #include "samples/kind.h"
@@ -79,7 +80,10 @@ double forecast_fit(const FitJob& job) {
   constexpr double kWhole = 90, kScan = 900, kPixel = 1.2e-5;
   constexpr double kRoundsOfZones = 4;  // what is left out of a picture follows the parameters, a fit each time
   const double scanned_each = std::max(50.0, static_cast<double>(job.options.scan_pixels) / std::max(1, task.frames()));
+  // Where pixels are rays of their own the search looks at a quarter of them, roughly (search.cc).
+  constexpr double kGlance = 0.25, kRough = 1e-2;
   double whole = 0, scanned = 0, pixels = 0;
+  bool own_rays = false;
   Cost with_derivatives, plain;
   const View* measured = nullptr;
   for (int g = 0; g < task.frames(); ++g) {
@@ -88,7 +92,10 @@ double forecast_fit(const FitJob& job) {
     // Pictures of a job that are as large as each other cost alike: the first of them is measured.
     if (!measured || measured->width != view.width || measured->height != view.height) {
       with_derivatives = measure(picture.scene, job.demand, theta, task.observable(g), task.unknowns.searched);
-      plain = measure(picture.scene, job.demand, theta, task.observable(g), {});
+      Demand demand = job.demand;
+      own_rays = has_own_rays(picture.scene, task.planned(g, theta, kRough));
+      if (own_rays) demand.intensity_accuracy = std::max(demand.intensity_accuracy, kRough);
+      plain = measure(picture.scene, demand, theta, task.observable(g), {});
       measured = &view;
     }
     double used = pixels_of(view);
@@ -96,7 +103,7 @@ double forecast_fit(const FitJob& job) {
       used = static_cast<double>(std::count(picture.mask.values().begin(), picture.mask.values().end(), 1));
     whole += with_derivatives.of(used);
     pixels += used;
-    scanned += plain.of(std::min(used, scanned_each));
+    scanned += plain.of(std::min(used, own_rays ? kGlance * scanned_each : scanned_each));
   }
   double rounds = std::max<double>(1, static_cast<double>(job.branches.size()));
   if (task.frames() > 0 && kind_of(task.picture(0).scene).zone) rounds *= kRoundsOfZones;

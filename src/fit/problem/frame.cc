@@ -104,8 +104,11 @@ bool are_rows(const Frames& frames) {
   return std::all_of(frames.begin(), frames.end(), [](const Frame& frame) { return frame.pixels.size() == 1; });
 }
 
+bool has_own_rays(const Scene& scene, const RenderPlan& plan) {
+  return traits_of(scene).sphere_diameter_um && !has_radial_table(plan) && !plan.wave;
+}
 bool has_own_rays(const Task& task, const Frame& frame, int g) {
-  return traits_of(task.picture(g).scene).sphere_diameter_um && !has_radial_table(frame.plan) && !frame.plan.wave;
+  return has_own_rays(task.picture(g).scene, frame.plan);
 }
 
 bool by_waves(const Frames& frames) {

@@ -31,7 +31,8 @@ Start prepare(const Task& task);
 
 /// All of one pixel each, as the rows of a table are.
 bool are_rows(const Frames& frames);
-/// Every pixel of a frame is rays of its own, microseconds each: no table serves all of a ring.
+/// Every pixel is rays of its own, microseconds each: no table serves all of a ring.
+bool has_own_rays(const Scene& scene, const RenderPlan& plan);
 bool has_own_rays(const Task& task, const Frame& frame, int g);
 /// Some frame's picture is by wave optics.
 bool by_waves(const Frames& frames);
