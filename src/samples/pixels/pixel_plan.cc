@@ -39,7 +39,7 @@ int fewest_points(const std::vector<std::array<double, 2>>& pixels, int n, int m
 
 }  // namespace
 
-void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPlan& plan) {
+void measure_points(const SampleImage<Pack>& model, RenderPlan& plan) {
   // Pilots are few, of edges the hardest among them.
   const double target = 0.25 * plan.demand.intensity_accuracy;
   double worst = 0;

@@ -8,6 +8,6 @@ namespace birefit {
 /// Raises plan.means.samples, and sets plan.means.edge_points and plan.means.defect_points, until more points would
 /// change no pilot pixel by more than a quarter of the accuracy: in any ring of pixels of a round sample, along its
 /// edges and about its defects. `model`: after tabulate().
-void measure_points(const Scene& scene, const SampleImage<Pack>& model, RenderPlan& plan);
+void measure_points(const SampleImage<Pack>& model, RenderPlan& plan);
 
 }  // namespace birefit

@@ -172,7 +172,7 @@ void measure_points_of(const Planning& planning, RenderPlan& plan) {
   const std::unique_ptr<SampleImage<Pack>> model =
       straight_image(planning.scene, plan, planning.value.as<Pack>(), planning.light);
   model->tabulate(SampleImage<Pack>::Wanted::picture, 0);
-  measure_points(planning.scene, *model, plan);
+  measure_points(*model, plan);
 }
 
 RenderPlan plan_ball(const Planning& planning) {
