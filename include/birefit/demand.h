@@ -28,6 +28,10 @@ struct Demand {
   Rays rays = Rays::straight;        ///< without meaning under Ceiling::wave
   double intensity_accuracy = 1e-4;  ///< numerical error of the intensity the planner must hold; (0, 0.1]
   std::string method = "auto";       ///< or a transport method's name
+  /// Of what the microscope adds to light of one line and one direction (a bandwidth, a condenser's aperture), what
+  /// changes the picture by less than this is left out, root mean square over the picture's own, measured on a few
+  /// pixels; [0, 1). 0: only what changes no pixel by more than intensity_accuracy. A fit takes 0.
+  double model_tolerance = 0;
   /// Equilibria that pictures ask for again and again, shared by all that this is passed to. plan() makes one where
   /// there is none; a fit has one for all its plans.
   std::shared_ptr<Memo> memo = nullptr;

@@ -38,6 +38,7 @@ struct Config {
   Scene scene;                                ///< of the first measurement, or of `image_size_px`
   std::vector<Scene> colours;                 ///< of a picture of red, green and blue: the same scene in each
   Observable observable;                      ///< what is measured in it
+  double model_tolerance = 0.01;              ///< of a picture that is shown, Demand::model_tolerance; a fit has 0
   std::vector<std::filesystem::path> inputs;  ///< every file that was read beside the config
   /// Of a fit: those of `inputs` that are no files but arrays (InMemory), with the SHA-256 of their samples, row after
   /// row, or of their bytes.

@@ -41,6 +41,20 @@ struct LightFilter {
   }
 };
 
+/// What of another channel's light is in a channel: what that one records of the same light, each as a fraction of what
+/// it records without a sample. Channel c of a camera whose channels mix, up to a gain and an offset, is
+/// (X_c + sum of share_d X_d) / (1 + sum of share_d); all three with gains and offsets free are a matrix of 3 x 4.
+struct Crosstalk {
+  std::shared_ptr<const SpectralTable> sensitivity;
+  ParameterRef share;
+
+  template <class Self, class Visit>
+  static void describe(Self& self, Visit&& visit) {
+    visit.number("share", self.share, numbers::within(-0.45, 10).known_within(0.02),
+                 "of another channel's light in this one, in units of its own");
+  }
+};
+
 /// The light of a picture, where it is no line: what counts is the product of all that is given.
 struct ChannelLight {
   Lamp lamp;

@@ -92,6 +92,7 @@ struct Condenser {
 struct Microscope {
   ParameterRef wavelength_nm;  ///< vacuum; with `channel_light` one of its wavelengths, which pictures do not depend on
   std::optional<ChannelLight> channel_light;  ///< not given: a line of this wavelength
+  std::vector<Crosstalk> crosstalk;           ///< with `channel_light`: other channels' light in this one
   ParameterRef polarizer_deg;                 ///< not given: none, the light that comes in is unpolarized
   ParameterRef analyzer_deg;                  ///< not given: none, all that leaves the sample is seen
   /// Flux that is let through along the polarizer over flux across it, both as they come in; >= 1; not given: ideal.
@@ -117,6 +118,7 @@ struct Microscope {
     visit.number("light.bandwidth_nm", self.bandwidth_nm, numbers::within(0, 5000, "nm").left_out(),
                  "FWHM of the line");
     visit.inside("light", self.channel_light);
+    visit.inside("camera.crosstalk", self.crosstalk);
     visit.number("polarizer_deg", self.polarizer_deg, numbers::dial(), "from +x");
     visit.number("analyzer_deg", self.analyzer_deg, numbers::dial(), "from +x");
     visit.number("polarizer_extinction_ratio", self.polarizer_extinction_ratio,

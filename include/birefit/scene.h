@@ -68,8 +68,9 @@ struct View {
 };
 
 /// Imaginary parts of the indices: a wave of extraordinary polarization falls off as exp(-2 k0 k_e depth) in intensity,
-/// an ordinary one by k_o (pleochroism, dichroism). The same at all wavelengths. Of cells and plates.
+/// an ordinary one by k_o (pleochroism, dichroism). Of cells and plates.
 struct Absorption {
+  double wavelength_nm = 0;  ///< vacuum, where they hold; 0: at all wavelengths
   ParameterRef ordinary, extraordinary;
 
   template <class Self, class Visit>
@@ -83,7 +84,8 @@ struct Absorption {
 struct Scene {
   Sample sample;
   Material material;
-  std::optional<Absorption> absorption;           ///< not given: none
+  /// None: transparent. Several: by growing wavelength, linear in between, as at the first and the last beyond.
+  std::vector<Absorption> absorption;
   ParameterRef surround_index;                    ///< of the isotropic medium around the sample
   std::optional<Dispersion> surround_dispersion;  ///< instead of surround_index
   Microscope microscope;

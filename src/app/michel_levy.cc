@@ -85,7 +85,13 @@ std::vector<Scene> scenes_of(const Config& config) {
   if (!config.scene.microscope.channel_light)
     throw UserError({config.path.string()}, "michel-levy needs light of all wavelengths: a line has no colours",
                     "microscope: {light: {lamp: A}, camera: {sensitivity: nikon_d5100}}, micrograph: {channel: rgb}");
-  return config.colours.empty() ? std::vector<Scene>{config.scene} : config.colours;
+  std::vector<Scene> scenes = config.colours.empty() ? std::vector<Scene>{config.scene} : config.colours;
+  for (const Scene& scene : scenes)
+    if (!scene.microscope.crosstalk.empty())
+      throw UserError({config.path.string()},
+                      "michel-levy takes each channel for itself: camera.crosstalk is not known",
+                      "take it out, or give the mixed channels as a camera of their own: sensitivity: FILE");
+  return scenes;
 }
 
 /// The pictures of a fit as fractions of white, and the pixels that all of them have.

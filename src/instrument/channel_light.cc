@@ -24,7 +24,43 @@ std::vector<LightNumber> numbers_of(const Microscope& microscope) {
     numbers.push_back({filter.centre_nm, kUmPerNm});
     numbers.push_back({filter.fwhm_nm, kUmPerNm});
   }
+  for (const Crosstalk& other : microscope.crosstalk) numbers.push_back({other.share, 1});
   return numbers;
+}
+
+/// The microscope's channel, and behind it those whose light is in it.
+Channels unmixed(const Microscope& microscope, const Theta& theta, const Where& where = {}) {
+  if (!microscope.channel_light)
+    return Channels(
+        GaussianLine{kUmPerNm * microscope.wavelength_nm.in(theta), kUmPerNm * microscope.bandwidth_nm.in(theta)}, {},
+        {EqualEnergy{}}, where);
+  const ChannelLight& light = *microscope.channel_light;
+  std::vector<Spectrum> sensitivities{light.sensitivity ? Spectrum(*light.sensitivity) : Spectrum(EqualEnergy{})};
+  for (const Crosstalk& other : microscope.crosstalk) sensitivities.emplace_back(*other.sensitivity);
+  return channels_of(light, theta, std::move(sensitivities), where);
+}
+
+/// The sum's first channel with so much of the others in it; slopes by the shares behind those by the light's numbers.
+SpectralSum mixed(SpectralSum sum, const Microscope& microscope, const Theta& theta) {
+  if (microscope.crosstalk.empty()) return sum;
+  double whole = 1;
+  std::vector<double> share;
+  for (const Crosstalk& other : microscope.crosstalk) share.push_back(other.share.in(theta)), whole += share.back();
+  const auto mix = [&](std::vector<std::vector<double>>& of) {
+    for (std::size_t k = 0; k < sum.size(); ++k) {
+      for (std::size_t d = 0; d < share.size(); ++d) of[0][k] += share[d] * of[d + 1][k];
+      of[0][k] /= whole;
+    }
+  };
+  std::vector<std::vector<double>> others(sum.weight.begin() + 1, sum.weight.end());
+  mix(sum.weight);
+  for (auto& number : sum.slope) mix(number), number.resize(1);
+  sum.weight.resize(1);
+  for (std::vector<double>& other : others) {
+    for (std::size_t k = 0; k < sum.size(); ++k) other[k] = (other[k] - sum.weight[0][k]) / whole;
+    sum.slope.push_back({std::move(other)});
+  }
+  return sum;
 }
 
 /// A sum's place at which this share of the only channel is passed.
@@ -55,18 +91,14 @@ Channels channels_of(const ChannelLight& light, const Theta& theta, std::vector<
   return Channels(std::move(lamp), std::move(filters), std::move(sensitivities), where);
 }
 
-Channels channel_of(const Microscope& microscope, const Theta& theta, const Where& where) {
-  if (!microscope.channel_light)
-    return Channels(
-        GaussianLine{kUmPerNm * microscope.wavelength_nm.in(theta), kUmPerNm * microscope.bandwidth_nm.in(theta)}, {},
-        {EqualEnergy{}}, where);
-  const ChannelLight& light = *microscope.channel_light;
-  return channels_of(light, theta, {light.sensitivity ? Spectrum(*light.sensitivity) : Spectrum(EqualEnergy{})}, where);
+SpectralSum channel_of(const Microscope& microscope, const Theta& theta, double reach_um, const Where& where) {
+  return mixed(unmixed(microscope, theta, where).fine(reach_um), microscope, theta);
 }
 
 std::shared_ptr<const WavelengthRule> wavelength_rule(const Microscope& microscope, const Theta& theta, double reach_um,
                                                       int n) {
-  const Channels channel = channel_of(microscope, theta);
+  // Nodes are those of all the channels in it, mixed or not: what of another is in one may be fitted.
+  const Channels channel = unmixed(microscope, theta);
   SpectralSum sum;
   if (reach_um > 0) {
     const SpectralSum fine = channel.fine(reach_um);
@@ -74,6 +106,7 @@ std::shared_ptr<const WavelengthRule> wavelength_rule(const Microscope& microsco
   } else {
     sum = channel.uniform(n);
   }
+  sum = mixed(std::move(sum), microscope, theta);
   auto rule = std::make_shared<WavelengthRule>();
   rule->reach_um = reach_um;
   for (const double um : sum.wavelength_um) rule->wavelength_nm.push_back(um / kUmPerNm);

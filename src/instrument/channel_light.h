@@ -38,9 +38,10 @@ S weight_in(const WavelengthRule& rule, std::size_t k, const std::vector<int>& a
   return weight;
 }
 
-/// The one channel that the microscope's light makes: of its channel_light, else of its line with a bandwidth (above
-/// 0). UserError as Channels has it.
-Channels channel_of(const Microscope&, const Theta&, const Where& = {});
+/// The one channel that the microscope's light makes (of its channel_light, else of its line with a bandwidth above
+/// 0) as a sum that is fine enough for path differences of reach_um, other channels' light in it included. UserError as
+/// Channels has it.
+SpectralSum channel_of(const Microscope&, const Theta&, double reach_um = 20, const Where& = {});
 /// The microscope's channel_light by other sensitivities than its own.
 Channels channels_of(const ChannelLight&, const Theta&, std::vector<Spectrum> sensitivities, const Where& = {});
 /// n wavelengths, at most a quarter of the finer sum's.

@@ -102,6 +102,14 @@ void plan_directions(const Scene& scene, const Values<double>& value, ManyDirect
                     disc.radius, sci(changed)));
     return;
   }
+  if (const double share = (now - axis).norm() / now.norm(); share < plan.demand.model_tolerance) {
+    plan.model_error = std::hypot(plan.model_error, changed);
+    plan.reasons.push_back(
+        fmt::format("the condenser (NA {:.3g}) changes the picture by {:.2g} % of its root mean square, less than "
+                    "physics.model_tolerance ({:g} %): light along the axis stands for all of it here, not in a fit",
+                    disc.radius, 100 * share, 100 * plan.demand.model_tolerance));
+    return;
+  }
   // Two finer sums must agree with the one that is taken: of fringes between the faces one may by chance.
   double left = changed;
   int n = 1;

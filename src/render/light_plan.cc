@@ -19,9 +19,8 @@ constexpr double kEndsOfLine = 3.09;
 /// Gauss nodes grow dear with their number, and beyond some dozens equal steps are as good (methods.md, "Spectrum").
 constexpr int kMostGauss = 60;
 
-/// Twice as many wavelengths until the means over a few pixels change no more, twice: echoes between the faces of a
-/// layer go by longer ways than its retardance, and of two rules that are too coarse for them one may agree with the
-/// other by chance. Pictures with echoes are of one pixel's work.
+/// Twice as many wavelengths until the means over a few pixels change no more, twice: of two rules that are too coarse
+/// for them one may agree with the other by chance. Such pictures are of one pixel's work.
 void settle_on_means(const Scene& scene, const Theta& theta, const LightProbe& probe, RenderPlan& plan) {
   constexpr int kMost = 4000;
   const double allowed = 0.25 * plan.demand.intensity_accuracy;
@@ -74,7 +73,7 @@ void settle_on_fringes(const Microscope& m, const Theta& theta, double finest_um
                        const EvenPhase& phase, double allowed, RenderPlan& plan) {
   // Equal steps err by the kinks of tables, too: Gauss nodes follow where those ask for more than dozens.
   constexpr int kMost = 1500, kMostOfKinks = 200;
-  const SpectralSum fine = channel_of(m, theta).fine(finest_um);
+  const SpectralSum fine = channel_of(m, theta, finest_um);
   double left = std::numeric_limits<double>::infinity();
   const auto look_at = [&](double reach_um, int count) {
     const auto rule = wavelength_rule(m, theta, reach_um, count);
@@ -95,7 +94,7 @@ std::optional<LightBand> light_band(const Microscope& microscope, const Theta& t
   if (narrow && !(microscope.bandwidth_nm && microscope.bandwidth_nm.in(theta) > 0)) return std::nullopt;
   LightBand band;
   band.narrow = narrow;
-  const auto ends = band_um(channel_of(microscope, theta).fine());
+  const auto ends = band_um(channel_of(microscope, theta));
   band.low_um = ends[0], band.high_um = ends[1];
   return band;
 }
@@ -138,8 +137,23 @@ void plan_wavelengths(const Scene& scene, const Theta& theta, const LightBand& b
     nodes = even ? static_cast<int>(std::ceil(kFoot * (deviation / (2 * std::numbers::pi) + kTail)))
                  : line_nodes(deviation) + 3;
   }
+  const RenderPlan of_line = plan;
   settle_on_fringes(m, theta, finest_um, nodes, even, {band.low_um, band.high_um, short_end, long_end}, share, plan);
-  if (plan.demand.ceiling == Ceiling::reflections) settle_on_means(scene, theta, probe, plan);
+  if (band.narrow && !plan.wave && plan.demand.model_tolerance > 0) {
+    const Eigen::VectorXd line = probe.means(of_line), sum = probe.means(plan);
+    if (const double left = (sum - line).norm() / sum.norm(); left < plan.demand.model_tolerance) {
+      plan = of_line;
+      plan.model_error = std::hypot(plan.model_error, (sum - line).cwiseAbs().maxCoeff());
+      plan.reasons.push_back(
+          fmt::format("the light's bandwidth of {:g} nm changes the picture by {:.2g} % of its root mean square, less "
+                      "than physics.model_tolerance ({:g} %): a single wavelength stands for it here, not in a fit",
+                      m.bandwidth_nm.in(theta), 100 * left, 100 * plan.demand.model_tolerance));
+      return;
+    }
+  }
+  // Echoes go by longer ways than the retardance; a table of absorption has kinks.
+  if (plan.demand.ceiling == Ceiling::reflections || scene.absorption.size() > 1)
+    settle_on_means(scene, theta, probe, plan);
   plan.cost_seconds *= static_cast<double>(plan.wavelengths->size());
   plan.reasons.push_back(fmt::format(
       "the light reaches from {:.0f} to {:.0f} nm, over which the largest retardance goes through {:.2g} fringes: the "

@@ -99,7 +99,7 @@ RenderPlan by_rule(RenderPlan planned, std::shared_ptr<const WavelengthRule> rul
 
 /// As many wavelengths as the spectra and fringes have detail.
 std::shared_ptr<const WavelengthRule> every_detail(const Microscope& microscope, const Theta& theta, double reach_um) {
-  const SpectralSum fine = channel_of(microscope, theta).fine(reach_um);
+  const SpectralSum fine = channel_of(microscope, theta, reach_um);
   auto rule = std::make_shared<WavelengthRule>();
   rule->weight = fine.weight.front();
   for (const double um : fine.wavelength_um) rule->wavelength_nm.push_back(1000 * um);

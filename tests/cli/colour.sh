@@ -68,6 +68,29 @@ P
 fi
 
 if /usr/bin/python3 -c 'import numpy, PIL' 2> /dev/null; then
+  # Channels that mix: the picture's do as those of the light.
+  sed 's/nikon_d5100/nikon_d5100, crosstalk: {r: {g: 0.25, b: 0.1}, b: {g: -0.05}}/' cell.yaml > mixing.yaml
+  "$birefit" render mixing.yaml --out mixing.npy --quiet || fail 'crosstalk: render'
+  "$birefit" michel-levy mixing.yaml --out mixing > mixing.txt 2>&1
+  [ $? -eq 2 ] && grep -q 'crosstalk is not known' mixing.txt || fail "crosstalk: $(cat mixing.txt)"
+  # A photograph whose channels a program has mixed: with the shares free the same birefringence, without them none.
+  /usr/bin/python3 - "$source" <<'P' || fail 'crosstalk'
+import sys, numpy, PIL.Image
+a, b = numpy.load("cell.npy")[0, 0], numpy.load("mixing.npy")[0, 0]
+assert abs(b[0] - (a[0] + 0.25 * a[1] + 0.1 * a[2]) / 1.35) < 1e-6 and abs(b[1] - a[1]) < 1e-6, (a, b)
+assert abs(b[2] - (a[2] - 0.05 * a[1]) / 0.95) < 1e-6, (a, b)
+code = numpy.array(PIL.Image.open(sys.argv[1] + "/data/colour_droplet/photograph.png")) / 255
+light = numpy.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+light = light @ numpy.array([[0.7, 0.2, 0.1], [0.15, 0.8, 0.05], [0.05, 0.2, 0.75]]).T
+code = numpy.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+PIL.Image.fromarray(numpy.rint(255 * code).astype(numpy.uint8)).save("mixed.png")
+P
+  sed 's|image: .*|image: mixed.png|' "$source/fit_configs/colour_droplet.yaml" > mixed.yaml
+  if "$birefit" fit mixed.yaml --out mixed > mixed.txt 2> /dev/null && ! grep -q '"grade": "answer with misfit"' mixed/fit.json; then fail "crosstalk: a plain answer without it"; fi
+  share='{value: 0, fit: [-0.3, 1]}'
+  "$birefit" fit mixed.yaml --out mixed --set "microscope.camera.crosstalk={r: {g: $share, b: $share}, g: {r: $share, b: $share}, b: {r: $share, g: $share}}" > mixed.txt 2> mixed.err ||
+    fail "crosstalk: no answer: $(tail -3 mixed.err)"
+  awk '$1 == "sample.material.birefringence" { found = 1; off = $3 - 0.165; inside = $5 > 0 && off * off < 9 * $5 * $5 } END { exit !(found && inside) }' mixed.txt || fail "crosstalk: $(grep -m1 birefringence mixed.txt)"
   # The chart is of the polarizers and plates that there are: a full-wave plate askew, an analyser that is not crossed.
   sed 's/analyzer_deg: 90/analyzer_deg: 75\n  behind: [{full_wave: {azimuth_deg: 20, made_for_nm: 530}}]/' cell.yaml > plate.yaml
   "$birefit" render plate.yaml --out plate.npy --quiet && "$birefit" michel-levy plate.yaml --out plate --quiet || fail 'plate'
@@ -101,6 +124,15 @@ sed -e '/image_size_px/d' -e 's/micrograph: {/micrograph: {image: lateral.png, t
 "$birefit" fit scale.yaml --out scale > scale.txt 2> scale.err || fail "channels: $(tail -3 scale.err)"
 awk '$1 == "micrograph.channels.b.micrograph.pixel_size_um" { found = 1; off = $3 - 0.16064 } END { exit !(found && off * off < 1e-10) }' scale.txt || fail "channels: $(cat scale.txt)"
 
+# A line of 3 nm and a condenser of 0.12 are left out of a picture that is shown, and said; not of a fit, nor where less is allowed.
+sed -e '/camera:/d' -e 's/channel: rgb, //' -e 's/lamp: A/wavelength_nm: 550, bandwidth_nm: 3/' -e 's/analyzer_deg: 90/analyzer_deg: 90\n  condenser: {na: 0.12}/' \
+  -e 's/thickness_um: 5/thickness_um: 20/' cell.yaml > nearly.yaml
+"$birefit" explain nearly.yaml > nearly.txt || fail "model_tolerance: $(cat nearly.txt)"
+grep -q 'bandwidth of 3 nm changes the picture by .* less than physics.model_tolerance' nearly.txt && grep -q 'condenser (NA 0.12) changes the picture by .* less than' nearly.txt ||
+  fail "model_tolerance: $(cat nearly.txt)"
+"$birefit" explain nearly.yaml --set physics.model_tolerance=0 > exactly.txt
+grep -q 'sum over [0-9]* directions' exactly.txt && grep -q 'sum over [0-9]* wavelengths' exactly.txt || fail "model_tolerance: 0 is not 0: $(cat exactly.txt)"
+
 # What does not go together is said, with its place.
 says() {  # WHAT SED ..
   sed "${@:2}" cell.yaml > wrong.yaml
@@ -124,6 +156,7 @@ says 'lies outside' -e 's/lamp: A/lamp: {file: lamp.csv}/'
 printf 'wavelength_nm,power\n400,1\n500,-2\n700,1\n' > lamp.csv
 says 'is negative' -e 's/lamp: A/lamp: {file: lamp.csv}/'
 printf 'nm,power\n400,1\n700,2\n' > lamp.csv
+says 'unknown key r' -e 's/nikon_d5100/nikon_d5100, crosstalk: {r: {r: 0.1}}/'
 says 'is no spectrum' -e 's/lamp: A/lamp: {file: lamp.csv}/'
 
 ((failures == 0)) && echo "white light: all as it should be"

@@ -24,8 +24,9 @@ struct DichroicCell : testing::TableBuilder {
     ConstantIndices material;
     material.ordinary = fixed("ordinary", 1.52), material.birefringence = fixed("birefringence", 0.15);
     scene.material = material;
-    scene.absorption.emplace();
-    scene.absorption->ordinary = fixed("k_o", 0.004), scene.absorption->extraordinary = fixed("k_e", 0.02);
+    scene.absorption.emplace_back();
+    scene.absorption.front().ordinary = fixed("k_o", 0.004),
+    scene.absorption.front().extraordinary = fixed("k_e", 0.02);
   }
   void uniform(double azimuth_deg) {
     Cell cell;
@@ -58,8 +59,8 @@ TEST(Absorption, FallsOffAlongTheAxes) {
 TEST(Absorption, AStrongDichroicPolarizes) {
   DichroicCell s(0, 90);
   s.uniform(45);
-  s.table[s.scene.absorption->ordinary].value = 0;
-  s.table[s.scene.absorption->extraordinary].value = 0.3;
+  s.table[s.scene.absorption.front().ordinary].value = 0;
+  s.table[s.scene.absorption.front().extraordinary].value = 0.3;
   EXPECT_NEAR(s.picture()(0, 0), 0.25, 1e-3);
 }
 
@@ -68,15 +69,64 @@ TEST(Absorption, IsThatOfASlab) {
   DichroicCell cell(10, 75);
   cell.uniform(40);
   DichroicCell slab(10, 75);
-  slab.scene.absorption.reset();
+  slab.scene.absorption.clear();
   Slab sample;
   sample.profile.interpolation = SlabProfile::Interpolation::constant;
   const double azimuth = 40 * std::numbers::pi / 180;
   sample.profile.rows.push_back({4, std::cos(azimuth), std::sin(azimuth), 0, 1.52, 1.67, 0.004, 0.02});
   slab.scene.sample = sample;
   EXPECT_NEAR(cell.picture()(0, 0), slab.picture()(0, 0), 1e-8);
-  cell.table[cell.scene.absorption->extraordinary].value = 0;
+  cell.table[cell.scene.absorption.front().extraordinary].value = 0;
   EXPECT_GT(std::abs(cell.picture()(0, 0) - slab.picture()(0, 0)), 0.01);
+}
+
+/// A dye that takes blue and red light differently, by three wavelengths.
+void dye(DichroicCell& s) {
+  const auto add = [&](double nm, double ordinary, double extraordinary) {
+    Absorption at;
+    at.wavelength_nm = nm;
+    at.ordinary = s.fixed("k_o", ordinary), at.extraordinary = s.fixed("k_e", extraordinary);
+    s.scene.absorption.push_back(at);
+  };
+  s.scene.absorption.clear();
+  add(450, 0.01, 0.03), add(550, 0.002, 0.02), add(650, 0.001, 0.004);
+}
+
+// Linear between the wavelengths that are stated, as at the outermost beyond.
+TEST(Absorption, GoesWithTheWavelength) {
+  struct At {
+    double nm, ordinary, extraordinary;
+  };
+  for (const At& at : {At{400, 0.01, 0.03}, At{475, 0.008, 0.0275}, At{550, 0.002, 0.02}, At{625, 0.00125, 0.008},
+                       At{700, 0.001, 0.004}}) {
+    DichroicCell by_wavelength(20, 70), alone(20, 70);
+    for (DichroicCell* s : {&by_wavelength, &alone}) {
+      s->uniform(50);
+      s->table[s->scene.microscope.wavelength_nm].value = at.nm;
+    }
+    alone.table[alone.scene.absorption.front().ordinary].value = at.ordinary;
+    alone.table[alone.scene.absorption.front().extraordinary].value = at.extraordinary;
+    dye(by_wavelength);
+    EXPECT_NEAR(by_wavelength.picture()(0, 0), alone.picture()(0, 0), 1e-12) << at.nm;
+  }
+}
+
+// In light of all wavelengths each is taken up by its own k: the sum of lines, the lamp's power even within a filter.
+TEST(Absorption, OfAllWavelengthsIsTheSumOfLines) {
+  constexpr double kCentre = 560, kWidth = 80;
+  DichroicCell s(20, 70);
+  s.uniform(50);
+  dye(s);
+  double lines = 0, all = 0;
+  for (double nm = 360; nm < 760; nm += 1) {
+    const double x = (nm - kCentre) / kWidth, weight = std::exp(-4 * std::numbers::ln2 * x * x);
+    s.table[s.scene.microscope.wavelength_nm].value = nm;
+    lines += weight * s.picture()(0, 0), all += weight;
+  }
+  ChannelLight& light = s.scene.microscope.channel_light.emplace();
+  light.filters.push_back({s.fixed("centre_nm", kCentre), s.fixed("fwhm_nm", kWidth), nullptr});
+  s.demand.intensity_accuracy = 1e-6;
+  EXPECT_NEAR(s.picture()(0, 0), lines / all, 2e-6);  // of the lines' steps, too
 }
 
 TEST(Absorption, HasDerivatives) {
@@ -97,12 +147,14 @@ TEST(Absorption, HasDerivatives) {
       plate.director.tilt_deg = s.fixed("tilt", 30), plate.director.azimuth_deg = s.fixed("azimuth", 25);
       s.scene.sample = plate;
       s.scene.view.width = s.scene.view.height = 24;
-      s.table[s.scene.absorption->ordinary].value = 1e-4, s.table[s.scene.absorption->extraordinary].value = 1e-3;
+      s.table[s.scene.absorption.front().ordinary].value = 1e-4,
+      s.table[s.scene.absorption.front().extraordinary].value = 1e-3;
     }
     Theta theta = s.table.values();
     s.demand.intensity_accuracy = 1e-5;
     const RenderPlan chosen = plan(s.scene, s.demand, theta);
-    const std::vector<int> active{s.scene.absorption->ordinary.index, s.scene.absorption->extraordinary.index,
+    const std::vector<int> active{s.scene.absorption.front().ordinary.index,
+                                  s.scene.absorption.front().extraordinary.index,
                                   s.scene.microscope.wavelength_nm.index};
     const Rendering all = render(s.scene, chosen, theta, active, 1);
     for (std::size_t j = 0; j < active.size(); ++j) {

@@ -106,6 +106,38 @@ void expect_slope(const Kind& kind, int index, double step) {
   EXPECT_LT(worst, 2e-3 * largest) << kind.table[index].name;
 }
 
+// Other channels' light in one, each in units of what it records without a sample: up to a gain, a row of a matrix.
+TEST(ChannelLight, ChannelsMixAsTheirPicturesDo) {
+  for (Kind& kind : testing::every_kind_small()) {
+    if (kind.name != "radial" && kind.name != "cell" && kind.name != "disc") continue;
+    SCOPED_TRACE(kind.name);
+    if (const ParameterRef load = kind.table.find("load_n")) kind.table[load].value = 40;
+    Microscope& m = kind.scene.microscope;
+    m.channel_light.emplace().lamp.planck_k = kind.number("planck_k", kPlanck);
+    const auto seen_by = [&](int channel) { return std::make_shared<const SpectralTable>(colour_matching(channel)); };
+    const auto picture = [&] {
+      const Theta theta = kind.table.values();
+      return render(kind.scene, plan(kind.scene, kind.demand, theta), theta, {}, 1).intensity;
+    };
+    std::vector<Image> alone;
+    for (const int channel : {0, 1, 2}) m.channel_light->sensitivity = seen_by(channel), alone.push_back(picture());
+    m.channel_light->sensitivity = seen_by(0);
+    constexpr double kGreen = 0.3, kBlue = -0.1;
+    m.crosstalk = {{seen_by(1), kind.number("green", kGreen)}, {seen_by(2), kind.number("blue", kBlue)}};
+    const Image mixed = picture();
+    double worst = 0;
+    for (std::size_t i = 0; i < mixed.size(); ++i) {
+      const double expected =
+          (alone[0].values()[i] + kGreen * alone[1].values()[i] + kBlue * alone[2].values()[i]) / (1 + kGreen + kBlue);
+      worst = std::max(worst, std::abs(mixed.values()[i] - expected));
+    }
+    EXPECT_LT(worst, kind.name == "disc" ? 5e-3 : 2 * kind.demand.intensity_accuracy);
+    expect_slope(kind, m.crosstalk[0].share.index, 0.01);
+    expect_slope(kind, m.crosstalk[1].share.index, 0.01);
+    expect_slope(kind, m.channel_light->lamp.planck_k.index, 5);
+  }
+}
+
 TEST(ChannelLight, ItsNumbersHaveDerivatives) {
   for (Kind& kind : testing::every_kind_small()) {
     if (kind.name != "radial" && kind.name != "cell" && kind.name != "volume" && kind.name != "bipolar" &&

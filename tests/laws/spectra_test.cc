@@ -90,7 +90,7 @@ TEST(Spectra, PlannedWavelengthsHoldWhateverTheLight) {
     const Demand demand{.intensity_accuracy = spread(1e-5, 1e-2)};
     RenderPlan chosen = plan(scene, demand, theta);
     const double seen = render(scene, chosen, theta, {}, 1).intensity(0, 0);
-    const SpectralSum fine = channel_of(scene.microscope, theta).fine(3 * retardance_um + 20);
+    const SpectralSum fine = channel_of(scene.microscope, theta, 3 * retardance_um + 20);
     auto all = std::make_shared<WavelengthRule>();
     all->weight = fine.weight.front();
     for (const double um : fine.wavelength_um) all->wavelength_nm.push_back(1000 * um);

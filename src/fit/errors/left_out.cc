@@ -261,6 +261,7 @@ void foretell_light(const Task& task, const Optimum& optimum, LeftOut& left_out)
     Scene scene = task.picture(g).scene;
     ChannelLight& light = *scene.microscope.channel_light;
     light.sensitivity = tilted(*light.sensitivity);
+    for (Crosstalk& other : scene.microscope.crosstalk) other.sensitivity = tilted(*other.sensitivity);
     const RenderPlan chosen = plan(scene, task.job.demand, optimum.theta);
     values.push_back(lit(task.picture(g), optimum.theta,
                          render(scene, chosen, optimum.theta, {}, task.job.options.threads).intensity));

@@ -149,6 +149,28 @@ CameraTables camera_by_name(const std::string& name) {
   return tables;
 }
 
+/// The row of `camera.crosstalk` for this colour, if there is one; once, however many pictures are of it.
+void read_crosstalk(ConfigReader& reader, const std::string& colour, Microscope& to) {
+  to.crosstalk.clear();
+  if (!reader.crosstalk.node || !reader.crosstalk.find(colour)) return;
+  std::vector<std::string> others;
+  for (const char* const other : kColours)
+    if (other != colour) others.emplace_back(other);
+  const Block row = reader.block(reader.crosstalk, colour, others, false);
+  for (const std::string& other : others) {
+    const YamlNode* const given = row.find(other);
+    if (!given) continue;
+    const auto sensitivity = reader.camera.find(other);
+    if (sensitivity == reader.camera.end()) {
+      reader.problems.add(given->where, "the camera has no channel " + other);
+      continue;
+    }
+    ParameterRef share = reader.table.find(row.path + "." + other);
+    if (!share) share = reader.number(row, other, described<Crosstalk>("share"));
+    to.crosstalk.push_back({sensitivity->second, share});
+  }
+}
+
 }  // namespace
 
 void read_light(ConfigReader& reader, const Block& microscope, Microscope& to) {
@@ -180,9 +202,11 @@ void read_light(ConfigReader& reader, const Block& microscope, Microscope& to) {
 
 CameraTables read_camera(ConfigReader& reader, const Block& microscope) {
   if (!microscope.find("camera")) return {};
-  const Block block = reader.block(microscope, "camera", {"sensitivity"}, true);
+  const Block block = reader.block(microscope, "camera", {"sensitivity", "crosstalk"}, true);
   if (block.node && !block.find("sensitivity"))
     reader.missing(block, "sensitivity", "cie_1931, nikon_d5100, or a table of wavelength_nm and r, g, b");
+  if (block.find("crosstalk"))
+    reader.crosstalk = reader.block(block, "crosstalk", {kColours.begin(), kColours.end()}, false);
   const std::optional<std::string> name = reader.text(block, "sensitivity");
   if (!name) return {};
   if (*name == "cie_1931" || *name == "nikon_d5100") return camera_by_name(*name);
@@ -223,10 +247,11 @@ void choose_channel(ConfigReader& reader, const std::string& channel, const Wher
       return;
     }
     microscope.channel_light->sensitivity = found->second;
+    if (!grey) read_crosstalk(reader, found->first, microscope);
   }
   try {
     const Theta theta = reader.table.values();
-    const double nm = mean_um(channel_of(microscope, theta, where).fine()) / kUmPerNm;
+    const double nm = mean_um(channel_of(microscope, theta, 20, where)) / kUmPerNm;
     microscope.wavelength_nm =
         reader.table.add_constant("microscope.light.wavelength_nm" + (channel.empty() ? "" : "." + channel), nm, "nm");
   } catch (const UserError& error) {

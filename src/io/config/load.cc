@@ -347,6 +347,7 @@ void Loading::hand_over() {
     }
   }
   config_.job.demand = reader_.demand;
+  config_.model_tolerance = reader_.model_tolerance;
   config_.job.demand.memo = std::make_shared<Memo>();
   config_.job.parameters = std::move(reader_.table);
   config_.job.warnings = std::move(reader_.warnings);

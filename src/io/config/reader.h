@@ -72,8 +72,10 @@ class ConfigReader {
   /// `physics: {ceiling: auto}` on a sphere: waves where they pay, within the time given for a fit (s).
   bool choose_waves = false;
   double max_seconds = 60;
+  double model_tolerance = 0.01;
   /// What the camera's channels see, by their names; "" of a camera without colours.
   std::map<std::string, std::shared_ptr<const SpectralTable>> camera;
+  Block crosstalk;  ///< `camera.crosstalk`, read as colours are chosen
 
   /// The block at a key, its keys checked against `known`.
   Block block(const Block& parent, const std::string& key, const std::vector<std::string>& known, bool required);

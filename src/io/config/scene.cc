@@ -401,8 +401,26 @@ void read_absorption(ConfigReader& reader, const YamlNode* material, Scene& scen
                         "a slab has it in its profile (k_o, k_e); droplets and sampled fields are transparent");
     return;
   }
-  const Block block = reader.block_of(*absorption, "sample.material.absorption", described_keys<Absorption>());
-  if (block.node) read_numbers(reader, block, scene.absorption.emplace());
+  const std::string name = "sample.material.absorption";
+  if (!absorption->is_sequence()) {
+    const Block block = reader.block_of(*absorption, name, described_keys<Absorption>());
+    if (block.node) read_numbers(reader, block, scene.absorption.emplace_back());
+    return;
+  }
+  std::vector<std::string> keys = described_keys<Absorption>();
+  keys.emplace_back("wavelength_nm");
+  for (std::size_t i = 0; i < absorption->items.size(); ++i) {
+    const YamlNode& item = absorption->items[i];
+    const Block block = reader.block_of(item, name + "[" + std::to_string(i + 1) + "]", keys);
+    if (!block.node) continue;
+    Absorption& made = scene.absorption.emplace_back();
+    read_numbers(reader, block, made);
+    const auto nm = reader.plain(block, "wavelength_nm", numbers::within(100, 20000, "nm"));
+    if (!nm) reader.missing(block, "wavelength_nm", "vacuum, where these hold");
+    made.wavelength_nm = nm.value_or(0);
+    if (i > 0 && nm && made.wavelength_nm <= scene.absorption[i - 1].wavelength_nm)
+      reader.problems.add(item.where, "wavelengths of absorption do not grow", "list them from the shortest on");
+  }
 }
 
 void read_sample(ConfigReader& reader, const Block& root, Scene& scene) {
@@ -454,7 +472,7 @@ void read_demand(ConfigReader& reader, const Block& root, const Scene& scene) {
   const Block accuracy = reader.block(root, "accuracy", {"intensity"}, false);
   reader.demand.intensity_accuracy = reader.plain(accuracy, "intensity", numbers::within(1e-12, 0.1)).value_or(1e-4);
 
-  const Block physics = reader.block(root, "physics", {"ceiling", "rays", "max_seconds"}, false);
+  const Block physics = reader.block(root, "physics", {"ceiling", "rays", "max_seconds", "model_tolerance"}, false);
   if (const YamlNode* rays = physics.find("rays")) {
     const std::string which = reader.choice(physics, "rays", {"straight", "eikonal", "auto"}).value_or("straight");
     reader.demand.rays = which == "eikonal" ? Rays::eikonal : Rays::straight;
@@ -495,6 +513,8 @@ void read_demand(ConfigReader& reader, const Block& root, const Scene& scene) {
     seconds.unit = "s";
     reader.max_seconds = reader.plain(physics, "max_seconds", seconds).value_or(60);
   }
+
+  reader.model_tolerance = reader.plain(physics, "model_tolerance", numbers::within(0, 0.5)).value_or(0.01);
 
   const Block transport = reader.block(root, "transport", {"method"}, false);
   std::vector<std::string> methods = {"auto"};

@@ -133,6 +133,15 @@ Json microscope_schema() {
   light["filters"] = {{"description", "what the lamp's light passes"}, {"type", "array"}, {"items", filter}};
   Json camera = {{"type", "object"}, {"additionalProperties", false}};
   camera["properties"]["sensitivity"] = text("cie_1931, nikon_d5100, or a table of wavelength_nm and r, g, b");
+  Json shares = {{"type", "object"}, {"additionalProperties", false}};
+  for (const char* of : {"r", "g", "b"}) add<Crosstalk>(shares, of);
+  for (auto& [of, row] : shares["properties"].items()) {
+    const Json share = row["properties"]["share"];
+    row = {{"type", "object"}, {"additionalProperties", false}};
+    for (const char* other : {"r", "g", "b"})
+      if (other != of) row["properties"][other] = share;
+  }
+  camera["properties"]["crosstalk"] = shares;
   microscope["properties"]["camera"] = camera;
   Json part = {{"type", "object"}};
   each_kind<PolarizingPart>([&]<class One>(const One*) { add<One>(part, One::kKey); });
@@ -199,7 +208,7 @@ std::string config_schema() {
   for (const auto& [key, words] : std::vector<std::pair<const char*, const char*>>{
            {"calibration", "frames that turn counts into transmission: dark, parallel or flat, crossed"},
            {"accuracy", "numerical error to hold: intensity"},
-           {"physics", "ceiling, rays, max_seconds"},
+           {"physics", "ceiling, rays, max_seconds, model_tolerance"},
            {"transport", "method"},
            {"prior", "from an earlier fit: from, parameters"},
            {"fit", "max_iterations, threads, scan_pixels, scan_candidates, outliers"}})

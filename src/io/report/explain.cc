@@ -9,6 +9,7 @@
 #include "birefit/expression.h"
 #include "birefit/forecast.h"
 #include "core/printable.h"
+#include "io/results/picture.h"
 #include "io/results/work.h"
 
 namespace birefit {
@@ -34,7 +35,8 @@ std::string json_number(double x) { return std::isfinite(x) ? fmt::format("{}", 
 /// Of one image, or of what leaves in all directions of light, on one thread.
 double seconds_an_image(const Config& config, const RenderPlan& chosen, const Theta& theta) {
   const Scene& scene = config.scene;
-  if (scene.microscope.directions.empty()) return forecast_image(scene, config.job.demand, theta, config.observable);
+  if (scene.microscope.directions.empty())
+    return forecast_image(scene, demand_of_picture(config), theta, config.observable);
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
   jones(scene, chosen, theta);
@@ -116,7 +118,7 @@ std::string expected_text(const Outlook& expected) {
 Explanation explain(const Config& config, const std::string& next) {
   const Theta theta = config.job.parameters.values();
   Explanation e;
-  e.plan = plan(config.scene, config.job.demand, theta, config.observable);
+  e.plan = plan(config.scene, demand_of_picture(config), theta, config.observable);
   e.warnings = config.job.warnings;
   for (const auto& more : {config.job.taken_as_exact, e.plan.warnings, e.plan.left_out})
     e.warnings.insert(e.warnings.end(), more.begin(), more.end());

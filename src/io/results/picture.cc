@@ -2,10 +2,16 @@
 
 namespace birefit {
 
+Demand demand_of_picture(const Config& config) {
+  Demand demand = config.job.demand;
+  demand.model_tolerance = config.model_tolerance;
+  return demand;
+}
+
 std::vector<RenderPlan> plans_of(const Config& config, const Theta& theta) {
   std::vector<RenderPlan> plans;
   for (const Scene* scene : scenes_of(config))
-    plans.push_back(plan(*scene, config.job.demand, theta, config.observable));
+    plans.push_back(plan(*scene, demand_of_picture(config), theta, config.observable));
   return plans;
 }
 

@@ -15,6 +15,9 @@ inline std::vector<const Scene*> scenes_of(const Config& config) {
   return scenes;
 }
 
+/// What a fit demands of its pictures, and what they may leave out that is no fit's.
+Demand demand_of_picture(const Config& config);
+
 /// A plan for each of them at theta; throws UserError like plan().
 std::vector<RenderPlan> plans_of(const Config& config, const Theta& theta);
 

@@ -142,13 +142,29 @@ std::unique_ptr<Column<S>> transparent_planar_column(const Scene& scene, const V
   return column_of_law<S>(UniformLaw<S>{axis, eo, ee, thickness}, true);
 }
 
+/// Imaginary parts of n_o and n_e of a scene that absorbs, at its light's wavelength.
+template <class S>
+std::array<S, 2> absorption_at(const Scene& scene, const Values<S>& value) {
+  const std::vector<Absorption>& all = scene.absorption;
+  const auto of = [&](std::size_t i) { return std::array<S, 2>{value(all[i].ordinary), value(all[i].extraordinary)}; };
+  const S nm = value(scene.microscope.wavelength_nm);
+  const double at = lane(plain(nm), 0);
+  std::size_t above = 0;
+  while (above < all.size() && all[above].wavelength_nm <= at) ++above;
+  if (above == 0 || above == all.size()) return of(above == 0 ? 0 : above - 1);
+  const std::array<S, 2> low = of(above - 1), high = of(above);
+  const double from = all[above - 1].wavelength_nm;
+  const S share = (nm - from) * (1 / (all[above].wavelength_nm - from));
+  return {low[0] + share * (high[0] - low[0]), low[1] + share * (high[1] - low[1])};
+}
+
 /// The same as the scene has it.
 template <class S>
 std::unique_ptr<Column<S>> make_planar_column(const Scene& scene, const Values<S>& value) {
   std::unique_ptr<Column<S>> column = transparent_planar_column(scene, value);
-  if (!scene.absorption) return column;
-  return std::make_unique<AbsorbingColumn<S>>(std::move(column), value(scene.absorption->ordinary),
-                                              value(scene.absorption->extraordinary));
+  if (scene.absorption.empty()) return column;
+  const auto [ordinary, extraordinary] = absorption_at<S>(scene, value);
+  return std::make_unique<AbsorbingColumn<S>>(std::move(column), ordinary, extraordinary);
 }
 
 }  // namespace birefit
