@@ -94,9 +94,10 @@ struct CurvedRays {
   Eigen::VectorXd change;  ///< of all unknowns, from straight rays to curved ones
   double ratio = 0;        ///< of the objective by curved rays to that by straight ones
   double worse = 0;        ///< by so much, all pixels counted
+  double part = 1;         ///< of the pixels that were fitted
 };
 CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& optimum, std::size_t most_pixels,
-                    int steps) {
+                    int steps, double tolerance) {
   std::vector<RenderPlan> plans, straight_plans;
   std::vector<PixelSet> sets;
   // Of large images a part tells it, fitted both ways: what its noise does to a fit, it does to both.
@@ -115,9 +116,9 @@ CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& op
   }
   SolveOptions few = few_steps(task, steps);
   double straight_objective = optimum.problem->objective();
-  // To a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search for more
-  // would follow.
-  few.function_tolerance = 0.1 / std::max(straight_objective, 1.0);
+  // At best to a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search
+  // for more would follow.
+  few.function_tolerance = std::max(0.1 / std::max(straight_objective, 1.0), tolerance);
   Theta straight = optimum.theta;
   if (part) {
     LeastSquares problem(task, std::move(straight_plans), sets);
@@ -132,7 +133,24 @@ CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& op
   Eigen::VectorXd searched = optimum.searched;
   problem.solve(searched, few);
   return {change_of_unknowns(task, straight, problem.theta()), problem.objective() / straight_objective,
-          (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used)};
+          (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used),
+          static_cast<double>(used) / static_cast<double>(all)};
+}
+
+/// Standard deviation of `worse`, for the pixels that were left out: a sum over pixels of d^2 + 2 d noise, d what the
+/// rays differ by, is worse by `least` and more.
+double uncertainty_of_worse(const CurvedRays& rays, double least, double reduced) {
+  return 2 * std::sqrt(std::max(std::abs(rays.worse), least) * reduced * (1 / rays.part - 1));
+}
+constexpr double kClear = 3;
+
+/// Whether a part of the pixels says all there is to say of curved rays: all of them could not make chi-square, which
+/// is worse by so much, cross `most`, nor the shift a standard error.
+bool is_plain(const CurvedRays& rays, double shift, double most, double reduced) {
+  constexpr double kFarBelow = 0.5, kFarAbove = 2;
+  const double sd = uncertainty_of_worse(rays, most, reduced);
+  if (rays.worse - kClear * sd > most || shift < kFarBelow) return true;
+  return rays.worse + kClear * sd < most && shift > kFarAbove;
 }
 
 }  // namespace
@@ -190,16 +208,28 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
   curved.demand.rays = Rays::eikonal;
   const Task curved_task(curved);
   const double reduced = std::max(1.0, optimum.reduced_chi_square(task));
-  // Few pixels tell that curved rays do not describe the image at all; by how much they would shift what they describe
-  // as well takes all of them.
-  constexpr double kWorse = 9, kTimesWorse = 20;
-  constexpr std::size_t kFewPixels = 1 << 12, kPixels = 1 << 17;
-  constexpr int kFewSteps = 3, kSteps = 12;
+  // Few pixels, fitted roughly, tell that curved rays do not describe the image; some, of most images, what they
+  // change; where that is near a limit it takes all of them.
+  constexpr double kWorse = 9, kTimesWorse = 1.1, kRoughly = 1e-3;
+  constexpr std::size_t kFewPixels = 1 << 12, kSomePixels = 1 << 14, kPixels = 1 << 17;
+  constexpr int kSteps = 12;
   std::size_t all = 0;
   for (const Frame& frame : optimum.frames) all += frame.pixels.size();
-  if (all > 2 * kFewPixels && compared(task, curved_task, optimum, kFewPixels, kFewSteps).ratio > kTimesWorse) return;
-  const CurvedRays rays = compared(task, curved_task, optimum, kPixels, kSteps);
-  const Shift shift = largest_shift(task, rays.change, sd);
+  const auto fitted_to = [&](std::size_t pixels, double tolerance) {
+    return compared(task, curved_task, optimum, pixels, kSteps, tolerance);
+  };
+  if (all > 2 * kFewPixels) {
+    const CurvedRays few = fitted_to(kFewPixels, kRoughly);
+    if (few.ratio > kTimesWorse && few.worse - kClear * uncertainty_of_worse(few, 0, reduced) > kWorse * reduced)
+      return;
+  }
+  const bool many = all > 2 * kSomePixels;
+  CurvedRays rays = fitted_to(many ? kSomePixels : kPixels, 0);
+  Shift shift = largest_shift(task, rays.change, sd);
+  if (many && !is_plain(rays, shift.standard_errors, kWorse * reduced, reduced)) {
+    rays = fitted_to(kPixels, 0);
+    shift = largest_shift(task, rays.change, sd);
+  }
   left_out.change_by_curved_rays = rays.worse < kWorse * reduced ? shift.standard_errors : 0;
   if (left_out.change_by_curved_rays < 1) return;
   const double value = optimum.theta[static_cast<std::size_t>(shift.index)];

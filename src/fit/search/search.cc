@@ -122,6 +122,7 @@ std::unique_ptr<LeastSquares> sampled(const Task& task, const Frames& frames, co
             : pixel_set(micrograph, frame.sigma, subsample(frame.pixels, scanned_pixels(task, frames, g, close))));
     plans.push_back(is_one_number(micrograph)      ? rough_plan(task, g, theta)
                     : has_own_rays(task, frame, g) ? rougher_plan(task, g, theta, close)
+                    : frame.plan.wavelengths       ? task.planned(g, theta, close.accuracy)  // a third fewer of them
                                                    : frame.plan);
   }
   auto problem = std::make_unique<LeastSquares>(task, std::move(plans), std::move(sets));
