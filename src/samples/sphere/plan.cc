@@ -154,7 +154,7 @@ void note_rays(const Scene& scene, const Values<double>& value, const DropletOpt
         "elsewhere they do not.",
         size));
   if (const double turned = turned_by_core(o); turned > 0.005 && plan.demand.rays == Rays::straight)
-    plan.warnings.push_back(
+    plan.left_out.push_back(
         fmt::format("Light is taken straight through the shell's core; refraction there would turn a ray half-way to "
                     "the core's edge by {:.2g} degrees, "
                     "and moves fringes around the edge. The error bars do not contain this.",
