@@ -157,6 +157,8 @@ printf 'wavelength_nm,power\n400,1\n500,-2\n700,1\n' > lamp.csv
 says 'is negative' -e 's/lamp: A/lamp: {file: lamp.csv}/'
 printf 'nm,power\n400,1\n700,2\n' > lamp.csv
 says 'unknown key r' -e 's/nikon_d5100/nikon_d5100, crosstalk: {r: {r: 0.1}}/'
+printf 'wavelength_nm,all\n400,1\n700,2\n' > grey.csv
+says 'crosstalk is between colours' -e 's/channel: rgb, //; s/nikon_d5100/grey.csv, crosstalk: {r: {g: 0.1}}/'
 says 'is no spectrum' -e 's/lamp: A/lamp: {file: lamp.csv}/'
 
 ((failures == 0)) && echo "white light: all as it should be"

@@ -387,6 +387,33 @@ TEST(Fit, OneUniformFrameCannotGiveBiasGainAndOffset) {
   EXPECT_TRUE(std::isnan(estimate(result, "sample.crystal.bias_v").stderr_));
 }
 
+/// A line that a fit of a bar warns of which has noise of kSd and states so much.
+std::string said_of_noise(double stated, bool smoothed, unsigned seed) {
+  constexpr int kWidth = 40, kHeight = 30;
+  constexpr double kSd = 20;
+  Bar bar(700, 0.4);
+  bar.free_linear();
+  Picture& micrograph = bar.add_image(kWidth, kHeight, bar.bias);
+  micrograph.noise = NoiseModel{stated, 0, false};
+  Gaussian gaussian(seed);
+  Image noise(kWidth + 1, kHeight + 1);
+  for (double& x : noise.values()) x = kSd * gaussian();
+  expose(micrograph, 3000, 150, 700, 0.4, [&](int x, int y, double) {
+    if (!smoothed) return noise(x, y);
+    return 0.25 * (noise(x, y) + noise(x + 1, y) + noise(x, y + 1) + noise(x + 1, y + 1));
+  });
+  for (const std::string& warning : fit(bar.job).warnings)
+    if (warning.find("far less than the noise") != std::string::npos) return warning;
+  return {};
+}
+
+// A chi-square far below its degrees of freedom is no good news: the noise is stated too large, or pixels share it.
+TEST(Fit, LessThanTheStatedNoiseIsNamed) {
+  EXPECT_NE(said_of_noise(80, false, 41).find("about 0.25 times"), std::string::npos);
+  EXPECT_NE(said_of_noise(20, true, 42).find("neighbouring pixels share"), std::string::npos);
+  for (unsigned seed = 50; seed < 60; ++seed) EXPECT_EQ(said_of_noise(20, false, seed), "");
+}
+
 TEST(Fit, NoiseAloneIsNoSignal) {
   for (unsigned seed = 0; seed < 20; ++seed) {
     Bar bar;

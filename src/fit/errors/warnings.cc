@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "fit/errors/report.h"
+#include "fit/errors/statistics.h"
 #include "fit/weights/settle.h"
 
 namespace birefit::estimation {
@@ -105,14 +106,58 @@ void warn_of_misfit(const MicrographResult& micrograph, double range_of_all, dou
                       : "; the errors allow for it as far as the residuals show it."));
 }
 
+/// Chi-square lies below what noise of this size would leave once in a million times, and well below.
+bool is_too_little(double chi_square, double freedom) {
+  constexpr double kMuch = 0.7, kByChance = 1e-6;
+  return freedom > 1 && chi_square < kMuch * freedom && chi_square < chi_square_quantile(kByChance, freedom);
+}
+
+/// Correlation of the residual, in units of the noise, between neighbours along rows and columns.
+double correlation_of_neighbours(const MicrographResult& micrograph) {
+  const auto z = [&](int x, int y) { return micrograph.residual(x, y) / micrograph.sigma(x, y); };
+  double products = 0, squares = 0;
+  for (int y = 0; y + 1 < micrograph.residual.height(); ++y)
+    for (int x = 0; x + 1 < micrograph.residual.width(); ++x) {
+      const double here = z(x, y), right = z(x + 1, y), below = z(x, y + 1);
+      if (!std::isfinite(here + right + below)) continue;
+      products += 0.5 * here * (right + below), squares += here * here;
+    }
+  return squares > 0 ? products / squares : 0;
+}
+
+/// Less is left over than the noise that is stated: no good news, but another noise.
+void warn_of_too_little(const Task& task, int g, FitResult& result) {
+  const MicrographResult& micrograph = result.micrographs[static_cast<std::size_t>(g)];
+  const double freedom = micrograph.used - static_cast<double>(task.unknowns.size()) / task.frames();
+  if (!is_too_little(micrograph.chi_square, freedom)) return;
+  const double reduced = micrograph.chi_square / freedom, shared = correlation_of_neighbours(micrograph);
+  constexpr double kShared = 0.1;
+  const std::string found =
+      fmt::format("{}: the model leaves far less than the noise that is {} (reduced chi-square {:.3g})",
+                  micrograph.name, micrograph.noise.estimated ? "read off the picture" : "stated", reduced);
+  if (shared > kShared)
+    warn(result, found + fmt::format(": neighbouring pixels share theirs (correlation {:.2g}), as those of pictures do "
+                                     "that are resampled, demosaiced or smoothed. The errors are those of pixels "
+                                     "that know nothing of each other: fit the picture as the camera saw it.",
+                                     shared));
+  else if (!micrograph.noise.estimated)  // of a picture without noise it is what the estimate cannot go below
+    warn(result, found + fmt::format(": the picture's is about {:.2g} times that, and the errors are as much too wide. "
+                                     "micrograph.noise takes another; left out, it is read off the picture.",
+                                     std::sqrt(reduced)));
+}
+
 /// The rows of one table together.
 struct Rows {
   double number = 0, chi_square = 0, squares = 0, low = std::numeric_limits<double>::infinity(), high = -low;
 };
 
-void warn_of_misfit(const std::string& name, const Rows& rows, FitResult& result) {
+void warn_of_misfit(const std::string& name, const Rows& rows, double unknowns, FitResult& result) {
   const double percent =
       rows.high > rows.low ? 100 * std::sqrt(rows.squares / rows.number) / (rows.high - rows.low) : 0;
+  if (is_too_little(rows.chi_square, rows.number - unknowns))
+    warn(result, fmt::format("{}: the model leaves far less than the noise that is stated (reduced chi-square {:.3g}): "
+                             "the rows' is about {:.2g} times that, and the errors are as much too wide.",
+                             name, rows.chi_square / rows.number, std::sqrt(rows.chi_square / rows.number)));
   if (rows.chi_square / rows.number > 2 && rows.number > 3)
     warn(result,
          fmt::format(
@@ -201,8 +246,9 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
     warn_of_range(task, optimum, g, result);
     warn_of_outliers(task, optimum, g, result);
     warn_of_misfit(micrograph, high - low, high, result);
+    warn_of_too_little(task, g, result);
   }
-  for (const auto& [name, rows] : tables) warn_of_misfit(name, rows, result);
+  for (const auto& [name, rows] : tables) warn_of_misfit(name, rows, task.unknowns.size(), result);
   for (const ParameterEstimate& estimate : result.parameters)
     if (estimate.prior_sd && !task.job.parameters[task.job.parameters.find(estimate.name)].nuisance &&
         estimate.stderr_ > 0.98 * *estimate.prior_sd)

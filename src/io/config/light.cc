@@ -247,7 +247,10 @@ void choose_channel(ConfigReader& reader, const std::string& channel, const Wher
       return;
     }
     microscope.channel_light->sensitivity = found->second;
-    if (!grey) read_crosstalk(reader, found->first, microscope);
+    if (!grey)
+      read_crosstalk(reader, found->first, microscope);
+    else if (reader.crosstalk.node)
+      reader.problems.add(reader.crosstalk.where, "crosstalk is between colours, and this camera has none");
   }
   try {
     const Theta theta = reader.table.values();
