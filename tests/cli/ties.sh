@@ -48,6 +48,18 @@ assert derived['micrographs[1].microscope.analyzer_deg']['tied']
 assert [d['name'] for d in plain['derived']] == ['retardance_nm', 'gooch_tarry'], plain['derived']
 PYTHON
 
+# Draws from the posterior: of what follows from what is drawn and exact alone, not of a thickness that is known to half a percent.
+"$birefit" fit "$config" --samples 60 --out draws > draws.txt 2>&1 || fail "draws: $(tail -3 draws.txt)"
+head -1 draws/samples.csv | grep -q 'retardance_nm' && fail 'draws of a retardance without those of its thickness'
+"$birefit" fit "$config" --samples 60 --set 'sample.cell.thickness_um={value: 5, exact: true}' --out draws > draws.txt 2>&1 || fail "draws: $(tail -3 draws.txt)"
+python3 - << 'PYTHON' || fail 'draws of what follows'
+import csv
+rows = list(csv.DictReader(open('draws/samples.csv')))
+assert len(rows) == 60 and len({row['retardance_nm'] for row in rows}) > 10, rows[:2]
+for row in rows:
+    assert abs(float(row['retardance_nm']) - 5000 * float(row['sample.material.birefringence'])) < 1e-5, row
+PYTHON
+
 # A number on the command line takes the place of an expression, and an expression that of a number.
 "$birefit" explain "$config" --set 'microscope.analyzer_deg=45' > explain.txt 2>&1 || fail 'explain --set'
 grep -qF 'analyzer_deg = microscope.polarizer_deg + 90' explain.txt && fail 'what was set is still tied'

@@ -25,14 +25,48 @@ std::string table_csv(const SignalTable& table, const FitResult& result) {
   return text;
 }
 
-std::string samples_csv(const FitResult& result) {
+/// Those of the config's derived quantities that follow from what is drawn (entries of the table) and what is exact
+/// alone: of what is stated and not known exactly, draws have what it does to the fit, not its own value.
+std::vector<const Derived*> derived_of_draws(const FitJob& job, const std::vector<int>& drawn) {
+  std::vector<const Derived*> of_draws;
+  for (const Derived& derived : job.derived) {
+    const auto is_drawn = [&](int root) {
+      const Parameter& parameter = job.parameters[root];
+      return std::find(drawn.begin(), drawn.end(), root) != drawn.end() ||
+             (!parameter.free && !(parameter.known_to.of(parameter.value) > 0));
+    };
+    bool all = true;
+    for (const int of : derived.tie.of)
+      for (const int root : job.parameters.roots(of)) all = all && is_drawn(root);
+    if (all) of_draws.push_back(&derived);
+  }
+  return of_draws;
+}
+
+std::string samples_csv(const FitJob& job, const FitResult& result) {
+  const ParameterTable& table = job.parameters;
   std::string text;
-  for (const ParameterEstimate& p : result.parameters) text += (text.empty() ? "" : ",") + csv_field(p.name);
+  std::vector<int> drawn;  // entries of the table, below 0 of what a fit has added itself
+  for (const ParameterEstimate& p : result.parameters) {
+    const ParameterRef ref = table.find(p.name);
+    drawn.push_back(ref ? ref.index : -1);
+    text += (text.empty() ? "" : ",") + csv_field(p.name);
+  }
+  const std::vector<const Derived*> derived = derived_of_draws(job, drawn);
+  for (const Derived* one : derived) text += "," + csv_field(one->name);
   text += "\n";
+  Theta theta = table.values();
   const Eigen::MatrixXd& values = result.samples->values;
-  for (Eigen::Index i = 0; i < values.rows(); ++i)
-    for (Eigen::Index j = 0; j < values.cols(); ++j)
-      text += fmt::format("{:.10g}{}", values(i, j), j + 1 < values.cols() ? "," : "\n");
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    for (Eigen::Index j = 0; j < values.cols(); ++j) {
+      text += fmt::format("{}{:.10g}", j > 0 ? "," : "", values(i, j));
+      if (const int at = drawn[static_cast<std::size_t>(j)]; at >= 0)
+        theta[static_cast<std::size_t>(at)] = values(i, j);
+    }
+    if (!derived.empty()) table.follow(theta);
+    for (const Derived* one : derived) text += fmt::format(",{:.10g}", table.value_of(one->tie, theta));
+    text += "\n";
+  }
   return text;
 }
 
@@ -76,7 +110,7 @@ std::vector<FileContent> result_files(const Config& config, const FitResult& res
     add("fitted", result.micrographs[i].fitted);
     add("residual", result.micrographs[i].residual);
   }
-  if (result.samples) files.push_back({"samples.csv", samples_csv(result)});
+  if (result.samples) files.push_back({"samples.csv", samples_csv(config.job, result)});
   files.push_back({"config.yaml", config.text});
   files.push_back({"log.txt", log_text(config, result)});
   files.push_back({"report.html", report_html(config, result)});
