@@ -79,15 +79,20 @@ find whole -type f -exec md5sum {} + | sort | cmp -s - before.txt || fail 'resum
 
 # ---- killed, then resumed ---------------------------------------------------------------------------------------------
 
-"$birefit" series series.yaml --threads 4 --out killed > /dev/null 2>&1 &
-pid=$!
-for ((k = 0; k < 2000; ++k)); do
-  [ "$(done_in killed)" -ge 2 ] && break
-  sleep 0.005
+# A busy machine may look so late that all is done: then once more.
+for ((attempt = 0; attempt < 5; ++attempt)); do
+  rm -rf killed
+  "$birefit" series series.yaml --threads 2 --out killed > /dev/null 2>&1 &
+  pid=$!
+  for ((k = 0; k < 2000; ++k)); do
+    [ "$(done_in killed)" -ge 2 ] && break
+    sleep 0.005
+  done
+  kill -9 $pid
+  wait $pid 2> /dev/null
+  finished=$(done_in killed)
+  [ "$finished" -lt 10 ] && break
 done
-kill -9 $pid
-wait $pid 2> /dev/null
-finished=$(done_in killed)
 [ "$finished" -ge 2 ] && [ "$finished" -lt 10 ] || fail "killed after $finished frames"
 find killed -name fit.json -exec stat -c '%n %i %y' {} + | sort > before.txt
 # What a kill between two system calls may leave.
