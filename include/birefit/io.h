@@ -90,6 +90,8 @@ struct LoadedImage {
   int bits = 0;                ///< 8 or 16 for integers, 32 for float
   double top_code = 0;         ///< 255, 65535, or 0 for floats
   double pixel_size_um = 0;    ///< 0 = the file does not state it
+  /// By the file's OME metadata; 0 = not stated, or several.
+  double objective_na = 0, emission_nm = 0;
   std::string filter_pattern;  ///< "rggb", ..: of a raw photograph's first cell; "" = not stated
   std::array<double, 2> uneven_pixel_um{};  ///< stated along x and y where they differ; else 0
   bool colour = false;                      ///< `values` are one of several channels, or their mean

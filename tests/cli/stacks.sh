@@ -52,5 +52,25 @@ config fit "{files: $data/droplet_stack.tif, set_from: known.csv, own: [microgra
 awk '$1 ~ "diameter_um$" && $2 == "=" { found = $5 > 0 && ($3 - 9.3)^2 < 16 * $5^2 } END { exit !found }' fit.txt || fail "fit: $(grep diameter fit.txt)"
 [ "$(grep -c '^ *micrographs\[[0-3]\].micrograph.center_px.[xy] *=' fit.txt)" -eq 8 ] || fail 'fit: not a centre for each page'
 
+# ---- metadata -----------------------------------------------------------------------------------------------------------
+
+# What a file states of the objective and of the light is compared with the config; of its pixels' size a warning is enough.
+if /usr/bin/python3 -c 'import PIL' 2> /dev/null; then
+  config plain '[{image: stated.tif}]' "$diameter" "$birefringence"
+  sed -i 's/micrograph: {/micrograph: {page: 0, /; s/polarizer_deg: 0/polarizer_deg: 0, objective_na: 0.8/; s/physics: .*/physics: {ceiling: one_way}/' plain.yaml
+  /usr/bin/python3 - "$data/droplet_stack.tif" << 'P' || fail 'stated.tif'
+import sys, PIL.Image
+ome = ('<?xml version="1.0"?><OME xmlns="x"><Instrument><Objective ID="o" LensNA="0.4"/></Instrument><Image><Pixels SizeX="2" '
+       'PhysicalSizeX="0.16" PhysicalSizeY="0.16"><Channel EmissionWavelength="546"/></Pixels></Image></OME>')
+PIL.Image.open(sys.argv[1]).save("stated.tif", tiffinfo={270: ome})
+P
+  sed -i 's/page: 0, //' plain.yaml
+  "$birefit" fit plain.yaml --out plain > plain.txt 2> plain.err
+  [ $? -eq 2 ] && grep -q 'yaml:.*objective of NA 0.4, and microscope.objective_na is 0.8' plain.err && grep -q 'in light of 546 nm, and' plain.err || fail "metadata: $(cat plain.err)"
+  "$birefit" explain plain.yaml --set micrograph.metadata=ignore > plain.txt 2> plain.err || fail "metadata: ignore: $(cat plain.err)"
+  "$birefit" explain plain.yaml --set microscope.objective_na=0.4 --set microscope.light.wavelength_nm=546 > plain.txt 2> plain.err || fail "metadata: $(cat plain.err)"
+  grep -q 'states pixels of 0.16 um, the config of 0.12 um' plain.txt plain.err || fail "metadata: size: $(cat plain.txt)"
+fi
+
 [ $failures -eq 0 ] && echo 'all as required' || echo "$failures failures"
 exit $((failures > 0))

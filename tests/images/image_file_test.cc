@@ -493,6 +493,27 @@ TEST_F(ImageFile, OmePhysicalSizeIsTrustedAndItsUnitDefaultsToMicrometres) {
   EXPECT_EQ(size("PhysicalSizeX=\"0.1\" PhysicalSizeY=\"0.2\""), 0) << "not square";
 }
 
+// Of several objectives the one that was used; numbers that channels do not share are nobody's.
+TEST_F(ImageFile, OmeStatesTheObjectiveAndTheLight) {
+  const std::vector<std::uint8_t> samples = {1, 2, 3, 4};
+  const auto loaded = [&](const std::string& instrument, const std::string& channels) {
+    const std::string ome = "<?xml version=\"1.0\"?><OME xmlns=\"x\"><Instrument>" + instrument +
+                            "</Instrument><Image ID=\"Image:0\"><ObjectiveSettings ID=\"Objective:1\"/>" +
+                            "<Pixels ID=\"Pixels:0\" SizeX=\"2\">" + channels + "</Pixels></Image></OME>";
+    return load(write("a.tif", with_resolution(72, 72, "in", ome), samples));
+  };
+  const std::string two =
+      "<Objective ID=\"Objective:0\" LensNA=\"0.4\"/><Objective ID=\"Objective:1\" LensNA=\"0.75\"/>";
+  const LoadedImage one = loaded(two, "<Channel ID=\"Channel:0\" EmissionWavelength=\"546.1\"/>");
+  EXPECT_DOUBLE_EQ(one.objective_na, 0.75);
+  EXPECT_DOUBLE_EQ(one.emission_nm, 546.1);
+  EXPECT_NEAR(loaded("", "<Channel EmissionWavelength=\"0.59\" EmissionWavelengthUnit=\"\xc2\xb5m\"/>").emission_nm,
+              590, 1e-9);
+  const LoadedImage none = loaded("", "<Channel EmissionWavelength=\"450\"/><Channel EmissionWavelength=\"590\"/>");
+  EXPECT_EQ(none.objective_na, 0);
+  EXPECT_EQ(none.emission_nm, 0);
+}
+
 // ---- writing --------------------------------------------------------------------------------------------------------
 
 Image ramp() {

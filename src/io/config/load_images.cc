@@ -11,6 +11,7 @@
 #include "io/config/fit.h"
 #include "io/config/light.h"
 #include "io/config/loading.h"
+#include "io/config/metadata.h"
 #include "io/config/mosaic.h"
 #include "io/config/rings.h"
 #include "io/config/scene.h"
@@ -92,6 +93,7 @@ void Loading::take_view_of_image(const Item& item, const std::string& name, Scen
     return;
   }
   set_view(reader_, loaded->width, loaded->height, loaded->pixel_size_um, name, scene);
+  compare_metadata(reader_, *loaded, name, where, settings_.metadata_ignored, scene);
   demand_pixel_size(scene, loaded->uneven_pixel_um);
   if (!reader_.problems.empty()) return;
   Mask all(loaded->values.width(), loaded->values.height(), 1);
@@ -144,6 +146,8 @@ void Loading::take_image(std::size_t i, const Beside& beside, Taken& taken) {
                              std::to_string(loaded->width) + " x " + std::to_string(loaded->height),
                          "leave it out");
   set_view(reader_, loaded->width, loaded->height, loaded->pixel_size_um, micrograph.name, micrograph.scene);
+  if (i % channels_.size() == 0)
+    compare_metadata(reader_, *loaded, micrograph.name, where, settings_.metadata_ignored, micrograph.scene);
   if (sound_) demand_pixel_size(micrograph.scene, loaded->uneven_pixel_um);
   if (!rings) {
     take_part(own, micrograph.scene);

@@ -217,9 +217,9 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
   MicrographSettings settings;
   const Block block =
       reader.block(root, "micrograph",
-                   {"image",    "page", "channel", "channels",          "mosaic",     "bayer",      "pixel_size_um",
-                    "transfer", "gain", "offset",  "illumination",      "background", "center_px",  "rotation_deg",
-                    "roi_px",   "bin",  "mask",    "saturation_counts", "noise",      "calibration"},
+                   {"image",    "page", "channel", "channels",          "mosaic",     "bayer",       "pixel_size_um",
+                    "transfer", "gain", "offset",  "illumination",      "background", "center_px",   "rotation_deg",
+                    "roi_px",   "bin",  "mask",    "saturation_counts", "noise",      "calibration", "metadata"},
                    false);
   settings.where = block.where;
   const auto place = [&](const char* key) { return block.find(key) ? block.find(key)->where : block.where; };
@@ -238,6 +238,7 @@ MicrographSettings read_micrograph(ConfigReader& reader, const Block& root, cons
     for (const YamlEntry& entry : channels.node->entries) settings.channels[entry.key] = &entry.value;
   }
   settings.mosaic = read_mosaic(reader, block, settings.channel);
+  settings.metadata_ignored = reader.choice(block, "metadata", {"compare", "ignore"}).value_or("compare") == "ignore";
 
   settings.pixel_size_um = read_pixel_size(reader, block, scene);
   if (const YamlNode* transfer = block.find("transfer")) {

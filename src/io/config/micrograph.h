@@ -41,6 +41,7 @@ struct MicrographSettings {
   std::optional<std::string> dark, light, crossed;
   Where dark_where, light_where, crossed_where;
   bool calibrated() const { return dark || light; }
+  bool metadata_ignored = false;  ///< the file's word on objective, light and size counts for nothing
   Where where;
 };
 

@@ -171,6 +171,7 @@ Json micrograph_schema() {
                     {"maxItems", 4}};
   keys["saturation_counts"] = {{"description", "counts from which a pixel is saturated"}, {"type", "number"}};
   for (const auto& [key, words] : std::vector<std::pair<const char*, const char*>>{
+           {"metadata", "ignore: what the file states of objective and light does not count"},
            {"page", "of a file of several, from 0; or {t, z, c}"},
            {"channel", "r, g, b, rgb (all three), mean, or a number from 0"},
            {"channels", "r, g, b: parameter paths and what that colour of rgb has for itself"},

@@ -23,6 +23,7 @@
 #include "io/images/npy_image.h"
 #include "io/images/pages.h"
 #include "io/images/signature.h"
+#include "io/images/stated_optics.h"
 #include "io/images/stated_size.h"
 #include "io/images/tiff_tags.h"
 #include "io/libraries/raw_photograph.h"
@@ -391,6 +392,8 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
                                     spec.get_float_attribute("YResolution", 0),
                                     spec.get_string_attribute("ResolutionUnit", "")};
   loaded.pixel_size_um = stated_pixel_size_um(resolution, description, loaded.notes, loaded.uneven_pixel_um);
+  const StatedOptics optics = stated_optics(description);
+  loaded.objective_na = optics.objective_na, loaded.emission_nm = optics.emission_nm;
   return loaded;
 }
 
