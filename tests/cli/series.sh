@@ -79,20 +79,27 @@ find whole -type f -exec md5sum {} + | sort | cmp -s - before.txt || fail 'resum
 
 # ---- killed, then resumed ---------------------------------------------------------------------------------------------
 
-# A busy machine may look so late that all is done: then once more.
-for ((attempt = 0; attempt < 5; ++attempt)); do
-  rm -rf killed
-  "$birefit" series series.yaml --threads 2 --out killed > /dev/null 2>&1 &
-  pid=$!
-  for ((k = 0; k < 2000; ++k)); do
-    [ "$(done_in killed)" -ge 2 ] && break
-    sleep 0.005
+# end_early FOLDER SIGNAL: a series ended so after two frames or more; sets `code` and `finished`. A busy machine may look so
+# late that all is done: then once more.
+end_early() {
+  local pid k attempt
+  for ((attempt = 0; attempt < 5; ++attempt)); do
+    rm -rf "$1"
+    "$birefit" series series.yaml --threads 1 --out "$1" > /dev/null 2>&1 &
+    pid=$!
+    for ((k = 0; k < 2000; ++k)); do
+      [ "$(done_in "$1")" -ge 2 ] && break
+      sleep 0.005
+    done
+    kill "-$2" $pid
+    wait $pid 2> /dev/null
+    code=$?
+    finished=$(done_in "$1")
+    [ "$finished" -lt 10 ] && break
   done
-  kill -9 $pid
-  wait $pid 2> /dev/null
-  finished=$(done_in killed)
-  [ "$finished" -lt 10 ] && break
-done
+}
+
+end_early killed KILL
 [ "$finished" -ge 2 ] && [ "$finished" -lt 10 ] || fail "killed after $finished frames"
 find killed -name fit.json -exec stat -c '%n %i %y' {} + | sort > before.txt
 # What a kill between two system calls may leave.
@@ -114,16 +121,8 @@ same damaged && grep -q '^8 frames were up to date' stdout.txt || fail "damaged 
 
 # ---- Ctrl-C -----------------------------------------------------------------------------------------------------------
 
-"$birefit" series series.yaml --threads 1 --out stopped > /dev/null 2>&1 &
-pid=$!
-for ((k = 0; k < 2000; ++k)); do
-  [ "$(done_in stopped)" -ge 2 ] && break
-  sleep 0.005
-done
-kill -INT $pid
-wait $pid
-[ $? -eq 1 ] || fail 'exit code after Ctrl-C'
-finished=$(done_in stopped)
+end_early stopped INT
+[ "$code" -eq 1 ] || fail 'exit code after Ctrl-C'
 [ "$(wc -l < stopped/series.csv)" -eq 11 ] && [ "$(grep -c ',not done,$' stopped/series.csv)" -eq $((10 - finished)) ] || fail 'series.csv after Ctrl-C'
 run --out stopped --resume && same stopped || fail 'resume after Ctrl-C'
 
