@@ -149,12 +149,13 @@ void warn_of_too_little(const Task& task, int g, FitResult& result) {
 /// The rows of one table together.
 struct Rows {
   double number = 0, chi_square = 0, squares = 0, low = std::numeric_limits<double>::infinity(), high = -low;
+  bool stated_noise = true;
 };
 
 void warn_of_misfit(const std::string& name, const Rows& rows, double unknowns, FitResult& result) {
   const double percent =
       rows.high > rows.low ? 100 * std::sqrt(rows.squares / rows.number) / (rows.high - rows.low) : 0;
-  if (is_too_little(rows.chi_square, rows.number - unknowns))
+  if (rows.stated_noise && is_too_little(rows.chi_square, rows.number - unknowns))
     warn(result, fmt::format("{}: the model leaves far less than the noise that is stated (reduced chi-square {:.3g}): "
                              "the rows' is about {:.2g} times that, and the errors are as much too wide.",
                              name, rows.chi_square / rows.number, std::sqrt(rows.chi_square / rows.number)));
@@ -237,6 +238,7 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
       const auto [x, y] = optimum.frames[static_cast<std::size_t>(g)].pixels[0];
       const double value = task.picture(g).values(x, y);
       rows.number += 1;
+      rows.stated_noise = rows.stated_noise && !micrograph.noise.estimated;
       rows.chi_square += micrograph.chi_square;
       rows.squares += micrograph.residual_rms * micrograph.residual_rms;
       rows.low = std::min(rows.low, value);
