@@ -38,6 +38,9 @@ fit_and_compare volume volume --set "micrograph.roi_px=[12,12,36,36]"
 for file in fitted.tif residual.tif; do
   [[ -s out_e12_droplet/$file ]] || { echo "FAILED: no $file"; exit 1; }
 done
+# Five times the noise that the table has is no good news.
+"$program" fit "$source/fit_configs/freedericksz_sweep.yaml" --set signal.noise=0.05 --out out_loud 2>&1 | grep -q 'far less than the noise that is stated' ||
+  { echo "FAILED: noise stated too large is not named"; exit 1; }
 "$program" explain "$source/fit_configs/e12_droplet.yaml" | grep -q diagonal || { echo "FAILED: explain"; exit 1; }
 "$program" render "$source/fit_configs/e12_droplet.yaml" --out render.tif || { echo "FAILED: render"; exit 1; }
 
