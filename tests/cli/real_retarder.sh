@@ -9,7 +9,7 @@ data=$source/data/real/lc_retarder_voltage
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-sed "s#\.\./data/real/lc_retarder_voltage#$data#; s/every: 8/every: 16/" "$source/fit_configs/lc_retarder.yaml" > all.yaml || exit 1
+sed "s#\.\./data/real/lc_retarder_voltage#$data#; s/every: 8/every: 32/" "$source/fit_configs/lc_retarder.yaml" > all.yaml || exit 1
 failures=0
 fail() { echo "FAIL $*"; failures=$((failures + 1)); }
 voltage=sample.cell.director.freedericksz.voltage_v
@@ -74,7 +74,7 @@ done
 # A wavelength that took no part in the curve: its three constants (phase, gain, offset) from the rows farther than 0.8 V from the
 # extremum, everything else from the other four. Voltages of the extrema are those of the data's description.
 while read -r wavelength near; do
-  without all "$wavelength" | sed 's/every: 16/every: 32/' > "four$wavelength.yaml"
+  without all "$wavelength" > "four$wavelength.yaml"
   run "four$wavelength"
   file=$data/${wavelength}nm_sweep.csv
   measured=$(extremum "$file" V2 Out "$near")
