@@ -19,7 +19,8 @@ struct IndependentCamera {
     const Eigen::Vector3d towards =
         Eigen::Vector3d(std::tan(tilt_x_deg * M_PI / 180), std::tan(tilt_y_deg * M_PI / 180), 1).normalized();
     // Turned there from above the screen by the shortest way.
-    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), towards);
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), axis = up.cross(towards);
+    const Eigen::Quaterniond turn = Eigen::Quaterniond(1 + up.dot(towards), axis.x(), axis.y(), axis.z()).normalized();
     const Eigen::Vector3d seen = turn * Eigen::Vector3d(x, y, 0);
     if (half_field_deg == 0) {  // parallel lines of sight
       const Eigen::Vector3d p = seen - seen.z() / towards.z() * towards;

@@ -82,10 +82,10 @@ struct IndependentPlate {
     m << first[0].field, first[1].field, -air[2].field, -air[3].field;
     Eigen::Matrix<double, 4, 2> in;
     in << air[0].field, air[1].field;
-    const Eigen::Matrix2d entry = m.colPivHouseholderQr().solve(in).topRows<2>();
+    const Eigen::Matrix2d entry = (m.inverse() * in).topRows<2>();
     m << air[0].field, air[1].field, -last[2].field, -last[3].field;
     in << last[0].field, last[1].field;
-    const Eigen::Matrix2d exit = m.colPivHouseholderQr().solve(in).topRows<2>();
+    const Eigen::Matrix2d exit = (m.inverse() * in).topRows<2>();
     double path = 0;
     const std::size_t n = n_e.size() - 1;
     for (std::size_t i = 0; i <= n; ++i)

@@ -90,11 +90,12 @@ TEST(Combine, LinearFitsOneByOneAreTheJointFit) {
     all.block(f * kRows, 0, kRows, 1) = rows.col(1);
     all.block(f * kRows, f + 1, kRows, 1) = rows.col(0);
     values.segment(f * kRows, kRows) = y;
-    const Eigen::MatrixXd covariance = (rows.transpose() * rows).inverse();
+    const Eigen::MatrixXd covariance = (rows.transpose() * rows).llt().solve(Eigen::MatrixXd::Identity(2, 2));
     fits.push_back({{"own", "slope"}, covariance * (rows.transpose() * y), covariance, 10});
     slopes.push_back(*marginal(fits.back(), {"slope"}));
   }
-  const Eigen::MatrixXd covariance = (all.transpose() * all).inverse();
+  const Eigen::MatrixXd covariance =
+      (all.transpose() * all).llt().solve(Eigen::MatrixXd::Identity(kFits + 1, kFits + 1));
   const Eigen::VectorXd joint = covariance * (all.transpose() * values);
   const SharedEstimate shared = combine(slopes, std::nullopt);
   EXPECT_NEAR(shared.posterior.mean[0], joint[0], 1e-9 * std::abs(joint[0]) + 1e-3 * std::sqrt(covariance(0, 0)));
