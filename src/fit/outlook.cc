@@ -241,12 +241,11 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
   std::vector<Shot> shots;
   for (const auto& [words, change] : candidates) try {
       const Information both = information(planned(with_shot(base, change)));
-      for (int j = 0; j < both.unknowns.size(); ++j)
-        if (both.unknowns.table_index(j) == wanted) {
-          const double variance = both.inverse.covariance(j, j);
-          const bool open = both.inverse.undetermined[static_cast<std::size_t>(j)];
-          shots.push_back({words, open ? std::numeric_limits<double>::infinity() : std::sqrt(variance)});
-        }
+      const int j = both.unknowns.of_entry(wanted);
+      if (j < 0) continue;
+      const double variance = both.inverse.covariance(j, j);
+      const bool open = both.inverse.undetermined[static_cast<std::size_t>(j)];
+      shots.push_back({words, open ? std::numeric_limits<double>::infinity() : std::sqrt(variance)});
     } catch (const UserError&) {  // a wavelength beyond the material's data, say: no candidate
     }
   std::stable_sort(shots.begin(), shots.end(), [](const Shot& a, const Shot& b) { return a.stderr_ < b.stderr_; });

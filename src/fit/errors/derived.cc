@@ -25,14 +25,19 @@ struct Owed {
 
 using ValueAt = std::function<double(const Theta&)>;
 
+bool is_stated(const Stated& stated, int index) {
+  return std::find(stated.index.begin(), stated.index.end(), index) != stated.index.end();
+}
+
 /// No unknown that it follows from is without an error, or a limit: a slope of 0 makes neither known.
 bool all_known(const Task& task, const FitResult& result, const Tie& tie) {
   for (const int of : tie.of)
-    for (const int root : task.job.parameters.roots(of))
-      for (int j = 0; j < task.unknowns.size(); ++j)
-        if (const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
-            task.unknowns.table_index(j) == root && (!std::isfinite(p.stderr_) || !p.limit.empty()))
-          return false;
+    for (const int root : task.job.parameters.roots(of)) {
+      const int j = task.unknowns.of_entry(root);
+      if (j < 0) continue;
+      const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
+      if (!std::isfinite(p.stderr_) || !p.limit.empty()) return false;
+    }
   return true;
 }
 
@@ -45,13 +50,11 @@ Owed owed(const Task& task, const Covariances& covariances, const FitResult& res
   owed.by = Eigen::VectorXd::Zero(task.unknowns.size());
   double alone = 0;  // what nothing fitted depends on
   for (const TieSlope& slope : slopes) {
-    bool found = false;
-    for (int j = 0; j < task.unknowns.size() && !found; ++j)
-      if ((found = task.unknowns.table_index(j) == slope.index)) owed.by[j] = slope.by;
-    for (Eigen::Index i = 0; i < stated.sd.size() && !found; ++i)
-      found = stated.index[static_cast<std::size_t>(i)] == slope.index;
+    const int j = task.unknowns.of_entry(slope.index);
+    if (j >= 0) owed.by[j] = slope.by;
     const Parameter& parameter = task.job.parameters[slope.index];
-    if (!found) alone += std::pow(slope.by * parameter.known_to.of(parameter.value), 2);
+    if (j < 0 && !is_stated(stated, slope.index))
+      alone += std::pow(slope.by * parameter.known_to.of(parameter.value), 2);
   }
   const double together = owed.by.dot(result.covariance * owed.by);
   double apart = 0, stated_variance = alone;
@@ -76,9 +79,8 @@ std::vector<std::pair<int, double>> known_alone(const Task& task, const Stated& 
   for (const int of : tie.of)
     for (const int root : task.job.parameters.roots(of)) {
       const Parameter& parameter = task.job.parameters[root];
-      bool found = std::find(stated.index.begin(), stated.index.end(), root) != stated.index.end();
-      for (int j = 0; j < task.unknowns.size() && !found; ++j) found = task.unknowns.table_index(j) == root;
-      if (const double sd = parameter.known_to.of(parameter.value); !found && sd > 0) alone[root] = sd;
+      const bool elsewhere = task.unknowns.of_entry(root) >= 0 || is_stated(stated, root);
+      if (const double sd = parameter.known_to.of(parameter.value); !elsewhere && sd > 0) alone[root] = sd;
     }
   return {alone.begin(), alone.end()};
 }
@@ -152,9 +154,8 @@ double error_of_parts(const Task& task, const FitResult& result, const std::vect
   double squares = 0;
   for (const TieSlope& slope : slopes) {
     const Parameter& parameter = task.job.parameters[slope.index];
-    double sd = parameter.known_to.of(parameter.value);
-    for (int j = 0; j < task.unknowns.size(); ++j)
-      if (task.unknowns.table_index(j) == slope.index) sd = std::sqrt(result.covariance(j, j));
+    const int j = task.unknowns.of_entry(slope.index);
+    const double sd = j >= 0 ? std::sqrt(result.covariance(j, j)) : parameter.known_to.of(parameter.value);
     squares += std::pow(slope.by * sd, 2);
   }
   return std::sqrt(squares);
@@ -205,9 +206,9 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
                      error_of_parts(task, result, slopes), estimate);
     }
     // Of one fitted number alone: what that number's own interval says, which need not be symmetric.
-    for (int j = 0; j < task.unknowns.size() && slopes.size() == 1 && of.by_stated == 0; ++j) {
-      const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
-      if (task.unknowns.table_index(j) != slopes[0].index || !p.profiled || std::isnan(estimate.stderr_)) continue;
+    const int only = slopes.size() == 1 && of.by_stated == 0 ? task.unknowns.of_entry(slopes[0].index) : -1;
+    if (only >= 0 && result.parameters[static_cast<std::size_t>(only)].profiled && !std::isnan(estimate.stderr_)) {
+      const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(only)];
       const auto at = [&](double end) {
         Theta theta = result.theta;
         theta[static_cast<std::size_t>(slopes[0].index)] = std::clamp(end, p.lower, p.upper);

@@ -138,11 +138,6 @@ void LeastSquares::set_priors() {
   const int n = unknowns_.size();
   std::vector<Eigen::RowVectorXd> rows;
   std::vector<double> target;
-  const auto column_of = [&](int table_index) {
-    for (int j = 0; j < n; ++j)
-      if (unknowns_.table_index(j) == table_index) return j;
-    return -1;
-  };
   for (int j = 0; j < n; ++j) {
     const Parameter& parameter = job_.parameters[unknowns_.table_index(j)];
     if (!parameter.prior_sd) continue;
@@ -159,7 +154,7 @@ void LeastSquares::set_priors() {
       double mean = root.row(i).dot(prior.mean);
       for (std::size_t k = 0; k < prior.names.size(); ++k) {
         const ParameterRef ref = job_.parameters.find(prior.names[k]);
-        const int column = ref ? column_of(ref.index) : -1;
+        const int column = ref ? unknowns_.of_entry(ref.index) : -1;
         if (column >= 0) row[column] += root(i, static_cast<Eigen::Index>(k));
         // A parameter that is known here conditions the others on its value.
         else

@@ -23,6 +23,12 @@ struct Unknowns {
     const int p = static_cast<int>(searched.size());
     return j < p ? searched[j] : linear[j - p];
   }
+  /// The unknown that is this entry of the table; -1: none is.
+  int of_entry(int table_index) const {
+    for (int j = 0; j < size(); ++j)
+      if (this->table_index(j) == table_index) return j;
+    return -1;
+  }
   static Unknowns of(const FitJob& job);
 };
 
