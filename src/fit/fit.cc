@@ -127,7 +127,7 @@ std::unique_ptr<Refit> with_all_departures(const Task& task, const Optimum& opti
   auto wider = std::make_unique<Refit>(with_catalogue(task, optimum));
   wider->optimum = settle(wider->task, best_with_nuisances(wider->task, task, optimum, minima));
   if (wider->optimum.stopped ||
-      !believes_catalogue(missed_of_contrast(task, optimum), missed_of_contrast(wider->task, wider->optimum)))
+      !believes_catalogue(missed_of_all(task, optimum), missed_of_all(wider->task, wider->optimum)))
     return nullptr;
   wider->optimum.came_from = optimum.theta;
   return wider;
@@ -145,12 +145,26 @@ std::unique_ptr<Refit> without_specks(const Task& task, const Optimum& optimum, 
   return fitted;
 }
 
+/// Several pictures with all that they may depart by together, where that takes four fifths off what is left over: else
+/// it is something in the sample.
+std::unique_ptr<Refit> explained(const Task& task, Optimum& optimum, const Minima& minima) {
+  if (!asks_catalogue(task, optimum)) return nullptr;
+  std::unique_ptr<Refit> wider = with_all_departures(task, optimum, minima);
+  constexpr double kNearlyAll = 0.2;
+  if (!wider || excess_of(wider->optimum) > kNearlyAll * excess_of(optimum)) return nullptr;
+  return wider;
+}
+
 /// Where something is left over, its causes are asked for; where these do not explain all of it, what is foreign to the
 /// object is left out and the rest asked again. `minima` are of this task.
 Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
   if (beaten || optimum.stopped) return concluded(task, minima, std::move(optimum), beaten);
-  if (!asks_catalogue(task, optimum)) {
-    const std::unique_ptr<Refit> less = without_specks(task, optimum, minima);
+  if (task.frames() > 1 || !asks_catalogue(task, optimum)) {
+    std::unique_ptr<Refit> less = without_specks(task, optimum, minima);
+    if (task.frames() > 1)
+      if (std::unique_ptr<Refit> wider =
+              less ? explained(less->task, less->optimum, minima) : explained(task, optimum, minima))
+        less = std::move(wider);
     if (!less) return concluded(task, minima, std::move(optimum), false);
     const Minima places = widened(less->task, task, less->optimum.theta, minima);
     return concluded(less->task, places, std::move(less->optimum), false);

@@ -53,6 +53,22 @@ const char* words_of(const std::string& name) {
   return "";
 }
 
+/// Whether these are several exposures of one view, of what is neither round nor the same all over: what light and
+/// camera depart by is the same in all of them.
+bool are_alike(const Task& task) {
+  bool even = true;
+  for (int g = 0; g < task.frames(); ++g) {
+    const Picture& picture = task.picture(g);
+    const Traits traits = traits_of(picture.scene);
+    if (traits.round || picture.gain.index != task.picture(0).gain.index ||
+        picture.values.width() != task.picture(0).values.width() ||
+        picture.values.height() != task.picture(0).values.height() || picture.values.height() == 1)
+      return false;
+    even = even && traits.even;
+  }
+  return !even;
+}
+
 }  // namespace
 
 bool is_asked(const FitOptions& options, std::string_view departure) {
@@ -62,7 +78,9 @@ bool is_asked(const FitOptions& options, std::string_view departure) {
 
 bool asks_catalogue(const Task& task, Optimum& optimum) {
   constexpr double kHopeless = 0.1;
-  if (optimum.stopped || task.frames() != 1 || !task.picture(0).effects.empty()) return false;
+  if (optimum.stopped || !task.picture(0).effects.empty()) return false;
+  if (task.frames() > 1)
+    return are_alike(task) && optimum.misfit.beyond_noise && missed_of_all(task, optimum) < kHopeless;
   if (!traits_of(task.picture(0).scene).round) return false;
   if (!(missed_of_contrast(task, optimum) < kHopeless)) return false;
   optimum.explained = !leaves_discrepancy(task, optimum);
@@ -85,16 +103,22 @@ FitJob with_catalogue(const Task& task, const Optimum& optimum) {
     parameter.prior_sd = kind.sd * gain;
     return wider.parameters.add(std::move(parameter));
   };
-  Picture& picture = std::get<Picture>(wider.measurements.front());
+  const Picture first = std::get<Picture>(wider.measurements.front());
   for (const Uneven& one : kUneven) {
-    const bool fitted = std::any_of(picture.uneven.begin(), picture.uneven.end(), [&](const UnevenLight& own) {
+    const bool fitted = std::any_of(first.uneven.begin(), first.uneven.end(), [&](const UnevenLight& own) {
       return own.shape == one.shape && own.of_intensity == one.of_intensity;
     });
-    if (!fitted && is_asked(task.job.options, one.kind.name))
-      picture.uneven.push_back({term(one.kind), one.shape, one.of_intensity, true});
+    if (fitted || !is_asked(task.job.options, one.kind.name)) continue;
+    const ParameterRef coefficient = term(one.kind);
+    for (Measurement& of : wider.measurements)
+      std::get<Picture>(of).uneven.push_back({coefficient, one.shape, one.of_intensity, true});
   }
-  for (const Effect& one : kEffects)
-    if (is_asked(task.job.options, one.kind.name)) picture.effects.push_back({term(one.kind), one.effect});
+  for (const Effect& one : kEffects) {
+    const bool of_camera = one.effect == PictureEffect::Kind::gamma || one.effect == PictureEffect::Kind::curve;
+    if ((task.frames() > 1 && !of_camera) || !is_asked(task.job.options, one.kind.name)) continue;
+    const ParameterRef coefficient = term(one.kind);
+    for (Measurement& of : wider.measurements) std::get<Picture>(of).effects.push_back({coefficient, one.effect});
+  }
   return wider;
 }
 

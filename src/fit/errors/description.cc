@@ -2,9 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "core/robust.h"
 #include "fit/errors/discrepancy.h"
 #include "fit/errors/report.h"
 #include "fit/errors/verdict.h"
@@ -22,6 +27,34 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
   result.described = !(reduced > kMisfit && result.left_over > kMostLeftOver);
   const double by_chance = 25 + 2 * task.unknowns.size() + 2 * std::log(std::max(1, places));
   return (*constant - chi_square) / reduced > by_chance;
+}
+
+std::string judge_rows(const Task& task, const Optimum& optimum, FitResult& result) {
+  constexpr double kMostOfRange = 0.03;
+  struct Rows {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    std::vector<double> off, noise;
+  };
+  std::map<std::string, Rows> tables;
+  for (int g = 0; g < task.frames(); ++g) {
+    const LeastSquares::FrameMisfit frame = optimum.problem->frame_misfit(g);
+    Rows& rows = tables[task.sights[static_cast<std::size_t>(g)].table];
+    const double value = frame.mean_light;
+    rows.low = std::min(rows.low, value), rows.high = std::max(rows.high, value);
+    rows.off.push_back(std::abs(frame.mean_whitened) * frame.mean_noise_sd), rows.noise.push_back(frame.mean_noise_sd);
+  }
+  for (auto& [name, rows] : tables) {
+    // By the median: a row that is wrong by itself is none of the model's.
+    const double off = kNormalSdPerMad * median(rows.off), noise = median(rows.noise),
+                 missed = std::sqrt(std::max(0.0, off * off - noise * noise)) / std::max(rows.high - rows.low, 1e-300);
+    if (!(missed > kMostOfRange)) continue;
+    result.described = false;
+    return fmt::format(
+        "Not described: the model misses {:.2g} % of the range of the values{}, where 3 % is the most that its values "
+        "could be trusted with.",
+        100 * missed, tables.size() > 1 ? " of " + name : "");
+  }
+  return {};
 }
 
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {

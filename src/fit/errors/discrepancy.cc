@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -226,7 +227,7 @@ bool tells_row_patterns(const Task& task, const LeastSquares& problem) {
   for (int g = 0; g < task.frames(); ++g) {
     const Picture& picture = task.picture(g);
     const bool even = traits_of(picture.scene).even && picture.uneven.empty() && picture.effects.empty();
-    if (task.observable(g).quantity != Quantity::intensity || (!even && problem.pixels(g).pixels.size() != 1))
+    if (task.observable(g).quantity == Quantity::ring_radius_cm || (!even && problem.pixels(g).pixels.size() != 1))
       return false;
   }
   return task.unknowns.size() > 0 && task.frames() >= task.unknowns.size() + kFreedom;
@@ -285,12 +286,13 @@ std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
     left.found = by_patterns(all, left.inverse.covariance);
     if (left.found.white < kAsThought) break;
   }
-  constexpr double kEvidence = 15;  // clean pictures stay below it (NoDepartureIsAskedForInCleanPictures)
+  // Clean pictures stay below it (NoDepartureIsAskedForInCleanPictures), and clean tables, whose rows are fewer.
+  constexpr double kEvidenceOfPixels = 15, kEvidenceOfRows = 9;
   // What noise does not explain is scaled by its own size as well (Misfit); only of what is round it asks without a
   // pattern that is seen.
   const bool round = !rows && traits_of(task.picture(0).scene).round;
   const bool beyond_noise = round && is_beyond_noise(task, optimum);
-  if (!beyond_noise && !(left.found.evidence > kEvidence)) return std::nullopt;
+  if (!beyond_noise && !(left.found.evidence > (rows ? kEvidenceOfRows : kEvidenceOfPixels))) return std::nullopt;
   return left;
 }
 
@@ -303,6 +305,16 @@ double missed_of_contrast(const Task& task, const Optimum& optimum, int frame) {
   const auto [low, high] = problem.intensity_range(frame);
   const double missed = std::sqrt(std::max(0.0, (residual.square() - sigma.square()).mean()));
   return missed / std::max(std::abs(task.gain_of(frame, optimum.theta)) * (high - low), 1e-300);
+}
+
+double missed_of_all(const Task& task, const Optimum& optimum) {
+  double low = std::numeric_limits<double>::infinity(), high = -low, missed = 0;
+  for (int g = 0; g < task.frames(); ++g) {
+    const auto [l, h] = optimum.problem->intensity_range(g);
+    low = std::min(low, l), high = std::max(high, h);
+    missed += std::pow(missed_of_contrast(task, optimum, g) * (h - l), 2) / task.frames();
+  }
+  return std::sqrt(missed) / std::max(high - low, 1e-300);
 }
 
 bool leaves_discrepancy(const Task& task, const Optimum& optimum) { return left_over(task, optimum).has_value(); }

@@ -25,5 +25,7 @@ bool leaves_discrepancy(const Task& task, const Optimum& optimum);
 
 /// What the model of a picture misses beyond its noise, as RMS over the range of the model's light.
 double missed_of_contrast(const Task& task, const Optimum& optimum, int frame = 0);
+/// The same of all pictures, over the range of their light together.
+double missed_of_all(const Task& task, const Optimum& optimum);
 
 }  // namespace birefit::estimation

@@ -243,6 +243,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   const bool nearly = (covariances.discrepancy() && task.frames() == 1) || left_out.by_light;
   if (nearly && result.described && traits_of(task.picture(0).scene).round)
     misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
+  else if (result.described && covariances.discrepancy() && are_rows(optimum.frames))
+    misfit = judge_rows(task, optimum, result);
   report_stated(task, optimum, covariances, result);
   keep_inputs_of_note(task, result);
   report_micrographs(task, optimum, result);

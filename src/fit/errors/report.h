@@ -48,6 +48,8 @@ bool judge_description(const Task& task, const Optimum& optimum, double chi_squa
 /// that it, and not noise alone, leaves next to unknown. Says why in a sentence, with result.described = false; else
 /// nothing.
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result);
+/// The same of tables: 3 % of the range of a table's values.
+std::string judge_rows(const Task& task, const Optimum& optimum, FitResult& result);
 /// Those that matter beside the errors, largest first.
 void keep_inputs_of_note(const Task& task, FitResult& result);
 /// The part of the covariance by what is stated.

@@ -70,6 +70,11 @@ std::size_t product_of(const std::vector<Axis>& axes) {
   return product;
 }
 
+bool costs_microseconds(const Task& task) {
+  return std::all_of(task.sights.begin(), task.sights.end(),
+                     [](const Sight& sight) { return traits_of(sight.picture->scene).quick; });
+}
+
 /// What has several valleys, and what has one as long as the grid stays small: it moves the others' minima. `fineness`:
 /// steps are so much shorter.
 std::vector<Axis> axes_of(const Task& task, const std::vector<PicturePhase>& phases, double fineness = 1) {
@@ -355,11 +360,6 @@ Effort effort_of(const LeastSquares& problem, int points, int candidates) {
 }
 
 }  // namespace
-
-bool costs_microseconds(const Task& task) {
-  return std::all_of(task.sights.begin(), task.sights.end(),
-                     [](const Sight& sight) { return traits_of(sight.picture->scene).quick; });
-}
 
 double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
   if (minimum.searched.size() == 0) return 0;

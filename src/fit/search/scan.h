@@ -44,9 +44,6 @@ using SameMinimum = std::function<bool(const Eigen::VectorXd&, const Eigen::Vect
 ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> starts, int steps,
                   const SameMinimum& same);
 
-/// Whether all samples are those whose pictures cost next to nothing: cells without a field.
-bool costs_microseconds(const Task& task);
-
 /// |R delta|: how many joint standard errors apart.
 double separation(const Candidate& minimum, const Eigen::VectorXd& other);
 /// ln of the share of the bounds that a minimum takes up (<= 0): the likelihood's integral around it, as if it were a

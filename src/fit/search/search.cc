@@ -179,20 +179,6 @@ bool is_hopeless(const Task& task, LeastSquares& sample, const ScanResult& scan)
   return not_described || *constant - best.objective < by_chance * reduced;
 }
 
-/// Whether another plan may describe what the best place does not. Where numbers are many times the unknowns and all
-/// but a five-hundredth of what a constant leaves is told, it is the sample that departs from its model, not the plan;
-/// but where it costs next to nothing it is asked.
-bool is_doubtful(const Task& task, LeastSquares& sample, const ScanResult& scan) {
-  constexpr double kByChance = 5, kManyTimes = 3, kLittle = 1.0 / 500;
-  const Candidate& best = scan.candidates.front();
-  const double rows = static_cast<double>(sample.pixel_rows());
-  if (!(best.objective > rows + kByChance * std::sqrt(2 * rows))) return false;
-  if (costs_microseconds(task) || rows < kManyTimes * task.unknowns.size()) return true;
-  sample.evaluate(best.searched, false);
-  const std::optional<double> constant = chi_square_of_a_constant(task, sample);
-  return !constant || best.objective - rows > kLittle * (*constant - rows);
-}
-
 }  // namespace
 
 Minima search(const Task& task, const Start& start, double hopeless_above) {
@@ -224,9 +210,11 @@ Minima search(const Task& task, const Start& start, double hopeless_above) {
   // Plans are made for where the search begins. Pictures that are one number each turn on the third decimal of it: what
   // is described badly by plans for the start (a field below its threshold needs few steps) is looked for once more by
   // those for either end of what may be.
+  constexpr double kDoubtful = 5;
   const auto lowest = [&] { return minima.scan.candidates.front().objective; };
   for (const bool upper : {true, false}) {
-    if (!all_are_one_number(task) || minima.scan.interrupted || !is_doubtful(task, looks->closely(), minima.scan))
+    if (!all_are_one_number(task) || minima.scan.interrupted ||
+        !(lowest() > minima.rows + kDoubtful * std::sqrt(2 * minima.rows)))
       break;
     const Theta end = at_bounds(task, minima.theta, upper);
     auto other = std::make_unique<Looks>(task, minima.frames, end);

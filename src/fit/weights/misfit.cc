@@ -221,8 +221,10 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   const LampJitter lamp = lamp_of(task, optimum, frames, ratio);
   found.lamp_jitter = lamp.share;
   // What scatters by more than a lamp does is not the lamp, nor need it be where frames are not described either.
-  constexpr double kSignificant = 0.999;
-  const double significant = chi_square_quantile(kSignificant, dof);
+  // The noise that was read off a table's rows is no better known than what they scatter by.
+  constexpr double kSignificant = 0.999, kOfNoiseRead = 0.95;
+  const bool rows = are_rows(optimum.frames), read = rows && optimum.frames.front().noise.estimated;
+  const double significant = chi_square_quantile(read ? kOfNoiseRead : kSignificant, dof);
   constexpr double kTellsWhich = 2;  // degrees of freedom: a single one tells of any scatter only that it is there
   const bool of_model = found.beyond_noise && dof > kTellsWhich - 0.1 &&
                         sum_of_squares(frames, ratio, 0) > chi_square_quantile(kShown, dof) &&
@@ -236,7 +238,6 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   found.frames_scatter = sum > dof && found.lamp_jitter == 0 && (found.beyond_noise || sum > significant);
   found.frame_sd = found.frames_scatter ? scatter_of_means(task, optimum.theta, frames, dof) : 0;
   // Rows of a table are its pixels: neighbours share a misfit that is wider than their distance.
-  const bool rows = are_rows(optimum.frames);
   found.row_length = rows && found.frames_scatter
                          ? std::min(row_correlation(task, optimum.theta, frames, found.frame_sd), dof / 4)
                          : 1;

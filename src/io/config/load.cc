@@ -325,6 +325,11 @@ void Loading::note_taken_as_exact() {
   if (!tables_.empty() && quantity_ != Quantity::intensity && !reader_.table[tables_[0].gain].free)
     config_.job.taken_as_exact.push_back(
         "the scale of the table's values: an instrument that drifts along its rows looks like a law of the material.");
+  if (const auto* crystal = std::get_if<Crystal>(&config_.scene.sample);
+      crystal && !crystal->built_in_bias_v && config_.job.measurements.size() > 1)
+    config_.job.taken_as_exact.push_back(
+        "sample.crystal.built_in_bias_v is not given: no charge in the bar. Pictures at three or more voltages can "
+        "tell it, where it is fitted.");
   if (std::holds_alternative<Droplet>(config_.scene.sample) && !config_.scene.microscope.objective_na)
     config_.job.taken_as_exact.push_back(
         "microscope.objective_na is not given: every ray that leaves the droplet is "
