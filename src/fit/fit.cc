@@ -145,14 +145,16 @@ std::unique_ptr<Refit> without_specks(const Task& task, const Optimum& optimum, 
   return fitted;
 }
 
-/// Several pictures with all that they may depart by together, where that takes four fifths off what is left over: else
-/// it is something in the sample.
+/// Several pictures with all that they may depart by together, where that takes a fifth off what is left over; of bars
+/// four fifths: else it is something in the sample.
 std::unique_ptr<Refit> explained(const Task& task, Optimum& optimum, const Minima& minima) {
   if (!asks_catalogue(task, optimum)) return nullptr;
   std::unique_ptr<Refit> wider = with_all_departures(task, optimum, minima);
   constexpr double kNearlyAll = 0.2;
-  if (!wider || excess_of(wider->optimum) > kNearlyAll * excess_of(optimum)) return nullptr;
-  return wider;
+  if (!wider) return nullptr;
+  const double before = excess_of(optimum), after = excess_of(wider->optimum);
+  const bool worth = is_round_throughout(task) ? is_worth_leaving_out(before, after) : after < kNearlyAll * before;
+  return worth ? std::move(wider) : nullptr;
 }
 
 /// Where something is left over, its causes are asked for; where these do not explain all of it, what is foreign to the

@@ -53,18 +53,18 @@ const char* words_of(const std::string& name) {
   return "";
 }
 
-/// Whether these are several exposures of one view, of what is neither round nor the same all over: what light and
-/// camera depart by is the same in all of them.
+/// Whether these are several exposures of one view, of what is not the same all over: what light and camera depart by
+/// is the same in all of them.
 bool are_alike(const Task& task) {
   bool even = true;
+  const Picture& first = task.picture(0);
   for (int g = 0; g < task.frames(); ++g) {
     const Picture& picture = task.picture(g);
-    const Traits traits = traits_of(picture.scene);
-    if (traits.round || picture.gain.index != task.picture(0).gain.index ||
-        picture.values.width() != task.picture(0).values.width() ||
-        picture.values.height() != task.picture(0).values.height() || picture.values.height() == 1)
+    if (picture.gain.index != first.gain.index || picture.values.width() != first.values.width() ||
+        picture.values.height() != first.values.height() || picture.values.height() == 1 ||
+        traits_of(picture.scene).round.has_value() != traits_of(first.scene).round.has_value())
       return false;
-    even = even && traits.even;
+    even = even && traits_of(picture.scene).even;
   }
   return !even;
 }
@@ -79,10 +79,9 @@ bool is_asked(const FitOptions& options, std::string_view departure) {
 bool asks_catalogue(const Task& task, Optimum& optimum) {
   constexpr double kHopeless = 0.1;
   if (optimum.stopped || !task.picture(0).effects.empty()) return false;
-  if (task.frames() > 1)
-    return are_alike(task) && optimum.misfit.beyond_noise && missed_of_all(task, optimum) < kHopeless;
-  if (!traits_of(task.picture(0).scene).round) return false;
-  if (!(missed_of_contrast(task, optimum) < kHopeless)) return false;
+  if (task.frames() > 1 && !are_alike(task)) return false;
+  if (!(missed_of_all(task, optimum) < kHopeless)) return false;
+  if (!traits_of(task.picture(0).scene).round) return task.frames() > 1 && optimum.misfit.beyond_noise;
   optimum.explained = !leaves_discrepancy(task, optimum);
   return !optimum.explained;
 }
@@ -115,7 +114,7 @@ FitJob with_catalogue(const Task& task, const Optimum& optimum) {
   }
   for (const Effect& one : kEffects) {
     const bool of_camera = one.effect == PictureEffect::Kind::gamma || one.effect == PictureEffect::Kind::curve;
-    if ((task.frames() > 1 && !of_camera) || !is_asked(task.job.options, one.kind.name)) continue;
+    if ((!traits_of(first.scene).round && !of_camera) || !is_asked(task.job.options, one.kind.name)) continue;
     const ParameterRef coefficient = term(one.kind);
     for (Measurement& of : wider.measurements) std::get<Picture>(of).effects.push_back({coefficient, one.effect});
   }
@@ -130,13 +129,16 @@ Eigen::VectorXd shift_by_aspect(const Task& task, const Optimum& optimum, const 
     if (effect.kind == PictureEffect::Kind::stretch_x || effect.kind == PictureEffect::Kind::stretch_diagonal)
       stretch = std::hypot(stretch, optimum.theta[static_cast<std::size_t>(effect.coefficient.index)] / gain);
   if (!(gain > 0) || !(stretch > 0)) return {};
-  const PixelSet& set = optimum.problem->pixels(0);
   const Eigen::VectorXd& light = optimum.problem->intensity();
-  const KnownLight known(picture.scene.view, optimum.theta, set.pixels, light);
   Eigen::VectorXd change(light.size());
-  for (std::size_t i = 0; i < set.pixels.size(); ++i)
-    change[static_cast<Eigen::Index>(i)] =
-        stretch * effect_at(PictureEffect::Kind::growth, known, set.pixels[i][0], set.pixels[i][1]);
+  Eigen::Index begin = 0;
+  for (int g = 0; g < task.frames(); ++g) {
+    const PixelSet& set = optimum.problem->pixels(g);
+    const KnownLight known(task.picture(g).scene.view, optimum.theta, set.pixels,
+                           light.segment(begin, set.value.size()));
+    for (const auto& [x, y] : set.pixels)
+      change[begin++] = stretch * effect_at(PictureEffect::Kind::growth, known, x, y);
+  }
   return optimum.problem->shift_by(change, covariance);
 }
 

@@ -60,10 +60,10 @@ void scale_patterns(Sums& sums) {
   sums.br = scale.cwiseProduct(sums.br);
 }
 
-/// Over every stride-th pixel.
-Sums sums_of(const LeastSquares& problem, const Patterns& patterns, Eigen::Index stride,
+/// Of a picture, over every stride-th pixel.
+Sums sums_of(const LeastSquares& problem, int picture, const Patterns& patterns, Eigen::Index stride,
              std::array<Partition, 2>& parts) {
-  const PixelSet& set = problem.pixels(0);
+  const PixelSet& set = problem.pixels(picture);
   const Eigen::Index n = parts[0].front().jr.size(), m = patterns.count();
   Sums sums{Eigen::MatrixXd::Zero(n, n),
             Eigen::MatrixXd::Zero(n, m),
@@ -74,8 +74,8 @@ Sums sums_of(const LeastSquares& problem, const Patterns& patterns, Eigen::Index
             0,
             {}};
   for (int k = 0; k < patterns.count(); ++k) sums.group.push_back(patterns.group(k));
-  problem.for_noise_whitened_rows(0, [&](Eigen::Index begin, const Eigen::MatrixXd& all_rows,
-                                         const Eigen::VectorXd& all_residuals) {
+  problem.for_noise_whitened_rows(picture, [&](Eigen::Index begin, const Eigen::MatrixXd& all_rows,
+                                               const Eigen::VectorXd& all_residuals) {
     const Eigen::Index first = (stride - begin % stride) % stride,
                        used = (all_rows.rows() - first + stride - 1) / stride;
     if (used <= 0) return;
@@ -103,10 +103,10 @@ Sums sums_of(const LeastSquares& problem, const Patterns& patterns, Eigen::Index
   return sums;
 }
 
-Parted parted(const Task& task, const LeastSquares& problem, Eigen::Index stride) {
+Parted parted(const Task& task, const LeastSquares& problem, int picture, Eigen::Index stride) {
   Parted sums;
   sums.parts.fill(Partition(Patterns::kParts, no_part(task)));
-  sums.all = sums_of(problem, Patterns(task, problem), stride, sums.parts);
+  sums.all = sums_of(problem, picture, Patterns(task, problem, picture), stride, sums.parts);
   for (Partition& partition : sums.parts)
     for (Part& part : partition) part.jj = Eigen::MatrixXd(part.jj.selfadjointView<Eigen::Lower>());
   return sums;
@@ -145,11 +145,11 @@ struct Discrepancy {
   double white = 1;            ///< variance of what no pattern explains, over the noise's
   Eigen::MatrixXd covariance;  ///< of the unknowns, by a discrepancy of the size that the residual shows
 };
-/// `c`: the unknowns' covariance by noise alone.
-Discrepancy by_patterns(const Sums& s, const Eigen::MatrixXd& c) {
+/// Of one picture or table; `c`: the unknowns' covariance by noise alone, `pulls`: J^T r of all pictures.
+Discrepancy by_patterns(const Sums& s, const Eigen::MatrixXd& c, const Eigen::VectorXd& pulls) {
   const Eigen::Index m = s.br.size(), p = c.rows();
   const Eigen::MatrixXd g = s.bb - s.jb.transpose() * c * s.jb;
-  const Eigen::VectorXd h = s.br - s.jb.transpose() * (c * s.jr);
+  const Eigen::VectorXd h = s.br - s.jb.transpose() * (c * pulls);
   const double excess = std::max(s.rr / s.pixels - 1, 3 * std::sqrt(2 / s.pixels));
   Eigen::VectorXd v = Eigen::VectorXd::Constant(Patterns::kGroups, excess / static_cast<double>(m));
   Eigen::VectorXd of_pattern(m), found = Eigen::VectorXd::Zero(m);
@@ -183,7 +183,7 @@ Discrepancy by_patterns(const Sums& s, const Eigen::MatrixXd& c) {
   }
   spread();
   // What no pattern explains is white, and scales what noise does.
-  const Eigen::VectorXd pull = s.jr - s.jb * found, moved = c * pull;
+  const Eigen::VectorXd pull = s.jr - s.jb * found, moved = c * (pulls - s.jb * found);
   const double rest =
       s.rr - 2 * found.dot(s.br) + found.dot(s.bb * found) - 2 * pull.dot(moved) + moved.dot(s.jj * moved);
   const double white = std::max(1.0, rest / std::max(1.0, s.pixels - static_cast<double>(p) - free));
@@ -208,17 +208,22 @@ Eigen::MatrixXd by_parts(const Partition& parts, const Eigen::MatrixXd& informat
   return covariance;
 }
 
-/// One picture whose model changes from place to place, with enough of it to tell patterns apart. (Of several, three in
-/// a calibration, patterns and pictures left out in turn widen far beyond what the pictures' own scatter is, which is
-/// in the errors already; behind a calibration what one picture misses is known from the calibration's frames.)
+/// Pictures whose model changes from place to place, with enough of each to tell patterns apart: one, or several of
+/// what is round. (Of several of a bar, three in a calibration, patterns and pictures left out in turn widen far beyond
+/// what the pictures' own scatter is, which is in the errors already; behind a calibration what one picture misses is
+/// known from the calibration's frames.)
 bool tells_patterns(const Task& task, const LeastSquares& problem) {
   constexpr std::size_t kFewestPixels = 400;
   constexpr double kContrast = 0.05;  // else it is one number
-  if (task.frames() != 1 || task.job.prior || task.unknowns.size() == 0) return false;
-  const auto [low, high] = problem.intensity_range(0);
-  return task.observable(0).quantity == Quantity::intensity && !traits_of(task.picture(0).scene).even &&
-         problem.pixels(0).pixels.size() >= kFewestPixels &&
-         high - low > kContrast * std::max(std::abs(high), std::abs(low));
+  if (task.job.prior || task.unknowns.size() == 0 || (task.frames() > 1 && !is_round_throughout(task))) return false;
+  for (int g = 0; g < task.frames(); ++g) {
+    const auto [low, high] = problem.intensity_range(g);
+    if (task.observable(g).quantity != Quantity::intensity || traits_of(task.picture(g).scene).even ||
+        problem.pixels(g).pixels.size() < kFewestPixels ||
+        !(high - low > kContrast * std::max(std::abs(high), std::abs(low))))
+      return false;
+  }
+  return true;
 }
 
 /// Frames of one number each, enough of them to tell a pattern from what is fitted.
@@ -233,17 +238,17 @@ bool tells_row_patterns(const Task& task, const LeastSquares& problem) {
   return task.unknowns.size() > 0 && task.frames() >= task.unknowns.size() + kFreedom;
 }
 
-/// Of one picture: does it scatter about the fit by more than its noise? Of n pixels chi-square scatters by 2/n. A
+/// Does a picture scatter about the fit by more than its noise? Of n pixels chi-square scatters by 2/n. A
 /// noise that was read off the picture is known to no better than 38/n; read once more off what is left over it is
 /// known to 14/n (weights/noise.cc).
-bool is_beyond_noise(const Task& task, const Optimum& optimum) {
-  const auto pixels = static_cast<double>(optimum.problem->pixel_rows());
-  const double reduced = optimum.problem->frame_misfit(0).chi_square / pixels;
+bool is_beyond_noise(const Task& task, const Optimum& optimum, int g) {
+  const auto pixels = static_cast<double>(optimum.problem->pixels(g).value.size());
+  const double reduced = optimum.problem->frame_misfit(g).chi_square / pixels;
   if (!(reduced > 1 + 3 * std::sqrt(2 / pixels))) return false;
-  const Frame& frame = optimum.frames[0];
+  const Frame& frame = optimum.frames[static_cast<std::size_t>(g)];
   if (!frame.noise.estimated || frame.noise_of_all) return true;
-  const Image fitted = fitted_image(task, optimum.frames, 0, optimum.theta);
-  const Picture& picture = task.picture(0);
+  const Image fitted = fitted_image(task, optimum.frames, g, optimum.theta);
+  const Picture& picture = task.picture(g);
   const Image again = standard_deviation(picture, estimate_noise(picture, &fitted, true), fitted);
   double louder = 0;  // mean over the pixels that are fitted, as chi-square is
   for (const auto& [x, y] : frame.pixels) louder += std::pow(again(x, y) / frame.sigma(x, y), 2) / pixels;
@@ -252,11 +257,12 @@ bool is_beyond_noise(const Task& task, const Optimum& optimum) {
 
 /// What there is to say of a fit's residual; nothing where noise explains it.
 struct LeftOver {
-  Parted sums;
+  std::array<Partition, 2> parts;  ///< the same one of all pictures together
   Eigen::MatrixXd information;
   Inverse inverse;
-  Discrepancy found;
-  double sampled = 1;  ///< share of the pixels
+  Eigen::MatrixXd covariance;  ///< of the unknowns, by discrepancies of the size that the residuals show
+  double white = 1;            ///< the largest
+  double sampled = 1;          ///< share of the pixels
 };
 std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
   const LeastSquares& problem = *optimum.problem;
@@ -265,34 +271,58 @@ std::optional<LeftOver> left_over(const Task& task, const Optimum& optimum) {
   if (!rows && !tells_patterns(task, problem)) return std::nullopt;
   constexpr double kPixels = 40000;  // they tell a discrepancy as well as all of them
   const double pixels = rows ? task.frames() : static_cast<double>(problem.pixel_rows());
+  std::vector<Parted> pictures;
+  if (rows) pictures.push_back(parted_rows(task, problem));
+  for (int g = 0; g < task.frames() && !rows; ++g)
+    pictures.push_back(parted(task, problem, g, static_cast<Eigen::Index>(std::ceil(pixels / kPixels))));
   LeftOver left;
-  left.sums =
-      rows ? parted_rows(task, problem) : parted(task, problem, static_cast<Eigen::Index>(std::ceil(pixels / kPixels)));
-  const Sums& all = left.sums.all;
-  left.sampled = all.pixels / pixels;
+  left.sampled = 0;
+  for (Parted& picture : pictures) {
+    left.sampled += picture.all.pixels / pixels;
+    // A misfit of thousands of times the noise leaves no digits for sums in units of that.
+    constexpr double kLargest = 100;
+    picture.measure_by(std::max(1.0, picture.all.rr / picture.all.pixels / kLargest));
+  }
   const Eigen::MatrixXd factor = problem.factor(true), of_data = problem.factor(false),
                         prior = factor.transpose() * factor - of_data.transpose() * of_data;
-  // A misfit of thousands of times the noise leaves no digits for sums in units of that.
-  constexpr double kLargest = 100;
-  left.sums.measure_by(std::max(1.0, all.rr / all.pixels / kLargest));
   // A noise that is larger than it was thought to be is no pattern: in its units they are sought again.
   constexpr int kTimes = 3;
   constexpr double kAsThought = 1.1;
-  for (int time = 0; time < kTimes; ++time) {
-    if (time > 0) left.sums.measure_by(left.found.white);
-    left.information = prior + all.jj;
+  std::vector<Discrepancy> found(pictures.size());
+  double evidence = 0;
+  for (int time = 0; time < kTimes && (time == 0 || left.white >= kAsThought); ++time) {
+    left.information = prior;
+    Eigen::VectorXd pulls = Eigen::VectorXd::Zero(prior.rows());
+    for (std::size_t g = 0; g < pictures.size(); ++g) {
+      if (time > 0) pictures[g].measure_by(found[g].white);
+      left.information += pictures[g].all.jj, pulls += pictures[g].all.jr;
+    }
     left.inverse = invert_normal_equations(Eigen::MatrixXd(left.information.llt().matrixU()));
     if (std::count(left.inverse.undetermined.begin(), left.inverse.undetermined.end(), true) > 0) return std::nullopt;
-    left.found = by_patterns(all, left.inverse.covariance);
-    if (left.found.white < kAsThought) break;
+    left.white = 1, evidence = 0;
+    left.covariance = Eigen::MatrixXd::Zero(prior.rows(), prior.cols());
+    for (std::size_t g = 0; g < pictures.size(); ++g) {
+      found[g] = by_patterns(pictures[g].all, left.inverse.covariance, pulls);
+      left.white = std::max(left.white, found[g].white), evidence = std::max(evidence, found[g].evidence);
+      // What pictures depart by they may all depart by alike: as if their shifts were one.
+      left.covariance += static_cast<double>(pictures.size()) * found[g].covariance;
+    }
   }
   // Clean pictures stay below it (NoDepartureIsAskedForInCleanPictures), and clean tables, whose rows are fewer.
   constexpr double kEvidenceOfPixels = 15, kEvidenceOfRows = 9;
   // What noise does not explain is scaled by its own size as well (Misfit); only of what is round it asks without a
   // pattern that is seen.
-  const bool round = !rows && traits_of(task.picture(0).scene).round;
-  const bool beyond_noise = round && is_beyond_noise(task, optimum);
-  if (!beyond_noise && !(left.found.evidence > (rows ? kEvidenceOfRows : kEvidenceOfPixels))) return std::nullopt;
+  bool beyond_noise = false;
+  for (int g = 0; g < task.frames() && !rows; ++g)
+    beyond_noise = beyond_noise || (traits_of(task.picture(g).scene).round && is_beyond_noise(task, optimum, g));
+  if (!beyond_noise && !(evidence > (rows ? kEvidenceOfRows : kEvidenceOfPixels))) return std::nullopt;
+  left.parts.fill(Partition(Patterns::kParts, no_part(task)));
+  for (const Parted& picture : pictures)
+    for (std::size_t way = 0; way < left.parts.size(); ++way)
+      for (std::size_t i = 0; i < left.parts[way].size(); ++i) {
+        left.parts[way][i].jj += picture.parts[way][i].jj;
+        left.parts[way][i].jr += picture.parts[way][i].jr;
+      }
   return left;
 }
 
@@ -317,15 +347,20 @@ double missed_of_all(const Task& task, const Optimum& optimum) {
   return std::sqrt(missed) / std::max(high - low, 1e-300);
 }
 
+bool is_round_throughout(const Task& task) {
+  return !are_colours(task) && std::all_of(task.sights.begin(), task.sights.end(), [](const Sight& sight) {
+    return traits_of(sight.picture->scene).round.has_value();
+  });
+}
+
 bool leaves_discrepancy(const Task& task, const Optimum& optimum) { return left_over(task, optimum).has_value(); }
 
 std::vector<Eigen::MatrixXd> covariances_by_discrepancy(const Task& task, const Optimum& optimum) {
   constexpr double kFactor = 1.5;
   const std::optional<LeftOver> left = left_over(task, optimum);
   if (!left) return {};
-  std::vector<Eigen::MatrixXd> all{left->found.white * left->sampled * left->inverse.covariance +
-                                   left->found.covariance};
-  for (const Partition& partition : left->sums.parts) all.push_back(by_parts(partition, left->information));
+  std::vector<Eigen::MatrixXd> all{left->white * left->sampled * left->inverse.covariance + left->covariance};
+  for (const Partition& partition : left->parts) all.push_back(by_parts(partition, left->information));
   std::erase_if(all, [](const Eigen::MatrixXd& covariance) { return !covariance.allFinite(); });
   for (Eigen::MatrixXd& covariance : all) covariance *= kFactor * kFactor;
   return all;

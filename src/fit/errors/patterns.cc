@@ -17,10 +17,13 @@ enum Group { kSlow, kFast, kMultiplied, kNonlinear, kRings, kShape = kRings + 4,
 static_assert(kBlur + 1 == Patterns::kGroups);
 constexpr int kDiscRings = 8, kOrders = 6;
 
-KnownLight light_of(const Task& task, const LeastSquares& problem) {
-  const auto [low, high] = problem.intensity_range(0);
-  return {task.picture(0).scene.view, problem.theta(), problem.pixels(0).pixels,
-          (problem.intensity().array() - low).matrix() / std::max(high - low, 1e-300)};
+KnownLight light_of(const Task& task, const LeastSquares& problem, int picture) {
+  const auto [low, high] = problem.intensity_range(picture);
+  Eigen::Index begin = 0;
+  for (int g = 0; g < picture; ++g) begin += problem.pixels(g).value.size();
+  const Eigen::VectorXd light = problem.intensity().segment(begin, problem.pixels(picture).value.size());
+  return {task.picture(picture).scene.view, problem.theta(), problem.pixels(picture).pixels,
+          (light.array() - low).matrix() / std::max(high - low, 1e-300)};
 }
 
 PixelRect around(const std::vector<std::array<int, 2>>& pixels) {
@@ -34,9 +37,9 @@ PixelRect around(const std::vector<std::array<int, 2>>& pixels) {
 
 }  // namespace
 
-Patterns::Patterns(const Task& task, const LeastSquares& problem)
-    : pixels_(problem.pixels(0).pixels), used_(around(pixels_)), light_(light_of(task, problem)) {
-  const Scene& scene = task.picture(0).scene;
+Patterns::Patterns(const Task& task, const LeastSquares& problem, int picture)
+    : pixels_(problem.pixels(picture).pixels), used_(around(pixels_)), light_(light_of(task, problem, picture)) {
+  const Scene& scene = task.picture(picture).scene;
   const Traits traits = traits_of(scene);
   sphere_ = static_cast<bool>(traits.sphere_diameter_um);
   if (traits.round) {

@@ -14,13 +14,13 @@
 
 namespace birefit::estimation {
 
-/// Of the first picture of a fit, at the last evaluated point of its problem.
+/// Of one picture of a fit, at the last evaluated point of its problem.
 class Patterns {
  public:
   static constexpr int kGroups = 10;
   static constexpr int kParts = 12;
 
-  Patterns(const Task& task, const LeastSquares& problem);
+  Patterns(const Task& task, const LeastSquares& problem, int picture = 0);
   int count() const { return static_cast<int>(group_.size()); }
   /// Of a pattern, below kGroups.
   int group(int pattern) const { return group_[static_cast<std::size_t>(pattern)]; }

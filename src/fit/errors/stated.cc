@@ -54,17 +54,6 @@ bool may_be_out_of_focus(const FitJob& job, const Scene& scene) {
          !is_exact(job.parameters[na]);
 }
 
-/// The frames are colours of photographs, each with a gain of its own: what one is off by as a whole is in its gain,
-/// and what is left over is in the pixels.
-bool are_colours(const Task& task) {
-  std::set<int> gains;
-  for (int g = 0; g < task.frames(); ++g) {
-    if (!task.picture(g).scene.microscope.channel_light) return false;
-    gains.insert(task.picture(g).gain.index);
-  }
-  return static_cast<int>(gains.size()) == task.frames();
-}
-
 /// A place of the narrow problem in the wider one.
 Eigen::VectorXd widened(const Task& wider, const Task& narrow, const Theta& theta, const Eigen::VectorXd& searched) {
   const Theta all = narrow.with(theta, searched);

@@ -71,6 +71,15 @@ std::vector<Sight> sights_of(const FitJob& job) {
   return sights;
 }
 
+bool are_colours(const Task& task) {
+  std::set<int> gains;
+  for (int g = 0; g < task.frames(); ++g) {
+    if (!task.picture(g).scene.microscope.channel_light) return false;
+    gains.insert(task.picture(g).gain.index);
+  }
+  return static_cast<int>(gains.size()) == task.frames();
+}
+
 bool follows_from(const ParameterTable& table, ParameterRef number, int index) {
   const std::vector<int> roots = table.roots(number.index);
   return std::find(roots.begin(), roots.end(), index) != roots.end();

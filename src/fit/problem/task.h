@@ -87,4 +87,8 @@ struct Task {
   }
 };
 
+/// The frames are colours of photographs, each with a gain of its own: what one is off by as a whole is in its gain,
+/// and what is left over is in the pixels.
+bool are_colours(const Task& task);
+
 }  // namespace birefit::estimation
