@@ -48,6 +48,18 @@ class Region : public testing::Test {
     EXPECT_TRUE(output->close());
     return folder_ / name;
   }
+  /// 32 x 32 pixels that scatter about `mean` by up to `scatter` codes.
+  void write_even(const std::string& name, int mean, int scatter) {
+    std::vector<std::uint16_t> samples;
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 32; ++x)
+        samples.push_back(
+            static_cast<std::uint16_t>(mean + static_cast<int>(code(x, y)) % (2 * scatter + 1) - scatter));
+    auto output = OIIO::ImageOutput::create(name);
+    EXPECT_TRUE(output->open((folder_ / name).string(), OIIO::ImageSpec(32, 32, 1, OIIO::TypeDesc::UINT16)));
+    EXPECT_TRUE(output->write_image(OIIO::TypeDesc::UINT16, samples.data())) << output->geterror();
+    EXPECT_TRUE(output->close());
+  }
   fs::path text(const std::string& name, const std::string& content) {
     std::ofstream(folder_ / name) << content;
     return folder_ / name;
@@ -202,6 +214,23 @@ TEST_F(Region, OfItsOwnIsEachPicturesPart) {
   EXPECT_NE(part.name, whole.name);
   EXPECT_THAT(mistake("calibration: {dark: a.tif, parallel: a.tif}\n" + config),
               testing::HasSubstr("a region of its own is given beside calibration frames"));
+}
+
+// An even picture that the camera has cut off is a single code, which tells nothing of the light, and shows no noise
+// that would say so. The darkest may well be one: an offset that hides the noise.
+TEST_F(Region, OfOneCodeAsBrightAsAnyIsSaturated) {
+  const std::string config =
+      "micrographs:\n  - {image: a.tif, set: {sample.crystal.bias_v: 100}}\n"
+      "  - {image: b.tif, set: {sample.crystal.bias_v: 300}}\n  - {image: c.tif, set: {sample.crystal.bias_v: 500}}\n"
+      "micrograph: {gain: {fit: auto}, offset: {fit: auto}}\n"
+      "sample: {crystal: {half_wave_voltage_v: {value: 700, fit: [400, 900]}, field_along: y}}\n"
+      "microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}\n";
+  write_even("a.tif", 3000, 20), write_even("b.tif", 14000, 40), write_even("c.tif", 25105, 0);
+  EXPECT_THAT(mistake(config), testing::HasSubstr("c.tif: all of its pixels are 25105 counts"));
+  write_even("c.tif", 25105, 50);
+  EXPECT_EQ(mistake(config), "");
+  write_even("a.tif", 3000, 0);
+  EXPECT_EQ(mistake(config), "");
 }
 
 TEST_F(Region, WhatCannotBeBinnedIsSaid) {

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "birefit/error.h"
+#include "birefit/fit.h"
 #include "birefit/render.h"
 #include "fit/weights/rows.h"
 #include "scene_builder.h"
@@ -141,6 +142,69 @@ TEST(Rows, SlipsAndTheWayThereShow) {
   // One way only: nothing to compare.
   x.resize(60), loop.resize(60);
   EXPECT_EQ(look_at_rows(x, loop).compared, 0);
+}
+
+/// A table of a tilted cell's path difference against the tilt, bent by a bow of the part `bow` of its range, with
+/// noise of a five-hundredth of that.
+FitResult fit_of_tilts(double birefringence, double bow, unsigned seed) {
+  constexpr int kRows = 30;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  TableBuilder b;
+  const ParameterRef thickness = b.fixed("thickness_um", 12), azimuth = b.fixed("azimuth_deg", 33);
+  const ParameterRef wavelength = b.fixed("wavelength_nm", 600), zero = b.fixed("zero", 0), air = b.fixed("air", 1);
+  const ParameterRef ordinary = b.fixed("ordinary", 1.52), dn = b.fitted("birefringence", 0.15, 0.05, 0.35);
+  Readings table;
+  table.name = "tilts.csv";
+  table.observable.quantity = Quantity::retardance_um;
+  table.values = Eigen::VectorXd(kRows);
+  table.gain = b.fixed("gain", 1), table.offset = zero;
+  const double range = path(1.52, birefringence, 0, 12);
+  table.noise = NoiseModel{range / 500, 0, false};
+  for (int row = 0; row < kRows; ++row) {
+    const double tilt = 80.0 * row / (kRows - 1), t = 2.0 * row / (kRows - 1) - 1;
+    Scene scene;
+    Cell cell;
+    cell.thickness_um = thickness;
+    UniformDirector director;
+    director.azimuth_deg = azimuth;
+    director.tilt_deg = b.fixed("tilt" + std::to_string(row), tilt);
+    cell.director = director;
+    scene.sample = cell;
+    scene.material = ConstantIndices{ordinary, dn};
+    scene.surround_index = air;
+    scene.microscope.wavelength_nm = wavelength;
+    scene.microscope.polarizer_deg = scene.microscope.analyzer_deg = zero;
+    scene.view.width = scene.view.height = 1;
+    table.rows.push_back(scene);
+    table.lines.push_back(row + 2);
+    table.values[row] =
+        path(1.52, birefringence, tilt, 12) + range * (bow * std::cos(1.5 * M_PI * t) + normal(random) / 500);
+  }
+  FitJob job;
+  job.measurements.push_back(std::move(table));
+  job.parameters = b.table;
+  job.options.threads = 1;
+  return fit(job);
+}
+
+// What rows miss a law of retardance by in a pattern moves it as that of light does, and beyond 3 % of the range there
+// is no answer.
+TEST(Rows, OfRetardancesAreChargedForWhatFollowsAPattern) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> birefringence(0.1, 0.25);
+  int answers = 0, inside = 0;
+  constexpr int kTables = 20;
+  for (unsigned i = 0; i < kTables; ++i) {
+    const double truth = birefringence(random);
+    const FitResult r = fit_of_tilts(truth, 0.01, i);
+    answers += r.has_answer();
+    inside += r.has_answer() && holds(r, "birefringence", truth);
+    EXPECT_EQ(fit_of_tilts(truth, 0.1, i).grade(), "not described") << truth;
+    EXPECT_EQ(fit_of_tilts(truth, 0, i).grade(), "answer") << truth;
+  }
+  EXPECT_GE(answers, kTables * 4 / 5);
+  EXPECT_GE(inside, answers * 0.95 - 3 * std::sqrt(answers * 0.95 * 0.05));
 }
 
 }  // namespace

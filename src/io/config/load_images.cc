@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "core/printable.h"
+#include "core/robust.h"
 #include "io/config/disc.h"
 #include "io/config/fit.h"
 #include "io/config/light.h"
@@ -25,6 +29,45 @@ bool fits_in(const MicrographSettings& settings, const std::array<int, 2>& size)
   const PixelRect roi = settings.roi.value_or(PixelRect{0, 0, size[0], size[1]});
   return roi.x0 >= 0 && roi.y0 >= 0 && roi.x1 <= size[0] && roi.y1 <= size[1] &&
          std::min(roi.width(), roi.height()) >= settings.bin;
+}
+
+/// Range and scatter of a picture's used pixels; nothing of few, or of a table of rings.
+struct Codes {
+  double low = 0, high = 0, sd = 0;
+};
+std::optional<Codes> codes_of(const Picture& picture) {
+  constexpr double kFewest = 50;
+  double n = 0, sum = 0, squares = 0;
+  Codes codes{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), 0};
+  for (std::size_t i = 0; i < picture.values.size() && i < picture.mask.size(); ++i) {
+    const double value = picture.values.values()[i];
+    if (!picture.mask.values()[i] || !std::isfinite(value)) continue;
+    codes.low = std::min(codes.low, value), codes.high = std::max(codes.high, value);
+    n += 1, sum += value, squares += value * value;
+  }
+  if (n < kFewest) return std::nullopt;
+  codes.sd = std::sqrt(std::max(0.0, squares / n - sum / n * sum / n));
+  return codes;
+}
+
+/// A picture of one single value, as bright as any of the others, of which most scatter, is where the camera ends.
+void refuse_clipped(ConfigReader& reader, const std::vector<const Picture*>& pictures,
+                    const std::vector<Where>& where) {
+  std::vector<double> scatter;
+  double brightest = -std::numeric_limits<double>::infinity();
+  for (const Picture* picture : pictures)
+    if (const std::optional<Codes> codes = codes_of(*picture))
+      scatter.push_back(codes->sd), brightest = std::max(brightest, codes->high);
+  constexpr double kCode = 1;
+  if (scatter.size() < 3 || median(scatter) < kCode) return;
+  for (std::size_t i = 0; i < pictures.size(); ++i)
+    if (const std::optional<Codes> codes = codes_of(*pictures[i]);
+        codes && codes->low == codes->high && codes->high == brightest)
+      reader.problems.add(where[i],
+                          fmt::format("{}: all of its pixels are {:.6g} counts, as bright as any, while other pictures "
+                                      "scatter: it is saturated",
+                                      pictures[i]->name, codes->high),
+                          "leave this picture out, or take it with a shorter exposure");
 }
 
 }  // namespace
@@ -182,6 +225,12 @@ void Loading::take_images() {
   for (std::size_t i = 0; i < micrographs_.size(); ++i) take_image(i, beside, taken);
   // A frame's own mistake, with which the others of its series have nothing to do.
   if (asked_.series && sound_ && !beside.missing && !reader_.problems.empty()) throw FrameError(reader_.problems.all());
+  std::vector<const Picture*> read;
+  std::vector<Where> read_from;
+  for (std::size_t i = 0; i < taken.filled.size(); ++i)
+    for (const Picture& picture : taken.filled[i])
+      read.push_back(&picture), read_from.push_back(items_[i / channels_.size()].image_where);
+  refuse_clipped(reader_, read, read_from);
   for (std::vector<Picture>& pictures : taken.filled)
     for (Picture& picture : pictures) find_starts(picture);
   warn_of_colours(taken);
