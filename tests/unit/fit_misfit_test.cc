@@ -1,5 +1,6 @@
 // What frames, rows and pixels miss the model by together, in the errors and in words.
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -72,6 +73,28 @@ TEST(Fit, FramesThatAgreeWidenTheirIntervalsByLessThanAThird) {
   // Frames that agree to their noise look as if they scattered in one of a hundred: five in 200 more would be one in
   // 1,000.
   EXPECT_LE(wider, 7);
+}
+
+// Three even pictures are three numbers: a voltage, a gain and an offset meet them whatever they are, and the fit says
+// so; a fourth one would show it.
+TEST(Fit, AsManyUnknownsAsPicturesLeaveNothingToCheck) {
+  for (const int pictures : {3, 4}) {
+    Bar bar(700, 0);
+    bar.free(bar.half_wave, 1450, 1000, 2000);
+    bar.free_linear();
+    Gaussian gaussian(5);
+    for (int g = 0; g < pictures; ++g) {
+      const double volts = 400 + 250 * g;
+      Picture& picture = bar.add_image(8, 8, bar.job.parameters.add_constant("bias", volts), true);
+      picture.noise = NoiseModel{20, 0, false};
+      expose(picture, 3000, 150, volts, 0, [&](int, int, double) { return 20 * gaussian(); });
+    }
+    const std::vector<std::string> exact = fit(bar.job).taken_as_exact;
+    const bool said = std::any_of(exact.begin(), exact.end(), [](const std::string& words) {
+      return words.find("nothing is left to check") != std::string::npos;
+    });
+    EXPECT_EQ(said, pictures == 3) << pictures;
+  }
 }
 
 TEST(Fit, FrameIntervalsCountFrames) {

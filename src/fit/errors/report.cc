@@ -198,6 +198,17 @@ void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covar
   covariances.lamp_drift = (drift.array().square() > kOfNote * covariance.diagonal().array()).any();
 }
 
+/// Several even pictures are a number each: no more of them than unknowns agree with any model.
+bool has_nothing_to_check(const Task& task, const LeastSquares& problem) {
+  constexpr double kEven = 1e-9;
+  if (task.frames() < 2 || task.job.prior || task.unknowns.size() < task.frames()) return false;
+  for (int g = 0; g < task.frames(); ++g) {
+    const auto [low, high] = problem.intensity_range(g);
+    if (!task.picture(g).uneven.empty() || high - low > kEven * std::max(std::abs(high), std::abs(low))) return false;
+  }
+  return true;
+}
+
 FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
                  Covariances covariances, bool beaten) {
   FitResult result;
@@ -210,6 +221,10 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.rivals = std::move(rivals.minima);
   result.warnings = optimum.warnings;
   result.taken_as_exact = task.job.taken_as_exact;
+  if (has_nothing_to_check(task, *optimum.problem))
+    result.taken_as_exact.push_back(
+        "the model itself: the pictures tell as many numbers as are fitted, and nothing is left to check it by. A "
+        "picture that is wrong, or a lamp that is not steady, would not show.");
   result.warnings.insert(result.warnings.end(), left_out.warnings.begin(), left_out.warnings.end());
   result.interrupted = (optimum.stopped && !beaten) || task.interrupted();
   if (result.interrupted) result.converged = false;
