@@ -207,5 +207,60 @@ TEST(Rows, OfRetardancesAreChargedForWhatFollowsAPattern) {
   EXPECT_GE(inside, answers * 0.95 - 3 * std::sqrt(answers * 0.95 * 0.05));
 }
 
+// The wavelengths of a table are read off one scale, all of them off by the same share: however many rows, the
+// birefringence is known no better than that.
+TEST(Rows, OfWavelengthsHaveOneScale) {
+  constexpr int kTables = 40, kRows = 25;
+  constexpr double kShare = 0.003, kNoise = 1e-4;
+  std::mt19937_64 random(12);
+  std::normal_distribution<double> normal;
+  int inside = 0;
+  for (int i = 0; i < kTables; ++i) {
+    const double truth = 0.15, scale = 1 + kShare * normal(random);
+    TableBuilder b;
+    const ParameterRef thickness = b.fixed("thickness_um", 12), zero = b.fixed("zero", 0), air = b.fixed("air", 1);
+    const ParameterRef ordinary = b.fixed("ordinary", 1.52), dn = b.fitted("birefringence", 0.16, 0.05, 0.35);
+    Readings table;
+    table.name = "wavelengths.csv";
+    table.observable.quantity = Quantity::retardance_waves;
+    table.values = Eigen::VectorXd(kRows);
+    table.gain = b.fixed("gain", 1), table.offset = zero;
+    table.noise = NoiseModel{kNoise, 0, false};
+    for (int row = 0; row < kRows; ++row) {
+      const double stated_nm = 450 + 10 * row;
+      Parameter wavelength;
+      wavelength.name = "signal[0].row[" + std::to_string(row) + "].microscope.light.wavelength_nm";
+      wavelength.value = stated_nm;
+      wavelength.unit = "nm";
+      wavelength.known_to.share = kShare;
+      Scene scene;
+      Cell cell;
+      cell.thickness_um = thickness;
+      UniformDirector director;
+      director.azimuth_deg = director.tilt_deg = zero;
+      cell.director = director;
+      scene.sample = cell;
+      scene.material = ConstantIndices{ordinary, dn};
+      scene.surround_index = air;
+      scene.microscope.wavelength_nm = b.table.add(wavelength);
+      scene.microscope.polarizer_deg = scene.microscope.analyzer_deg = zero;
+      scene.view.width = scene.view.height = 1;
+      table.rows.push_back(scene);
+      table.lines.push_back(row + 2);
+      table.values[row] = path(1.52, truth, 0, 12) / (1e-3 * stated_nm * scale) + kNoise * normal(random);
+    }
+    FitJob job;
+    job.measurements.push_back(std::move(table));
+    job.parameters = b.table;
+    job.options.threads = 1;
+    const FitResult r = fit(job);
+    ASSERT_TRUE(r.has_answer()) << r.verdict;
+    const ParameterEstimate* found = find_estimate(r, "birefringence");
+    EXPECT_LT(found->interval95_high - found->interval95_low, 2 * 2.2 * kShare * truth) << r.verdict;
+    inside += found->interval95_low <= truth && truth <= found->interval95_high;
+  }
+  EXPECT_GE(inside, kTables * 0.95 - 3 * std::sqrt(kTables * 0.95 * 0.05));
+}
+
 }  // namespace
 }  // namespace birefit

@@ -221,7 +221,7 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
     result.derived.push_back(std::move(estimate));
   };
   for (const int index : table.tied()) {
-    if (table.tie_of(index)->law->text() == kByZero) continue;
+    if (table.tie_of(index)->law->text() == kByZero || table.tie_of(index)->law->text() == kByScale) continue;
     const Parameter& parameter = table[index];
     const double value = result.theta[static_cast<std::size_t>(index)];
     const bool of_row = parameter.name.find("].row[") != std::string::npos;  // of which there are hundreds

@@ -50,6 +50,18 @@ bool is_own_dial(const FitJob& job, const std::vector<Ref*>& number) {
          });
 }
 
+/// Stated by every row for itself, and known to a share.
+template <class Ref>
+bool is_own_scale(const FitJob& job, const std::vector<Ref*>& number) {
+  if (number.empty()) return false;
+  return std::all_of(number.begin(), number.end(), [&](const Ref* ref) {
+    if (!*ref) return false;
+    const Parameter& stated = job.parameters[*ref];
+    return !stated.free && !stated.linear && stated.known_to.sd == 0 && stated.known_to.share > 0 &&
+           stated.name.find("].row[") != std::string::npos;
+  });
+}
+
 /// What other numbers follow from.
 std::set<int> followed(const FitJob& job) {
   std::set<int> all;
@@ -61,15 +73,16 @@ std::set<int> followed(const FitJob& job) {
   return all;
 }
 
-/// The entry is from now on what it was stated to be and the zero, so that what follows from it follows the zero, too.
-void tie_to_zero(ParameterTable& table, int index, ParameterRef zero) {
+/// The entry is from now on what it was stated to be and the zero, or times the scale, so that what follows from it
+/// follows that, too.
+void tie_to(ParameterTable& table, int index, ParameterRef common, const char* by) {
   Parameter& stated = table[index];
   stated.known_to = {};
   const std::string unit = stated.unit;
   const ParameterRef constant = table.add_constant("stated " + stated.name, stated.value, unit);
-  auto law = std::make_shared<Expression>(kByZero);
-  law->settle_units({unit, unit}, unit);
-  table.tie(index, {std::move(law), {zero.index, constant.index}});
+  auto law = std::make_shared<Expression>(by);
+  law->settle_units({table[common].unit, unit}, unit);
+  table.tie(index, {std::move(law), {common.index, constant.index}});
 }
 
 /// Of "signal[1].row[3].sample.temperature_k" what follows the frame.
@@ -82,27 +95,38 @@ std::string path_in_frame(const std::string& name) {
 
 bool has_own_dials(const FitJob& job) {
   const auto numbers = numbers_of<const FitJob, const ParameterRef>(job);
-  return std::any_of(numbers.begin(), numbers.end(),
-                     [&](const auto& number) { return is_own_dial(job, stated_of(job, number)); });
+  return std::any_of(numbers.begin(), numbers.end(), [&](const auto& number) {
+    return is_own_dial(job, stated_of(job, number)) || is_own_scale(job, stated_of(job, number));
+  });
 }
 
 FitJob with_shared_zeros(FitJob job) {
   const std::set<int> followed_by_others = followed(job);
   for (const std::vector<ParameterRef*>& all : numbers_of<FitJob, ParameterRef>(job)) {
     const std::vector<ParameterRef*> number = stated_of(job, all);
-    if (!is_own_dial(job, number)) continue;
+    const bool scale = is_own_scale(job, number);
+    if (!scale && !is_own_dial(job, number)) continue;
     const Parameter first = job.parameters[*number.front()];
-    const ParameterRef zero = job.parameters.add_constant("zero of " + path_in_frame(first.name), 0, first.unit);
-    for (const ParameterRef* ref : number)
-      job.parameters[zero].known_to.sd = std::max(job.parameters[zero].known_to.sd, job.parameters[*ref].known_to.sd);
+    const std::string path = path_in_frame(first.name);
+    const ParameterRef common = scale ? job.parameters.add_constant("scale of " + path, 1, "")
+                                      : job.parameters.add_constant("zero of " + path, 0, first.unit);
+    double& sd = job.parameters[common].known_to.sd;
+    for (const ParameterRef* ref : number) {
+      const Uncertainty& known_to = job.parameters[*ref].known_to;
+      sd = std::max(sd, scale ? known_to.share : known_to.sd);
+    }
     for (ParameterRef* ref : number) {
       if (followed_by_others.contains(ref->index)) {
-        if (!job.parameters.tie_of(ref->index)) tie_to_zero(job.parameters, ref->index, zero);
+        if (!job.parameters.tie_of(ref->index)) tie_to(job.parameters, ref->index, common, scale ? kByScale : kByZero);
         continue;
       }
       ParameterRef moved = *ref;
-      moved.plus += moved.times * job.parameters[*ref].value;
-      moved.index = zero.index;
+      const double stated = job.parameters[*ref].value;
+      if (scale)
+        moved.times *= stated;
+      else
+        moved.plus += moved.times * stated;
+      moved.index = common.index;
       *ref = moved;
     }
   }

@@ -388,10 +388,10 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
       const std::string name =
           "signal[" + std::to_string(number) + "].row[" + std::to_string(row.number) + "]." + item.columns[c].path;
       const ParameterRef own = reader.table.add_constant(name, value, columns[c].spec->unit);
-      // The zero of a dial or thermometer, as well as it is known where the number itself stands in the config.
+      // The zero of a dial or thermometer, the scale of a monochromator, as well as it is known where the number itself
+      // stands in the config.
       const Parameter& stated = reader.table[columns[c].shared];
-      reader.table[own].known_to.sd =
-          stated.where.line > 0 && !stated.free ? stated.known_to.sd : columns[c].spec->known_to.sd;
+      reader.table[own].known_to = stated.where.line > 0 && !stated.free ? stated.known_to : columns[c].spec->known_to;
       replace(scene, columns[c].shared, own);
     }
     table.x.push_back(row.set[0]);
