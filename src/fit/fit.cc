@@ -153,7 +153,7 @@ std::unique_ptr<Refit> explained(const Task& task, Optimum& optimum, const Minim
   constexpr double kNearlyAll = 0.2;
   if (!wider) return nullptr;
   const double before = excess_of(optimum), after = excess_of(wider->optimum);
-  const bool worth = is_round_throughout(task) ? is_worth_leaving_out(before, after) : after < kNearlyAll * before;
+  const bool worth = are_of_spheres(task) ? is_worth_leaving_out(before, after) : after < kNearlyAll * before;
   return worth ? std::move(wider) : nullptr;
 }
 

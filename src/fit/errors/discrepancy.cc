@@ -209,13 +209,13 @@ Eigen::MatrixXd by_parts(const Partition& parts, const Eigen::MatrixXd& informat
 }
 
 /// Pictures whose model changes from place to place, with enough of each to tell patterns apart: one, or several of
-/// what is round. (Of several of a bar, three in a calibration, patterns and pictures left out in turn widen far beyond
-/// what the pictures' own scatter is, which is in the errors already; behind a calibration what one picture misses is
-/// known from the calibration's frames.)
+/// spheres. (Of several of a bar or a disc, three in a calibration, patterns and pictures left out in turn widen far
+/// beyond what the pictures' own scatter is, which is in the errors already; behind a calibration what one picture
+/// misses is known from the calibration's frames.)
 bool tells_patterns(const Task& task, const LeastSquares& problem) {
   constexpr std::size_t kFewestPixels = 400;
   constexpr double kContrast = 0.05;  // else it is one number
-  if (task.job.prior || task.unknowns.size() == 0 || (task.frames() > 1 && !is_round_throughout(task))) return false;
+  if (task.job.prior || task.unknowns.size() == 0 || (task.frames() > 1 && !are_of_spheres(task))) return false;
   for (int g = 0; g < task.frames(); ++g) {
     const auto [low, high] = problem.intensity_range(g);
     if (task.observable(g).quantity != Quantity::intensity || traits_of(task.picture(g).scene).even ||
@@ -347,9 +347,9 @@ double missed_of_all(const Task& task, const Optimum& optimum) {
   return std::sqrt(missed) / std::max(high - low, 1e-300);
 }
 
-bool is_round_throughout(const Task& task) {
+bool are_of_spheres(const Task& task) {
   return !are_colours(task) && std::all_of(task.sights.begin(), task.sights.end(), [](const Sight& sight) {
-    return traits_of(sight.picture->scene).round.has_value();
+    return static_cast<bool>(traits_of(sight.picture->scene).sphere_diameter_um);
   });
 }
 

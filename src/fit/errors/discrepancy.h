@@ -23,8 +23,8 @@ std::vector<Eigen::MatrixXd> covariances_by_discrepancy(const Task& task, const 
 /// Whether there are any.
 bool leaves_discrepancy(const Task& task, const Optimum& optimum);
 
-/// Whether all pictures are of what is round, and no colours of one photograph.
-bool is_round_throughout(const Task& task);
+/// Whether all pictures are of spheres, and no colours of one photograph.
+bool are_of_spheres(const Task& task);
 
 /// What the model of a picture misses beyond its noise, as RMS over the range of the model's light.
 double missed_of_contrast(const Task& task, const Optimum& optimum, int frame = 0);

@@ -255,8 +255,7 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   const bool signal = judge_description(task, optimum, data_chi_square, minima.scan.points, result);
   if (!signal) result.identifiable = false;
   std::string misfit;
-  const bool nearly =
-      (covariances.discrepancy() && (task.frames() == 1 || is_round_throughout(task))) || left_out.by_light;
+  const bool nearly = (covariances.discrepancy() && (task.frames() == 1 || are_of_spheres(task))) || left_out.by_light;
   if (nearly && result.described && traits_of(task.picture(0).scene).round)
     misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
   else if (result.described && covariances.discrepancy() && are_rows(optimum.frames))
