@@ -145,8 +145,7 @@ void median_of_nine(Image& counts) {
 }
 
 // Two pictures that depart from the model alike do not scatter: what each misses is charged and refused as of one. A
-// median of nine pixels flattens fringes; charged by the pictures' scatter alone birefringence was nine half-widths
-// off.
+// median of nine pixels flattens fringes; charged by the pictures' scatter alone birefringence was 1.6 half-widths off.
 TEST(DisturbedRecovery, SeveralPicturesThatDepartAlike) {
   const auto half_widths_off = [](const FitResult& r, const char* name, double truth) {
     const ParameterEstimate* p = find_estimate(r, name);

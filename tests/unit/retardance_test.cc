@@ -144,48 +144,63 @@ TEST(Rows, SlipsAndTheWayThereShow) {
   EXPECT_EQ(look_at_rows(x, loop).compared, 0);
 }
 
-/// A table of a tilted cell's path difference against the tilt, bent by a bow of the part `bow` of its range, with
-/// noise of a five-hundredth of that.
-FitResult fit_of_tilts(double birefringence, double bow, unsigned seed) {
-  constexpr int kRows = 30;
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
+/// A table of a planar cell of 12 um and ordinary index 1.52, whose birefringence is fitted.
+struct CellTable {
   TableBuilder b;
-  const ParameterRef thickness = b.fixed("thickness_um", 12), azimuth = b.fixed("azimuth_deg", 33);
-  const ParameterRef wavelength = b.fixed("wavelength_nm", 600), zero = b.fixed("zero", 0), air = b.fixed("air", 1);
-  const ParameterRef ordinary = b.fixed("ordinary", 1.52), dn = b.fitted("birefringence", 0.15, 0.05, 0.35);
   Readings table;
-  table.name = "tilts.csv";
-  table.observable.quantity = Quantity::retardance_um;
-  table.values = Eigen::VectorXd(kRows);
-  table.gain = b.fixed("gain", 1), table.offset = zero;
-  const double range = path(1.52, birefringence, 0, 12);
-  table.noise = NoiseModel{range / 500, 0, false};
-  for (int row = 0; row < kRows; ++row) {
-    const double tilt = 80.0 * row / (kRows - 1), t = 2.0 * row / (kRows - 1) - 1;
+  ParameterRef thickness = b.fixed("thickness_um", 12), zero = b.fixed("zero", 0), air = b.fixed("air", 1);
+  ParameterRef ordinary = b.fixed("ordinary", 1.52), birefringence = b.fitted("birefringence", 0.16, 0.05, 0.35);
+  std::vector<double> values;
+
+  explicit CellTable(Quantity quantity) {
+    table.name = "rows.csv";
+    table.observable.quantity = quantity;
+    table.gain = b.fixed("gain", 1), table.offset = zero;
+  }
+  void add_row(ParameterRef tilt_deg, ParameterRef wavelength_nm, double value) {
     Scene scene;
     Cell cell;
     cell.thickness_um = thickness;
     UniformDirector director;
-    director.azimuth_deg = azimuth;
-    director.tilt_deg = b.fixed("tilt" + std::to_string(row), tilt);
+    director.azimuth_deg = zero;
+    director.tilt_deg = tilt_deg;
     cell.director = director;
     scene.sample = cell;
-    scene.material = ConstantIndices{ordinary, dn};
+    scene.material = ConstantIndices{ordinary, birefringence};
     scene.surround_index = air;
-    scene.microscope.wavelength_nm = wavelength;
+    scene.microscope.wavelength_nm = wavelength_nm;
     scene.microscope.polarizer_deg = scene.microscope.analyzer_deg = zero;
     scene.view.width = scene.view.height = 1;
     table.rows.push_back(scene);
-    table.lines.push_back(row + 2);
-    table.values[row] =
-        path(1.52, birefringence, tilt, 12) + range * (bow * std::cos(1.5 * M_PI * t) + normal(random) / 500);
+    table.lines.push_back(static_cast<int>(table.rows.size()) + 1);
+    values.push_back(value);
   }
-  FitJob job;
-  job.measurements.push_back(std::move(table));
-  job.parameters = b.table;
-  job.options.threads = 1;
-  return fit(job);
+  FitResult fitted(double noise) {
+    table.values = Eigen::Map<Eigen::VectorXd>(values.data(), std::ssize(values));
+    table.noise = NoiseModel{noise, 0, false};
+    FitJob job;
+    job.measurements.push_back(table);
+    job.parameters = b.table;
+    job.options.threads = 1;
+    return fit(job);
+  }
+};
+
+/// Path differences against the tilt of the axis, bent by a bow of the part `bow` of their range, with noise of a
+/// five-hundredth of that.
+FitResult fit_of_tilts(double birefringence, double bow, unsigned seed) {
+  constexpr int kRows = 30;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  CellTable cell(Quantity::retardance_um);
+  const ParameterRef wavelength = cell.b.fixed("wavelength_nm", 600);
+  const double range = path(1.52, birefringence, 0, 12);
+  for (int row = 0; row < kRows; ++row) {
+    const double tilt = 80.0 * row / (kRows - 1), t = 2.0 * row / (kRows - 1) - 1;
+    cell.add_row(cell.b.fixed("tilt" + std::to_string(row), tilt), wavelength,
+                 path(1.52, birefringence, tilt, 12) + range * (bow * std::cos(1.5 * M_PI * t) + normal(random) / 500));
+  }
+  return cell.fitted(range / 500);
 }
 
 // What rows miss a law of retardance by in a pattern moves it as that of light does, and beyond 3 % of the range there
@@ -211,53 +226,28 @@ TEST(Rows, OfRetardancesAreChargedForWhatFollowsAPattern) {
 // birefringence is known no better than that.
 TEST(Rows, OfWavelengthsHaveOneScale) {
   constexpr int kTables = 40, kRows = 25;
-  constexpr double kShare = 0.003, kNoise = 1e-4;
+  constexpr double kShare = 0.003, kNoise = 1e-4, kTruth = 0.15;
   std::mt19937_64 random(12);
   std::normal_distribution<double> normal;
   int inside = 0;
   for (int i = 0; i < kTables; ++i) {
-    const double truth = 0.15, scale = 1 + kShare * normal(random);
-    TableBuilder b;
-    const ParameterRef thickness = b.fixed("thickness_um", 12), zero = b.fixed("zero", 0), air = b.fixed("air", 1);
-    const ParameterRef ordinary = b.fixed("ordinary", 1.52), dn = b.fitted("birefringence", 0.16, 0.05, 0.35);
-    Readings table;
-    table.name = "wavelengths.csv";
-    table.observable.quantity = Quantity::retardance_waves;
-    table.values = Eigen::VectorXd(kRows);
-    table.gain = b.fixed("gain", 1), table.offset = zero;
-    table.noise = NoiseModel{kNoise, 0, false};
+    const double scale = 1 + kShare * normal(random);
+    CellTable cell(Quantity::retardance_waves);
     for (int row = 0; row < kRows; ++row) {
-      const double stated_nm = 450 + 10 * row;
       Parameter wavelength;
       wavelength.name = "signal[0].row[" + std::to_string(row) + "].microscope.light.wavelength_nm";
-      wavelength.value = stated_nm;
+      wavelength.value = 450 + 10 * row;
       wavelength.unit = "nm";
       wavelength.known_to.share = kShare;
-      Scene scene;
-      Cell cell;
-      cell.thickness_um = thickness;
-      UniformDirector director;
-      director.azimuth_deg = director.tilt_deg = zero;
-      cell.director = director;
-      scene.sample = cell;
-      scene.material = ConstantIndices{ordinary, dn};
-      scene.surround_index = air;
-      scene.microscope.wavelength_nm = b.table.add(wavelength);
-      scene.microscope.polarizer_deg = scene.microscope.analyzer_deg = zero;
-      scene.view.width = scene.view.height = 1;
-      table.rows.push_back(scene);
-      table.lines.push_back(row + 2);
-      table.values[row] = path(1.52, truth, 0, 12) / (1e-3 * stated_nm * scale) + kNoise * normal(random);
+      cell.add_row(cell.zero, cell.b.table.add(wavelength),
+                   path(1.52, kTruth, 0, 12) / (1e-3 * wavelength.value * scale) + kNoise * normal(random));
     }
-    FitJob job;
-    job.measurements.push_back(std::move(table));
-    job.parameters = b.table;
-    job.options.threads = 1;
-    const FitResult r = fit(job);
+    const FitResult r = cell.fitted(kNoise);
     ASSERT_TRUE(r.has_answer()) << r.verdict;
     const ParameterEstimate* found = find_estimate(r, "birefringence");
-    EXPECT_LT(found->interval95_high - found->interval95_low, 2 * 2.2 * kShare * truth) << r.verdict;
-    inside += found->interval95_low <= truth && truth <= found->interval95_high;
+    // Two standard deviations to either side, and a tenth for the t quantile.
+    EXPECT_LT(found->interval95_high - found->interval95_low, 2 * 2.2 * kShare * kTruth) << r.verdict;
+    inside += found->interval95_low <= kTruth && kTruth <= found->interval95_high;
   }
   EXPECT_GE(inside, kTables * 0.95 - 3 * std::sqrt(kTables * 0.95 * 0.05));
 }

@@ -104,7 +104,7 @@ FitJob with_catalogue(const Task& task, const Optimum& optimum) {
     parameter.prior_sd = kind.sd * gain;
     return wider.parameters.add(std::move(parameter));
   };
-  const Picture first = std::get<Picture>(wider.measurements.front());
+  const Picture& first = task.picture(0);
   for (const Uneven& one : kUneven) {
     const bool fitted = std::any_of(first.uneven.begin(), first.uneven.end(), [&](const UnevenLight& own) {
       return own.shape == one.shape && own.of_intensity == one.of_intensity;

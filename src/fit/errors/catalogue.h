@@ -11,9 +11,9 @@ namespace birefit::estimation {
 /// Whether a departure of that name is asked for (FitOptions::not_asked).
 bool is_asked(const FitOptions& options, std::string_view departure);
 
-/// Whether noise does not explain what a fit of one picture of a sphere or disc leaves over, while the model misses
-/// less than a tenth of its contrast: then the catalogue is asked. Where noise does explain it, the optimum says so
-/// from then on. Of several exposures of a bar it is asked by chi-square alone.
+/// Whether noise does not explain what a fit of one picture of a sphere or disc leaves over, or of several of a sphere
+/// in one gain, while the model misses less than a tenth of their contrast: then the catalogue is asked. Where noise
+/// does explain it, the optimum says so from then on. Of several exposures of a bar it is asked by chi-square alone.
 bool asks_catalogue(const Task& task, Optimum& optimum);
 /// By what is missed of the contrast (missed_of_contrast) without and with the catalogue: what missed more than a
 /// fiftieth is not nearly the picture's model, but other physics or another director, unless nearly all of it is

@@ -39,8 +39,7 @@ std::string judge_rows(const Task& task, const Optimum& optimum, FitResult& resu
   for (int g = 0; g < task.frames(); ++g) {
     const LeastSquares::FrameMisfit frame = optimum.problem->frame_misfit(g);
     Rows& rows = tables[task.sights[static_cast<std::size_t>(g)].table];
-    const double value = frame.mean_light;
-    rows.low = std::min(rows.low, value), rows.high = std::max(rows.high, value);
+    rows.low = std::min(rows.low, frame.mean_light), rows.high = std::max(rows.high, frame.mean_light);
     rows.off.push_back(std::abs(frame.mean_whitened) * frame.mean_noise_sd), rows.noise.push_back(frame.mean_noise_sd);
   }
   for (auto& [name, rows] : tables) {

@@ -223,7 +223,9 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   // What scatters by more than a lamp does is not the lamp, nor need it be where frames are not described either.
   // The noise that was read off a table's rows is no better known than what they scatter by.
   constexpr double kSignificant = 0.999, kOfNoiseRead = 0.95;
-  const bool rows = are_rows(optimum.frames), read = rows && optimum.frames.front().noise.estimated;
+  const bool rows = are_rows(optimum.frames),
+             read = rows && std::any_of(optimum.frames.begin(), optimum.frames.end(),
+                                        [](const Frame&frame) { return frame.noise.estimated; });
   const double significant = chi_square_quantile(read ? kOfNoiseRead : kSignificant, dof);
   constexpr double kTellsWhich = 2;  // degrees of freedom: a single one tells of any scatter only that it is there
   const bool of_model = found.beyond_noise && dof > kTellsWhich - 0.1 &&

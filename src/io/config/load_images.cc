@@ -53,13 +53,15 @@ std::optional<Codes> codes_of(const Picture& picture) {
 /// A picture of one single value, as bright as any of the others, of which most scatter, is where the camera ends.
 void refuse_clipped(ConfigReader& reader, const std::vector<const Picture*>& pictures,
                     const std::vector<Where>& where) {
+  constexpr std::size_t kFewest = 3;  // else there are no other pictures to tell by
+  if (pictures.size() < kFewest) return;
   std::vector<double> scatter;
   double brightest = -std::numeric_limits<double>::infinity();
   for (const Picture* picture : pictures)
     if (const std::optional<Codes> codes = codes_of(*picture))
       scatter.push_back(codes->sd), brightest = std::max(brightest, codes->high);
   constexpr double kCode = 1;
-  if (scatter.size() < 3 || median(scatter) < kCode) return;
+  if (scatter.size() < kFewest || median(scatter) < kCode) return;
   for (std::size_t i = 0; i < pictures.size(); ++i)
     if (const std::optional<Codes> codes = codes_of(*pictures[i]);
         codes && codes->low == codes->high && codes->high == brightest)
