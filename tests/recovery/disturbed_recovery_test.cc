@@ -5,8 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -16,60 +14,15 @@
 
 #include "birefit/fit.h"
 #include "departures.h"
+#include "droplet_96.h"
 #include "scene_builder.h"
 
 namespace birefit {
 namespace {
 using namespace testing;
 
-constexpr int kSize = 96;
-constexpr double kGain = 1000, kOffset = 40, kDiameter = 9.3, kBirefringence = 0.22;
-
-/// A droplet and the job to fit it; the table's values are the truth until start() is called.
-struct Droplet96 {
-  TableBuilder b;
-  Scene scene;
-  Picture m;
-  std::optional<Scene> nature;  ///< where it is not what the fit takes it for
-  Demand natural;               ///< how nature makes its picture
-  ParameterRef diameter, birefringence, center_x, center_y, polarizer, analyzer, gain, offset;
-
-  Droplet96() {
-    birefit::Droplet droplet;
-    droplet.diameter_um = diameter = b.fitted("diameter_um", kDiameter, 8.7, 9.9);
-    scene.sample = droplet;
-    scene.material = ConstantIndices{b.fixed("ordinary", 1.52),
-                                     birefringence = b.fitted("birefringence", kBirefringence, 0.15, 0.30)};
-    scene.surround_index = b.fixed("surround", 1.43);
-    scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 590);
-    scene.microscope.polarizer_deg = polarizer = b.fixed("polarizer_deg", 0);
-    scene.microscope.analyzer_deg = analyzer = b.fixed("analyzer_deg", 90);
-    scene.view.width = scene.view.height = kSize;
-    scene.view.pixel_size_um = b.fixed("pixel_size_um", 0.13);
-    scene.view.center_x_px = center_x = b.fitted("center_x", 47.7, 42, 53);
-    scene.view.center_y_px = center_y = b.fitted("center_y", 47.2, 42, 53);
-    scene.view.rotation_deg = b.fixed("rotation", 0);
-    gain = b.linear("gain", kGain);
-    offset = b.linear("offset", kOffset);
-  }
-  /// Intensity of a pixel with the table's values.
-  Image light() const {
-    const Theta theta = b.table.values();
-    const Scene& seen = nature ? *nature : scene;
-    return render(seen, plan(seen, natural, theta), theta, {}, 1).intensity;
-  }
-};
-
-using Random = std::mt19937_64;
 double uniform(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
-}
-
-/// Counts with photon and read noise.
-void expose(Image& counts, Random& random) {
-  std::normal_distribution<double> normal;
-  for (double& v : counts.values())
-    v = static_cast<double>(std::poisson_distribution<long>(std::max(v, 0.0))(random)) + 3 * normal(random);
 }
 
 struct Disturbance {
@@ -106,60 +59,6 @@ FitResult fit_one(const Disturbance& by, bool helped, unsigned seed) {
   if (helped) by.help(d, job);
   job.parameters = d.b.table;
   return fit(job);
-}
-
-/// The same droplet in two pictures, the second with both polarizers turned by 45 degrees.
-FitResult fit_two(const std::function<void(Image&)>& camera, unsigned seed) {
-  Droplet96 d;
-  Random random(seed);
-  FitJob job;
-  Scene turned = d.scene;
-  turned.microscope.polarizer_deg = d.b.fixed("polarizer_2", 45);
-  turned.microscope.analyzer_deg = d.b.fixed("analyzer_2", 135);
-  for (const Scene& scene : {d.scene, turned}) {
-    d.scene = scene;
-    Image counts = d.light();
-    for (double& v : counts.values()) v = kOffset + kGain * v;
-    expose(counts, random);
-    camera(counts);
-    job.measurements.push_back(micrograph_of("picture", scene, counts.values(), d.gain, d.offset, {3, 1}));
-    std::get<Picture>(job.measurements.back()).noise.reset();
-  }
-  for (const auto& [ref, start] : {std::pair(d.diameter, 9.2), {d.birefringence, 0.21}, {d.center_x, 47.0}})
-    d.b.table[ref].value = start;
-  job.parameters = d.b.table;
-  job.options.threads = 1;
-  return fit(job);
-}
-
-/// Every pixel becomes the middle one of itself and its neighbours.
-void median_of_nine(Image& counts) {
-  const Image before = counts;
-  for (int y = 1; y + 1 < counts.height(); ++y)
-    for (int x = 1; x + 1 < counts.width(); ++x) {
-      std::array<double, 9> around;
-      for (int i = 0; i < 9; ++i) around[static_cast<std::size_t>(i)] = before(x + i % 3 - 1, y + i / 3 - 1);
-      std::nth_element(around.begin(), around.begin() + 4, around.end());
-      counts(x, y) = around[4];
-    }
-}
-
-// Two pictures that depart from the model alike do not scatter: what each misses is charged and refused as of one. A
-// median of nine pixels flattens fringes; charged by the pictures' scatter alone birefringence was 1.6 half-widths off.
-TEST(DisturbedRecovery, SeveralPicturesThatDepartAlike) {
-  const auto half_widths_off = [](const FitResult& r, const char* name, double truth) {
-    const ParameterEstimate* p = find_estimate(r, name);
-    return std::abs(p->value - truth) /
-           (truth > p->value ? p->interval95_high - p->value : p->value - p->interval95_low);
-  };
-  for (const unsigned seed : {1u, 2u, 3u}) {
-    const FitResult clean = fit_two([](Image&) {}, seed);
-    EXPECT_EQ(clean.grade(), "answer") << clean.verdict;
-    const FitResult filtered = fit_two(median_of_nine, seed);
-    if (!filtered.has_answer()) continue;
-    EXPECT_LT(half_widths_off(filtered, "diameter_um", kDiameter), 1.5) << filtered.verdict;
-    EXPECT_LT(half_widths_off(filtered, "birefringence", kBirefringence), 1.5) << filtered.verdict;
-  }
 }
 
 /// Fits of several seeds: what lies beyond 5 standard errors must say so by having no answer.
