@@ -175,7 +175,7 @@ struct StatedNumber {
 };
 /// A departure of the picture from the model that was fitted since something was left over (docs/methods.md, "Nearly
 /// the model"). Light and background: shares of the gain at the picture's edge; blur: variance (px^2), < 0: sharpened;
-/// gamma: light to the power of 1 + gamma; curve: light times 1 + curve (light / brightest - 1); stretch: share by
+/// gamma: light to the power of 1 + gamma; curve: light times 1 + curve (light - 1); stretch: share by
 /// which the picture is wider, and as much lower (or longer along the diagonal from its upper left, as much narrower
 /// across).
 struct Departure {

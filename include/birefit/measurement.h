@@ -42,8 +42,8 @@ struct PictureEffect {
   /// What it is, with the unit of the effect.
   enum class Kind {
     blur,              ///< by its variance (px^2); < 0: sharpened
-    gamma,             ///< light to the power of 1 + gamma, of the brightest
-    curve,             ///< light times 1 + curve (light / brightest - 1)
+    gamma,             ///< light to the power of 1 + gamma
+    curve,             ///< light times 1 + curve (light - 1)
     stretch_x,         ///< about the centre, wider by it and as much lower
     stretch_diagonal,  ///< the same, longer along the diagonal from the upper left
     growth,            ///< about the centre, wider and higher by it

@@ -75,6 +75,12 @@ struct Bar {
     job.measurements.push_back(std::move(micrograph));
     return std::get<Picture>(job.measurements.back());
   }
+  /// Light that is known to be even: errors are those of noise.
+  void under_even_light() {
+    for (Measurement& measurement : job.measurements)
+      for (const auto shape : {UnevenLight::Shape::x, UnevenLight::Shape::y, UnevenLight::Shape::square})
+        std::get<Picture>(measurement).uneven.push_back({zero, shape, true});
+  }
 };
 
 inline double intensity(double bias, double tilt, int y, int height) {

@@ -131,6 +131,7 @@ TEST(Fit, StandardErrorsEqualTheSpreadOverSeeds) {
         const double signal = 3000 * mean + 100;
         micrograph.values(x, y) = signal + std::sqrt(100 + 0.5 * signal) * gaussian();
       }
+    bar.under_even_light();
     const FitResult result = fit(bar.job);
     const ParameterEstimate& bias = estimate(result, "sample.crystal.bias_v");
     ASSERT_TRUE(result.has_answer()) << seed << ": " << result.verdict;

@@ -72,6 +72,7 @@ TEST(Fit, ProfileFollowsAValleyThatBends) {
   m.noise = NoiseModel{kSd, 0, false};
   Gaussian gaussian(5);
   expose(m, 3000, 150, 1400, 0.4, [&](int, int, double) { return kSd * gaussian(); });
+  bar.under_even_light();
   const FitResult result = fit(bar.job);
   ASSERT_TRUE(result.has_answer()) << result.verdict;
   int profiled = 0;

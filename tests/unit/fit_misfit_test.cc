@@ -131,6 +131,30 @@ TEST(Fit, ASingleFrameThroughACalibrationCarriesTheFramesOwnMisfit) {
   EXPECT_TRUE(result.has_answer()) << result.verdict;
 }
 
+// Light that grows by 2 % towards one electrode looks like a field that does.
+TEST(Fit, LightThatMayBeUnevenIsInTheErrorOfAField) {
+  constexpr int kSide = 24;
+  constexpr double kGain = 3000, kVolts = 700, kTilt = 0.2, kUneven = 0.02;
+  const auto run = [&](bool known_to_be_even) {
+    Bar bar(kVolts);
+    bar.free(bar.tilt, 0.25, 0.05, 0.6);
+    bar.free_linear();
+    Picture& picture = bar.add_image(kSide, kSide, bar.bias);
+    picture.noise = NoiseModel{5, 0, false};
+    Gaussian gaussian(6);
+    expose(picture, kGain, 100, kVolts, kTilt, [&](int, int y, double) {
+      const double across = 2 * (y + 0.5) / kSide - 1;
+      return kGain * intensity(kVolts, kTilt, y, kSide) * kUneven * across + 5 * gaussian();
+    });
+    if (known_to_be_even) bar.under_even_light();
+    const FitResult result = fit(bar.job);
+    const ParameterEstimate& tilt = estimate(result, "sample.crystal.field_legendre.c1");
+    return std::abs(tilt.value - kTilt) / (0.5 * (tilt.interval95_high - tilt.interval95_low));
+  };
+  EXPECT_GT(run(true), 2);
+  EXPECT_LT(run(false), 1);
+}
+
 TEST(Fit, MisfitSharedByPixelsWidensTheErrors) {
   const auto run = [](double misfit) {
     Bar bar;
@@ -141,6 +165,7 @@ TEST(Fit, MisfitSharedByPixelsWidensTheErrors) {
     Gaussian gaussian(8);
     expose(micrograph, 3000, 100, 700, 0.4,
            [&](int x, int y, double) { return 10 * gaussian() + misfit * std::sin(0.4 * x) * std::sin(0.4 * y); });
+    bar.under_even_light();
     return fit(bar.job);
   };
   const FitResult clean = run(0), wrong = run(100);

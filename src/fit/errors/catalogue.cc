@@ -69,6 +69,22 @@ bool are_alike(const Task& task) {
   return !even;
 }
 
+const std::string kCharge = "sample.crystal.built_in_bias_v";
+
+/// Of bars at several voltages whose charge is not given it is a number, stated as none; nothing where it is given.
+ParameterRef with_charge(FitJob& job, const Theta& theta) {
+  constexpr double kOfHalfWave = 0.03;  // a standard deviation
+  std::vector<Crystal*> bars;
+  for_each_scene(job.measurements, [&](Scene& scene) {
+    if (Crystal* bar = std::get_if<Crystal>(&scene.sample); bar && !bar->built_in_bias_v) bars.push_back(bar);
+  });
+  if (bars.size() < 2 || bars.size() != job.measurements.size()) return {};
+  const ParameterRef charge = job.parameters.add_constant(kCharge, 0, "V");
+  job.parameters[charge].known_to.sd = kOfHalfWave * std::abs(bars.front()->half_wave_voltage_v.in(theta));
+  for (Crystal* bar : bars) bar->built_in_bias_v = charge;
+  return charge;
+}
+
 }  // namespace
 
 bool is_asked(const FitOptions& options, std::string_view departure) {
@@ -80,9 +96,9 @@ bool asks_catalogue(const Task& task, Optimum& optimum) {
   constexpr double kHopeless = 0.1;
   if (optimum.stopped || !task.picture(0).effects.empty()) return false;
   if (task.frames() > 1 && !are_alike(task)) return false;
-  if (!(missed_of_all(task, optimum) < kHopeless)) return false;
   const Traits traits = traits_of(task.picture(0).scene);
   if (!traits.round) return task.frames() > 1 && optimum.misfit.beyond_noise;
+  if (!(missed_of_all(task, optimum) < kHopeless)) return false;
   if (task.frames() > 1 && !traits.sphere_diameter_um) return false;  // a calibration's loads
   optimum.explained = !leaves_discrepancy(task, optimum);
   return !optimum.explained;
@@ -94,14 +110,20 @@ bool believes_catalogue(double missed_before, double missed_after) {
 }
 
 FitJob with_catalogue(const Task& task, const Optimum& optimum) {
-  FitJob wider = with_nuisances(task.job, told_numbers(task, optimum));
+  std::vector<int> numbers = told_numbers(task, optimum);
+  FitJob wider = task.job;
+  if (is_asked(task.job.options, kCharge))
+    if (const ParameterRef charge = with_charge(wider, optimum.theta)) numbers.push_back(charge.index);
+  wider = with_nuisances(wider, numbers);
   const double gain = std::abs(task.gain_of(0, optimum.theta));
-  const auto term = [&](const Kind& kind) {
+  double brightest = 0;  // of all pictures: one camera's curve is bent over what they show together
+  for (int g = 0; g < task.frames(); ++g) brightest = std::max(brightest, optimum.problem->intensity_range(g)[1]);
+  const auto term = [&](const Kind& kind, double unit = 1) {
     Parameter parameter;
     parameter.name = kPrefix + kind.name;
     parameter.unit = kind.unit;
     parameter.free = parameter.nuisance = parameter.linear = true;
-    parameter.prior_sd = kind.sd * gain;
+    parameter.prior_sd = kind.sd * gain * unit;
     return wider.parameters.add(std::move(parameter));
   };
   const Picture& first = task.picture(0);
@@ -117,7 +139,8 @@ FitJob with_catalogue(const Task& task, const Optimum& optimum) {
   for (const Effect& one : kEffects) {
     const bool of_camera = one.effect == PictureEffect::Kind::gamma || one.effect == PictureEffect::Kind::curve;
     if ((!traits_of(first.scene).round && !of_camera) || !is_asked(task.job.options, one.kind.name)) continue;
-    const ParameterRef coefficient = term(one.kind);
+    const bool bent = one.effect == PictureEffect::Kind::curve && brightest > 0;
+    const ParameterRef coefficient = term(one.kind, bent ? 1 / brightest : 1);
     for (Measurement& of : wider.measurements) std::get<Picture>(of).effects.push_back({coefficient, one.effect});
   }
   return wider;

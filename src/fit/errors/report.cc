@@ -7,6 +7,7 @@
 
 #include "fit/errors/catalogue.h"
 #include "fit/errors/discrepancy.h"
+#include "fit/errors/lamp_and_camera.h"
 #include "fit/errors/verdict.h"
 #include "samples/kind.h"
 
@@ -84,7 +85,7 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
                                   [&](int index) { return task.job.parameters[index].nuisance; });
   if (fitted || (covariances.stated.shift.size() > 0 && !covariances.stated.shift.isZero(0)))
     words += ", and what is stated and not known exactly";
-  if (covariances.lamp_drift) words += ", and a lamp that drifts";
+  if (!covariances.by_light.empty()) words += ", and " + covariances.by_light;
   if (left_out.by_waves) words += ", and what rays lose of a wave-optical image";
   if (left_out.by_light) words += ", and what another lamp or camera would change";
   return words;
@@ -190,12 +191,12 @@ void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covar
   Eigen::MatrixXd& covariance = covariances.with_misfit.covariance;
   covariance += stated.shift * stated.shift.transpose();
   covariances.stated = std::move(stated);
-  if (optimum.misfit.frames_scatter) return;  // which holds what the lamp does as well
-  const Eigen::VectorXd drift = shift_by_drift(task, *optimum.problem, covariances.of_noise.covariance);
-  if (drift.size() == 0) return;
-  covariance += drift * drift.transpose();
+  const LampAndCamera light = by_lamp_and_camera(task, optimum, covariances.of_noise.covariance);
+  if (light.covariance.size() == 0) return;
+  covariance += light.covariance;
   constexpr double kOfNote = 0.05;  // of a variance
-  covariances.lamp_drift = (drift.array().square() > kOfNote * covariance.diagonal().array()).any();
+  if ((light.covariance.diagonal().array() > kOfNote * covariance.diagonal().array()).any())
+    covariances.by_light = light.of_drift_alone ? "a lamp that drifts" : "what lamp and camera usually depart by";
 }
 
 /// Several even pictures are a number each: no more of them than unknowns agree with any model.
@@ -209,6 +210,14 @@ bool has_nothing_to_check(const Task& task, const LeastSquares& problem) {
   return true;
 }
 
+/// What a line of FitJob::taken_as_exact begins with may have been asked since (catalogue.h).
+bool is_fitted_since(const Task& task, const std::string& line) {
+  return std::any_of(task.unknowns.searched.begin(), task.unknowns.searched.end(), [&](int index) {
+    const Parameter& parameter = task.job.parameters[index];
+    return parameter.nuisance && line.starts_with(parameter.name + " ");
+  });
+}
+
 FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rivals rivals, const LeftOut& left_out,
                  Covariances covariances, bool beaten) {
   FitResult result;
@@ -220,7 +229,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   result.identifiable = optimum.possible;
   result.rivals = std::move(rivals.minima);
   result.warnings = optimum.warnings;
-  result.taken_as_exact = task.job.taken_as_exact;
+  for (const std::string& line : task.job.taken_as_exact)
+    if (!is_fitted_since(task, line)) result.taken_as_exact.push_back(line);
   if (has_nothing_to_check(task, *optimum.problem))
     result.taken_as_exact.push_back(
         "the model itself: the pictures tell as many numbers as are fitted, and nothing is left to check it by. A "

@@ -2,6 +2,8 @@
 // From an optimum to a result: errors, limits, intervals, what the image shows and what it does not, and words for all
 // of it.
 
+#include <string>
+
 #include "fit/errors/left_out.h"
 #include "fit/errors/rivals.h"
 #include "fit/errors/stated.h"
@@ -17,8 +19,8 @@ struct Covariances {
   double along = 1;                ///< largest factor on a standard error by the latter
   Eigen::VectorXd by_discrepancy;  ///< standard deviations of all unknowns by one that is left over; empty: none
   bool discrepancy() const { return by_discrepancy.size() > 0; }
-  bool lamp_drift = false;  ///< makes a part of note of `with_misfit`
-  Stated stated;            ///< what it would be to state these otherwise is in `with_misfit`, too
+  std::string by_light;  ///< what lamp and camera do that makes a part of note of `with_misfit`; empty: nothing
+  Stated stated;         ///< what it would be to state these otherwise is in `with_misfit`, too
 };
 /// `propagation`: LeftOut::propagation.
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);

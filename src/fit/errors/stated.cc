@@ -121,29 +121,6 @@ Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::Mat
   return stated;
 }
 
-Eigen::VectorXd shift_by_drift(const Task& task, const LeastSquares& problem, const Eigen::MatrixXd& covariance) {
-  const int frames = task.frames();
-  const ParameterRef gain = task.picture(0).gain;
-  if (frames < 2 || !gain) return {};
-  const double share = task.job.parameters[gain].known_to.share;
-  Eigen::MatrixXd column = problem.intensity() * share;
-  Eigen::Index begin = 0;
-  for (int g = 0; g < frames; ++g) {
-    if (!(task.picture(g).gain == gain) || task.observable(g).quantity != Quantity::intensity) return {};
-    const auto count = static_cast<Eigen::Index>(problem.pixels(g).pixels.size());
-    column.middleRows(begin, count) *= static_cast<double>(g) / (frames - 1) - 0.5;
-    begin += count;
-  }
-  if (!(share > 0)) return {};
-  const LeastSquares::Beside sums = problem.beside(std::move(column));
-  const Eigen::VectorXd shift = -covariance * sums.with_unknowns;
-  const double information = sums.among(0, 0) + sums.with_unknowns.col(0).dot(shift);
-  if (!shift.allFinite() || !std::isfinite(information)) return {};
-  // The estimates are those without a drift: its mean square by the pictures and its prior, not its variance.
-  const double variance = 1 / (1 + std::max(0.0, information)), mean = variance * sums.with_residual[0];
-  return std::sqrt(variance + mean * mean) * shift;
-}
-
 std::vector<int> told_numbers(const Task& task, const Optimum& optimum) {
   const Inverse inverse = invert_normal_equations(optimum.problem->factor());
   const Stated stated = linear_stated_numbers(task, *optimum.problem, optimum.theta, inverse.covariance);

@@ -28,11 +28,6 @@ Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::Mat
 /// What they add to the covariance where each is fitted along as far as the pictures tell it.
 Eigen::MatrixXd covariance_by(const Stated& stated);
 
-/// By how much the unknowns change where the lamp's light drifts from the first of several pictures of one gain to the
-/// last: by as much as is usual (Parameter::known_to of the gain), and as far as the pictures tell. Empty: there is
-/// none.
-Eigen::VectorXd shift_by_drift(const Task& task, const LeastSquares& problem, const Eigen::MatrixXd& covariance);
-
 /// Those that the pictures know themselves, where it matters: fitted beside the unknowns they leave them smaller
 /// errors, or describe the pictures better than by chance.
 struct WorthFitting {

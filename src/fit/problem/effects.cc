@@ -44,9 +44,9 @@ double effect_at(PictureEffect::Kind kind, const KnownLight& p, int x, int y) {
   const double here = p.light(x, y);
   switch (kind) {
     case PictureEffect::Kind::gamma:
-      return here > 0 && p.brightest > 0 ? here * std::log(here / p.brightest) : 0;
+      return here > 0 ? here * std::log(here) : 0;
     case PictureEffect::Kind::curve:
-      return p.brightest > 0 ? here * (here / p.brightest - 1) : 0;
+      return here * (here - 1);
     default:
       break;
   }
@@ -57,12 +57,8 @@ double effect_at(PictureEffect::Kind kind, const KnownLight& p, int x, int y) {
 
 double effect_change_at(PictureEffect::Kind kind, const KnownLight& p, const LightChange& change, int x, int y) {
   const double here = p.light(x, y), by = change.light(x, y);
-  if (kind == PictureEffect::Kind::gamma || kind == PictureEffect::Kind::curve) {
-    if (!(p.brightest > 0)) return 0;
-    const double share = here / p.brightest, of_brightest = change.light(p.brightest_at[0], p.brightest_at[1]);
-    if (kind == PictureEffect::Kind::curve) return by * (2 * share - 1) - share * share * of_brightest;
-    return here > 0 ? by * (std::log(share) + 1) - share * of_brightest : 0;
-  }
+  if (kind == PictureEffect::Kind::gamma) return here > 0 ? by * (std::log(here) + 1) : 0;
+  if (kind == PictureEffect::Kind::curve) return by * (2 * here - 1);
   if (!has_neighbours(p, x, y)) return 0;
   if (kind == PictureEffect::Kind::blur) return blur_at(change.light, x, y);
   return stretched(kind, slope_at(change.light, x, y), x - p.center_x, y - p.center_y) -

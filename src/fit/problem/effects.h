@@ -15,18 +15,13 @@ namespace birefit::estimation {
 struct KnownLight {
   Image light;
   Mask known;
-  double brightest = 0;
-  std::array<int, 2> brightest_at{};
   double center_x = 0, center_y = 0;  ///< of the sample, px
 
   KnownLight(int width, int height) : light(width, height), known(width, height) {}
   /// `values` at these pixels of a view; the centre where theta puts it.
   KnownLight(const View& view, const Theta& theta, const std::vector<std::array<int, 2>>& pixels,
              const Eigen::Ref<const Eigen::VectorXd>& values);
-  void set(int x, int y, double value) {
-    light(x, y) = value, known(x, y) = 1;
-    if (value > brightest) brightest = value, brightest_at = {x, y};
-  }
+  void set(int x, int y, double value) { light(x, y) = value, known(x, y) = 1; }
 };
 
 /// d(light of a pixel)/d(effect), in units of the light per unit of the effect (PictureEffect::Kind); 0 where it takes

@@ -1,0 +1,24 @@
+#pragma once
+// What lamp and camera do to all pictures of a fit alike, and no number of the scene stands for.
+
+#include <Eigen/Dense>
+
+#include "fit/search/optimum.h"
+
+namespace birefit::estimation {
+
+/// What they add to the covariance of the unknowns: each by as much as is usual, and as far as the pictures tell.
+/// - A lamp drifts from the first of several pictures of one gain to the last (Parameter::known_to of the gain).
+/// - Light is not even over a flat sample that is not the same all over: linear and quadratic, 2 % at the edge along
+///   the longer side (0.2 % where a calibration frame has divided it out), unless the picture's own is stated.
+/// - A camera's values are not proportional to light, in several pictures of one gain of a flat sample: light to the
+///   power of 1 + gamma, 0.3 %; not where the gain is exact.
+/// Empty: there is nothing of the kind.
+struct LampAndCamera {
+  Eigen::MatrixXd covariance;
+  bool of_drift_alone = false;
+};
+/// By the weights of the problem; `covariance` of the unknowns by the same.
+LampAndCamera by_lamp_and_camera(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);
+
+}  // namespace birefit::estimation
