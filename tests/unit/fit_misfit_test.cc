@@ -86,7 +86,7 @@ TEST(Fit, AsManyUnknownsAsPicturesLeaveNothingToCheck) {
     for (int g = 0; g < pictures; ++g) {
       const double volts = 400 + 250 * g;
       Picture& picture = bar.add_image(8, 8, bar.job.parameters.add_constant("bias", volts), true);
-      picture.noise = NoiseModel{20, 0, false};
+      picture.noise = NoiseModel{30, 0, false};
       expose(picture, 3000, 150, volts, 0, [&](int, int, double) { return 20 * gaussian(); });
     }
     const std::vector<std::string> exact = fit(bar.job).taken_as_exact;
@@ -138,13 +138,14 @@ TEST(Fit, LightThatMayBeUnevenIsInTheErrorOfAField) {
   const auto run = [&](bool known_to_be_even) {
     Bar bar(kVolts);
     bar.free(bar.tilt, 0.25, 0.05, 0.6);
-    bar.free_linear();
+    bar.job.parameters[bar.gain].free = bar.job.parameters[bar.gain].linear = true;
+    bar.job.parameters[bar.offset].value = 100;
     Picture& picture = bar.add_image(kSide, kSide, bar.bias);
-    picture.noise = NoiseModel{5, 0, false};
+    picture.noise = NoiseModel{30, 0, false};
     Gaussian gaussian(6);
     expose(picture, kGain, 100, kVolts, kTilt, [&](int, int y, double) {
       const double across = 2 * (y + 0.5) / kSide - 1;
-      return kGain * intensity(kVolts, kTilt, y, kSide) * kUneven * across + 5 * gaussian();
+      return kGain * intensity(kVolts, kTilt, y, kSide) * kUneven * across + 30 * gaussian();
     });
     if (known_to_be_even) bar.under_even_light();
     const FitResult result = fit(bar.job);
