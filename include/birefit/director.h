@@ -28,7 +28,8 @@ struct UniformDirector {
                  "the direction [x, y, z], of any length; instead of angles");
     visit.number("azimuth_deg", self.azimuth_deg, numbers::dial().or_else(0),
                  "from +x, counter-clockwise in the image");
-    visit.number("tilt_deg", self.tilt_deg, numbers::angle().or_else(0), "from the layer plane towards +z");
+    visit.number("tilt_deg", self.tilt_deg, numbers::angle().known_within(0.5).or_else(0),
+                 "from the layer plane towards +z");
   }
 };
 

@@ -75,11 +75,13 @@ struct Bar {
     job.measurements.push_back(std::move(micrograph));
     return std::get<Picture>(job.measurements.back());
   }
-  /// Light that is known to be even: errors are those of noise.
+  /// Light and background that are known to be even: errors are those of noise.
   void under_even_light() {
+    using Shape = UnevenLight::Shape;
     for (Measurement& measurement : job.measurements)
-      for (const auto shape : {UnevenLight::Shape::x, UnevenLight::Shape::y, UnevenLight::Shape::square})
-        std::get<Picture>(measurement).uneven.push_back({zero, shape, true});
+      for (const auto shape : {Shape::x, Shape::y, Shape::square})
+        for (const bool of_intensity : {true, false})
+          std::get<Picture>(measurement).uneven.push_back({zero, shape, of_intensity});
   }
 };
 

@@ -455,6 +455,28 @@ TEST_F(Config, RefusesAnImageOptionBesideMicrographs) {
   EXPECT_THROW(load_config(write("config.yaml", kCrystal), ConfigUse::fit, folder_ / "a.tif"), UserError);
 }
 
+// Where a cone's figure lies is set by eye, and a crystal is not cut exactly; what is stated to be exact is.
+TEST_F(Config, FigureOfAConeAndCutOfAPlateAreNotExact) {
+  save("a.tif", counts(100, 1));
+  const auto known_to = [&](const std::string& centre, const std::string& tilt) {
+    const auto config = load("micrograph: {image: a.tif" + centre + R"(}
+sample:
+  plate: {thickness_um: 500, director: {uniform: {azimuth_deg: 20, tilt_deg: )" +
+                                 tilt + R"(}}, view: {half_angle_deg: 20}}
+  material: {ordinary: 1.54, birefringence: {value: 0.01, fit: [0.005, 0.02]}}
+microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}
+)",
+                             ConfigUse::fit);
+    const ParameterTable& table = config.job.parameters;
+    const Scene& scene = std::get<Picture>(config.job.measurements.front()).scene;
+    const UniformDirector& director = std::get<Plate>(scene.sample).director;
+    return std::array{table[scene.view.center_x_px].known_to.sd, table[scene.view.center_y_px].known_to.sd,
+                      table[director.tilt_deg].known_to.sd};
+  };
+  EXPECT_EQ(known_to("", "80"), (std::array{2.0, 2.0, 0.5}));
+  EXPECT_EQ(known_to(", center_px: [15.5, 15.5]", "{value: 80, exact: true}"), (std::array{0.0, 0.0, 0.0}));
+}
+
 // Each names the place and what to do, not what the parser expected.
 TEST_F(Config, SaysWhatIsWrongWithTheYaml) {
   EXPECT_EQ(mistakes("sample:\n\tdroplet: 1\n"),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "fit/problem/light.h"
 #include "samples/kind.h"
@@ -9,7 +10,8 @@
 namespace birefit::estimation {
 namespace {
 
-constexpr double kUneven = 0.02, kUnevenOfCalibrated = 0.002, kGamma = 0.003;
+constexpr double kUneven = 0.02, kUnevenOfCalibrated = 0.002, kBackground = 0.01, kBackgroundOfCalibrated = 0.001,
+                 kGamma = 0.003;
 
 /// d(light of every pixel)/d(what is usual of one departure), a column each.
 class Columns {
@@ -61,6 +63,11 @@ bool are_even(const Task& task) {
                      [](const Sight& sight) { return traits_of(sight.picture->scene).even; });
 }
 
+bool is_stated(const Picture& picture, bool of_intensity, UnevenLight::Shape shape) {
+  return std::any_of(picture.uneven.begin(), picture.uneven.end(),
+                     [&](const UnevenLight& own) { return own.of_intensity == of_intensity && own.shape == shape; });
+}
+
 /// All of what round samples depart by is asked for where something is left over (catalogue.h); of flat ones only where
 /// they change over the picture, and field and light can be taken for each other.
 Columns columns_of(const Task& task, const Optimum& optimum) {
@@ -73,29 +80,27 @@ Columns columns_of(const Task& task, const Optimum& optimum) {
       return drift * (static_cast<double>(g) / (task.frames() - 1) - 0.5) * light;
     });
   if (!are_pictures_of_what_is_flat(task)) return columns;
-  const std::vector<UnevenLight>& stated = task.picture(0).uneven;
-  using Shape = UnevenLight::Shape;
-  for (const Shape shape : {Shape::x, Shape::y, Shape::square}) {
-    if (are_even(task) || std::any_of(stated.begin(), stated.end(),
-                                      [&](const UnevenLight& own) { return own.of_intensity && own.shape == shape; }))
-      continue;
-    LightTerm uneven;
-    uneven.shape = shape;
-    // About its mean: what all of the light is off by is the gain's.
-    std::vector<double> mean;
-    for (int g = 0; g < task.frames(); ++g) {
-      double sum = 0;
-      const auto& pixels = problem.pixels(g).pixels;
-      for (const auto& [x, y] : pixels) sum += uneven.shape_at(task.picture(g).scene.view, x, y);
-      mean.push_back(sum / std::max(1.0, static_cast<double>(pixels.size())));
+  for (const auto& [of_intensity, usual, behind_calibration] :
+       {std::tuple{true, kUneven, kUnevenOfCalibrated}, std::tuple{false, kBackground, kBackgroundOfCalibrated}})
+    for (const auto shape : {UnevenLight::Shape::x, UnevenLight::Shape::y, UnevenLight::Shape::square}) {
+      if (are_even(task) || is_stated(task.picture(0), of_intensity, shape)) continue;
+      LightTerm uneven;
+      uneven.shape = shape;
+      // About its mean: what all of the light is off by is the gain's.
+      std::vector<double> mean;
+      for (int g = 0; g < task.frames(); ++g) {
+        double sum = 0;
+        const auto& pixels = problem.pixels(g).pixels;
+        for (const auto& [x, y] : pixels) sum += uneven.shape_at(task.picture(g).scene.view, x, y);
+        mean.push_back(sum / std::max(1.0, static_cast<double>(pixels.size())));
+      }
+      columns.add(
+          [&, of_light = of_intensity, plain = usual, divided = behind_calibration](int g, int x, int y, double light) {
+            const Picture& picture = task.picture(g);
+            return (picture.variance_scale.empty() ? plain : divided) * (of_light ? light : 1) *
+                   (uneven.shape_at(picture.scene.view, x, y) - mean[static_cast<std::size_t>(g)]);
+          });
     }
-    columns.add([&](int g, int x, int y, double light) {
-      const Picture& picture = task.picture(g);
-      const bool calibrated = !picture.variance_scale.empty();
-      return (calibrated ? kUnevenOfCalibrated : kUneven) * light *
-             (uneven.shape_at(picture.scene.view, x, y) - mean[static_cast<std::size_t>(g)]);
-    });
-  }
   const bool bent = std::any_of(task.picture(0).effects.begin(), task.picture(0).effects.end(),
                                 [](const PictureEffect& own) { return own.kind == PictureEffect::Kind::gamma; });
   if (drift > 0 && !bent)

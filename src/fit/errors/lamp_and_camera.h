@@ -9,8 +9,9 @@ namespace birefit::estimation {
 
 /// What they add to the covariance of the unknowns: each by as much as is usual, and as far as the pictures tell.
 /// - A lamp drifts from the first of several pictures of one gain to the last (Parameter::known_to of the gain).
-/// - Light is not even over a flat sample that is not the same all over: linear and quadratic, 2 % at the edge along
-///   the longer side (0.2 % where a calibration frame has divided it out), unless the picture's own is stated.
+/// - Light is not even over a flat sample that is not the same all over: along x, y and outwards, 2 % at the edge of
+///   the longer side (0.2 % where a calibration frame has divided it out), and so a background, by 1 % (0.1 %) of the
+///   gain; unless the picture's own is stated.
 /// - A camera's values are not proportional to light, in several pictures of one gain of a flat sample: light to the
 ///   power of 1 + gamma, 0.3 %; not where the gain is exact.
 /// Empty: there is nothing of the kind.

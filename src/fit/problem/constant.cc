@@ -10,7 +10,8 @@
 namespace birefit::estimation {
 namespace {
 
-/// Chi-square of a constant with the uneven background of all frames that share one offset.
+/// Chi-square of a constant with the uneven background of all frames that share one offset; what is stated of it is not
+/// fitted.
 double chi_square_of_level(const Task& task, const LeastSquares& problem, int offset) {
   constexpr int kShapes = 4;
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kShapes, kShapes);
@@ -22,14 +23,21 @@ double chi_square_of_level(const Task& task, const LeastSquares& problem, int of
     const PixelSet& set = problem.pixels(g);
     for (Eigen::Index i = 0; i < set.value.size(); ++i) {
       const auto [x, y] = set.pixels[static_cast<std::size_t>(i)];
+      double value = set.value[i];
       shape.setZero();
-      for (const LightTerm& term : light_terms(m))
-        if (!term.of_intensity && !term.effect)
-          shape[term.shape ? 1 + static_cast<int>(*term.shape) : 0] = term.shape_at(m.scene.view, x, y);
+      for (const LightTerm& term : light_terms(m)) {
+        if (term.of_intensity || term.effect) continue;
+        const double at = term.shape_at(m.scene.view, x, y);
+        const Parameter* known = term.shape && term.coefficient ? &task.job.parameters[term.coefficient] : nullptr;
+        if (known && !known->free)
+          value -= known->value * at;
+        else
+          shape[term.shape ? 1 + static_cast<int>(*term.shape) : 0] = at;
+      }
       const double weight = 1 / (set.sigma[i] * set.sigma[i]);
       gram += weight * shape * shape.transpose();
-      right += weight * set.value[i] * shape;
-      squares += weight * set.value[i] * set.value[i];
+      right += weight * value * shape;
+      squares += weight * value * value;
     }
   }
   return std::max(0.0, squares - right.dot(gram.completeOrthogonalDecomposition().solve(right)));

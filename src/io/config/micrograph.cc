@@ -82,6 +82,11 @@ void read_center(ConfigReader& reader, const Block& block, const Scene& scene, M
       make_automatic(reader, settings.center_y);
     }
   }
+  // The figure of a cone of light is put in the middle of the camera by eye.
+  constexpr double kByEye = 2;
+  const bool figure = std::holds_alternative<Plate>(scene.sample) || (slab && slab->half_angle_deg);
+  if (figure && !node && reader.use != ConfigUse::render)
+    for (const ParameterRef at : {settings.center_x, settings.center_y}) reader.table[at].known_to.sd = kByEye;
   const bool fitted = reader.table[settings.center_x].free || reader.table[settings.center_y].free;
   if (node && fitted && !droplet && !cone)
     reader.problems.add(node->where, "center_px has no effect on this sample and cannot be fitted", "leave it out");

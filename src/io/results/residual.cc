@@ -47,9 +47,11 @@ double residual_fraction(const MicrographResult& micrograph) {
 double residual_fraction(const FitResult& result) {
   Span all;
   for (const MicrographResult& m : result.micrographs) add(m, all);
+  // One of several pictures that is nearly even says nothing of the sample's range.
+  constexpr double kNearlyEven = 0.05;
   double sum = 0, pixels = 0;
   for (const MicrographResult& m : result.micrographs) {
-    const double own = own_range(m), range = own > 0 ? own : all.range();
+    const double own = own_range(m), range = own > kNearlyEven * all.range() ? own : all.range();
     if (!(range > 0) || !std::isfinite(m.residual_rms) || m.used <= 0) continue;
     sum += m.used * std::pow(m.residual_rms / range, 2);
     pixels += m.used;
