@@ -1,8 +1,10 @@
 #include "app/demo.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <iostream>
 
 #include <fmt/format.h>
@@ -15,6 +17,16 @@ namespace birefit {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// As one word of a shell's line.
+std::string for_shell(const fs::path& path) {
+  const std::string text = path.string();
+  const auto plain = [](unsigned char c) { return std::isalnum(c) || std::strchr("/._-+,:@%", c) || c >= 0x80; };
+  if (std::all_of(text.begin(), text.end(), plain)) return text;
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
 
 constexpr double kReadCounts = 4, kCountsPerPhoton = 0.5, kTopCode = 65535;
 
@@ -81,7 +93,7 @@ void make_demo(const Kind& kind, const fs::path& folder) {
     for (const auto& [path, value] : kind.truth) std::cout << fmt::format("  {} = {}\n", path, value);
   }
   const fs::path out = folder / (kind.command == "jones" ? "jones.csv" : "out");
-  std::cout << "Run it:\n  birefit " << kind.command << " " << config.string() << " --out " << out.string() << "\n";
+  std::cout << "Run it:\n  birefit " << kind.command << " " << for_shell(config) << " --out " << for_shell(out) << "\n";
 }
 
 }  // namespace birefit

@@ -19,6 +19,7 @@
 #include "birefit/io.h"
 #include "core/printable.h"
 #include "io/results/work.h"
+#include "io/results/write.h"
 
 namespace birefit {
 namespace {
@@ -132,6 +133,7 @@ int run_fit(const Arguments& arguments) {
   std::unique_ptr<OutputFolder> folder;
   try {
     folder = std::make_unique<OutputFolder>(out);
+    refuse_to_replace_inputs(out, config);
   } catch (const UserError& error) {
     problems.add(error);
   }

@@ -31,6 +31,7 @@ int run_jones(const Arguments& arguments) {
     problems.add(error);
   }
   try {
+    check_replaces_none(arguments.out, config.inputs);
     check_output_file(arguments.out, {".csv"});
   } catch (const UserError& error) {
     problems.add(error);

@@ -86,6 +86,13 @@ void check_output_file(const fs::path& file, const std::vector<std::string>& ext
     throw UserError({file.string()}, "its folder cannot be written to (permissions, or the disk is full)");
 }
 
+void check_replaces_none(const fs::path& file, const std::vector<fs::path>& inputs) {
+  std::error_code code;
+  for (const fs::path& input : inputs)
+    if (fs::equivalent(file, input, code))
+      throw UserError({file.string()}, "is read by the config and would be replaced", "choose another --out");
+}
+
 std::string csv_number(double x) { return std::isfinite(x) ? fmt::format("{:.6g}", x) : std::string(); }
 
 void print_warnings(const std::vector<std::string>& warnings) {

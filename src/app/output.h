@@ -27,6 +27,9 @@ void make_folder(const std::string& folder);
 /// Throws UserError unless the file's name ends in one of `extensions` and its folder can be written.
 void check_output_file(const std::filesystem::path& file, const std::vector<std::string>& extensions);
 
+/// Throws UserError where the file is one of those that are read.
+void check_replaces_none(const std::filesystem::path& file, const std::vector<std::filesystem::path>& inputs);
+
 /// As CSV: empty when not finite.
 std::string csv_number(double x);
 

@@ -38,6 +38,7 @@ int run_render(const Arguments& arguments) {
     problems.add(error);
   }
   try {
+    check_replaces_none(arguments.out, config.inputs);
     check_output_file(arguments.out, {".exr", ".tif", ".tiff", ".npy", ".png"});
   } catch (const UserError& error) {
     problems.add(error);

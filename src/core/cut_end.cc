@@ -26,6 +26,7 @@ std::optional<double> noise_of_neighbours(const Image& values, const PixelRect& 
 std::optional<CutEnd> find_cut_end(End end, const Image& values, const PixelRect& area,
                                    std::optional<double> noise_sd) {
   constexpr double kShare = 0.005, kOverNext = 3, kNoise = 0.7;  // half a code, and rounding by the same measure
+  constexpr int kFewest = 4;                                     // of a small picture one pixel is a share, and no pile
   constexpr double kNoiseElsewhere = 2;  // an even picture of many frames may have one code by right
   std::map<double, int> pixels;
   int all = 0;
@@ -42,7 +43,7 @@ std::optional<CutEnd> find_cut_end(End end, const Image& values, const PixelRect
   int next = 0;
   for (const auto& [value, count] : pixels)
     if (const double off = std::abs(value - code); off > 0 && off < 1.5 * step) next += count;
-  if (!(here > kShare * all) || here < kOverNext * next) return std::nullopt;
+  if (here < kFewest || !(here > kShare * all) || here < kOverNext * next) return std::nullopt;
   const std::optional<double> own = noise_of_neighbours(values, area, code), noise = own ? own : noise_sd;
   if (!noise || !(*noise > (own ? kNoise : kNoiseElsewhere) * step)) return std::nullopt;
   return CutEnd{code, static_cast<double>(here) / all};

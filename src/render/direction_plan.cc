@@ -94,7 +94,9 @@ void plan_directions(const Scene& scene, const Values<double>& value, ManyDirect
   if (layers && scene.microscope.objective_na) note_objective(value(scene.microscope.objective_na), disc, plan);
   const Eigen::VectorXd axis = rings(0);
   Eigen::VectorXd now = rings(1);
-  const double changed = (now - axis).cwiseAbs().maxCoeff();
+  double changed = (now - axis).cwiseAbs().maxCoeff();
+  // One rule may agree with the axis by chance.
+  if (changed <= allowed) changed = std::max(changed, (rings(3) - axis).cwiseAbs().maxCoeff());
   if (changed <= allowed) {
     plan.numerical_error += changed;
     plan.reasons.push_back(

@@ -113,7 +113,10 @@ void plan_wavelengths(const Scene& scene, const Theta& theta, const LightBand& b
                             : short_end * m.bandwidth_nm.in(theta) / (2.3548200450309493 * m.wavelength_nm.in(theta));
   const double loss = 0.5 * (1 - std::exp(-0.5 * spread * spread));
   const bool pictures = plan.observable.quantity == Quantity::intensity;
-  if (band.narrow && (!pictures || !known || loss <= plan.demand.intensity_accuracy)) {
+  // Echoes go by longer ways than the retardance, and a table of absorption has peaks: what the light's width does to
+  // them the retardance does not tell.
+  const bool more = plan.demand.ceiling == Ceiling::reflections || scene.absorption.size() > 1;
+  if (band.narrow && (!pictures || (!more && (!known || loss <= plan.demand.intensity_accuracy)))) {
     plan.model_error = std::hypot(plan.model_error, loss);
     if (loss > 1e-3)
       plan.warnings.push_back(
@@ -151,9 +154,7 @@ void plan_wavelengths(const Scene& scene, const Theta& theta, const LightBand& b
       return;
     }
   }
-  // Echoes go by longer ways than the retardance; a table of absorption has kinks.
-  if (plan.demand.ceiling == Ceiling::reflections || scene.absorption.size() > 1)
-    settle_on_means(scene, theta, probe, plan);
+  if (more) settle_on_means(scene, theta, probe, plan);
   plan.cost_seconds *= static_cast<double>(plan.wavelengths->size());
   plan.reasons.push_back(fmt::format(
       "the light reaches from {:.0f} to {:.0f} nm, over which the largest retardance goes through {:.2g} fringes: the "

@@ -129,6 +129,28 @@ TEST(Absorption, OfAllWavelengthsIsTheSumOfLines) {
   EXPECT_NEAR(s.picture()(0, 0), lines / all, 2e-6);  // of the lines' steps, too
 }
 
+// Light of a narrow band may lie on a slope or a peak of a dye although it is sharp enough for the retardance.
+TEST(Absorption, OfANarrowBandIsTheSumOfLinesWithoutARetardance) {
+  constexpr double kCentre = 580, kWidth = 40;
+  DichroicCell s(20, 20);
+  s.uniform(20);
+  dye(s);
+  s.table[std::get<ConstantIndices>(s.scene.material).birefringence].value = 0;
+  s.demand.model_tolerance = 0, s.demand.intensity_accuracy = 1e-5;
+  double lines = 0, all = 0;
+  for (double nm = 480; nm <= 680; nm += 1) {
+    const double x = (nm - kCentre) / kWidth, weight = std::exp(-4 * std::numbers::ln2 * x * x);
+    s.table[s.scene.microscope.wavelength_nm].value = nm;
+    lines += weight * s.picture()(0, 0), all += weight;
+  }
+  s.table[s.scene.microscope.wavelength_nm].value = kCentre;
+  const double sharp = s.picture()(0, 0);
+  s.scene.microscope.bandwidth_nm = s.fixed("bandwidth_nm", kWidth);
+  ASSERT_GT(std::abs(sharp - lines / all), 1e-3);
+  // A line is a Gaussian of 1/wavelength: the next order of its width.
+  EXPECT_NEAR(s.picture()(0, 0), lines / all, 0.1 * std::abs(sharp - lines / all));
+}
+
 TEST(Absorption, HasDerivatives) {
   for (const bool twisted : {false, true}) {
     DichroicCell s(20, 80);

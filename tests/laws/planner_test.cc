@@ -300,6 +300,34 @@ TEST(Planner, ShippedScenesTakeAtMostHalfMoreSamplesThanTheCheapestMethod) {
   EXPECT_GE(judged, 4);
 }
 
+// Waves that run both ways need steps shorter than half a wave: with fewer a twisted cell is a mirror, whatever twice
+// as many say. In a host of nearly its index reflections are a thousandth.
+TEST(Planner, StepsOfAllReflectionsAreShorterThanHalfAWave) {
+  for (const double thickness : {5.0, 9.0, 14.0, 30.0})
+    for (const double twist : {90.0, 180.0, 263.0}) {
+      TableBuilder b;
+      Scene scene;
+      scene.view.width = scene.view.height = 1;
+      scene.surround_index = b.fixed("surround", 1.6);
+      scene.microscope.wavelength_nm = b.fixed("wavelength_nm", 550);
+      scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
+      scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
+      scene.material = ConstantIndices{b.fixed("ordinary", 1.5), b.fixed("birefringence", 0.2)};
+      TwistedDirector twisted;
+      twisted.twist_deg = b.fixed("twist_deg", twist), twisted.azimuth_deg = b.fixed("azimuth_deg", 0);
+      twisted.pretilt_deg = b.fixed("pretilt_deg", 20);
+      Cell cell;
+      cell.thickness_um = b.fixed("thickness_um", thickness), cell.director = twisted;
+      scene.sample = cell;
+      const Theta theta = b.table.values();
+      Demand demand;
+      const double one_way = render(scene, plan(scene, demand, theta), theta, {}, 1).intensity(0, 0);
+      demand.ceiling = Ceiling::reflections;
+      EXPECT_NEAR(render(scene, plan(scene, demand, theta), theta, {}, 1).intensity(0, 0), one_way, 0.02)
+          << thickness << " um, " << twist;
+    }
+}
+
 // Negative birefringence in a host denser than n_e: p is totally reflected where s still passes (seed 102 above).
 TEST(Planner, TotalReflectionOfOnePolarisationIsNoHole) {
   RandomScene r = random_scene(102);

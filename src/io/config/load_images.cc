@@ -219,6 +219,15 @@ void Loading::take_images() {
                            settings_.where.line > 0 ? settings_.where : Where{reader_.file}};
     if (!micrograph.node || !micrograph.node->find("image")) reader_.missing(micrograph, "image");
   }
+  // One picture that counts as two halves the variance of what it tells.
+  for (std::size_t i = 0; list_ && i < items_.size(); ++i)
+    for (std::size_t before = 0; before < i; ++before)
+      if (const Item& item = items_[i], &other = items_[before];
+          item.image && item.image == other.image && item.page.words() == other.page.words() && item.roi == other.roi) {
+        reader_.problems.add(item.image_where, *item.image + " is listed twice: it is one measurement",
+                             "leave one out, or give each a page or roi_px of its own");
+        break;
+      }
   // Images are loaded although something else is wrong: their mistakes are reported in the same run.
   const Beside beside = load_beside();
   Taken taken;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <regex>
 #include <utility>
 
 #include <fmt/format.h>
@@ -195,15 +196,26 @@ std::vector<Row> wanted_rows(ConfigReader& reader, const TextTable& text, const 
   return rows;
 }
 
+/// "angle (rad)", "angle [rad]" and "angle_rad" are in rad; empty where a name says nothing of a unit.
+std::string unit_in_name(const std::string& name) {
+  static const std::regex bracketed(R"(.*[(\[]([^()\[\]]+)[)\]] *)"),
+      appended(".*_(rad|mrad|deg|nm|um|mm|cm|mV|kV|V|C)");
+  std::smatch found;
+  return std::regex_match(name, found, bracketed) || std::regex_match(name, found, appended) ? found[1].str() : "";
+}
+
 /// A table that says "mV" under a column that sets volts, and a config that takes the numbers as they are.
 void check_unit(ConfigReader& reader, const TextTable& text, int column, const SignalItem& item, std::size_t i,
                 const std::string& unit) {
   const SignalItem::Column& taken = item.columns[i];
-  if (column < 0 || text.units.empty() || taken.scale != 1 || taken.plus != 0) return;
-  const std::string& given = text.units[static_cast<std::size_t>(column)];
+  if (column < 0 || taken.scale != 1 || taken.plus != 0) return;
+  const bool by_line = !text.units.empty() && !text.units[static_cast<std::size_t>(column)].empty();
+  const std::string given = by_line ? text.units[static_cast<std::size_t>(column)] : unit_in_name(taken.name);
   if (contradicts_unit(given, unit))
     reader.problems.add(taken.where,
-                        taken.name + " is in " + given + " by the table's line of units, " + taken.path + " in " + unit,
+                        taken.name + " is in " + given +
+                            (by_line ? " by the table's line of units, " : " by its name, ") + taken.path + " in " +
+                            unit,
                         "{column: " + taken.name + ", scale: .., plus: ..} converts it");
 }
 

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "birefit/volume.h"
 #include "io/config/described.h"
 #include "io/config/discs.h"
 
@@ -158,7 +159,24 @@ void add_branches(FitJob& job) {
   job.branches = {hedgehog, ring};
 }
 
+/// A box in metres is none of micrometres: neither less than a pixel nor a thousand fields of view is a sample.
+void check_box(ConfigReader& reader, const Scene& scene, const SampledVolume& volume, const std::string& name) {
+  constexpr double kMostFields = 1000;
+  const View& view = scene.view;
+  if (!volume.grid || !view.pixel_size_um || view.width <= 0) return;
+  const VolumeGrid& grid = *volume.grid;
+  const double scale = volume.scale ? reader.table[volume.scale].value : 1, pixel = pixel_um(reader, view),
+               wide = scale * (grid.nx - 1) * grid.spacing_um[0], high = scale * (grid.ny - 1) * grid.spacing_um[1],
+               largest = std::max(wide, high) / pixel;
+  if (largest >= 1 && largest <= kMostFields * std::max(view.width, view.height)) return;
+  reader.problems.add({reader.file},
+                      "sample.volume is a box of " + show(wide) + " x " + show(high) + " um, " +
+                          (largest < 1 ? "less than a pixel of " : "a thousand times what is seen of ") + name,
+                      "the file's spacing is in um: state scale (1e6 for metres, 0.001 for nm) or pixel_size_um");
+}
+
 void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& name) {
+  if (const auto* volume = std::get_if<SampledVolume>(&scene.sample)) return check_box(reader, scene, *volume, name);
   const auto* droplet = std::get_if<Droplet>(&scene.sample);
   const View& view = scene.view;
   if (!droplet || !droplet->diameter_um || !view.pixel_size_um || view.width <= 0) return;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdint>
 #include <map>
+#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -36,12 +38,21 @@ struct NpyArray {
   std::vector<std::size_t> shape;
   std::string shape_text;
   std::size_t bytes = 8;  ///< of a number
+  char kind = 'f';        ///< NumPy's: floats, signed and unsigned integers, b = truth values
   bool fortran = false, swapped = false;
   std::string_view data;
 
   double number(std::size_t at) const {
     const char* from = data.data() + bytes * at;
-    return bytes == 4 ? static_cast<double>(read_as<float>(from, swapped)) : read_as<double>(from, swapped);
+    if (kind == 'f')
+      return bytes == 4 ? static_cast<double>(read_as<float>(from, swapped)) : read_as<double>(from, swapped);
+    const auto whole = [&]<class Signed, class Unsigned>(Signed, Unsigned) {
+      return kind == 'i' ? static_cast<double>(read_as<Signed>(from, swapped))
+                         : static_cast<double>(read_as<Unsigned>(from, swapped));
+    };
+    if (bytes == 1) return whole(std::int8_t{}, std::uint8_t{});
+    if (bytes == 2) return whole(std::int16_t{}, std::uint16_t{});
+    return bytes == 4 ? whole(std::int32_t{}, std::uint32_t{}) : whole(std::int64_t{}, std::uint64_t{});
   }
 };
 
@@ -61,10 +72,15 @@ NpyArray parse_npy(std::string_view content, const std::string& file) {
   const std::string header(content.substr(start, length));
   const std::string type = npy_entry(header, "descr"), order = npy_entry(header, "fortran_order");
   array.shape_text = npy_entry(header, "shape");
-  if (type.size() != 5 || (type.substr(2) != "f4'" && type.substr(2) != "f8'") || (type[1] != '<' && type[1] != '>'))
-    refuse(file, "holds " + (type.empty() ? std::string("an unknown type") : type) + ", not floats of 4 or 8 bytes",
+  static const std::set<std::string> kRead = {"f4'", "f8'", "b1'", "u1'", "u2'", "u4'",
+                                              "u8'", "i1'", "i2'", "i4'", "i8'"};
+  if (type.size() != 5 || !kRead.contains(type.substr(2)) || (type[1] != '<' && type[1] != '>' && type[3] != '1'))
+    refuse(file,
+           "holds " + (type.empty() ? std::string("an unknown type") : type) +
+               ", neither floats of 4 or 8 bytes nor integers",
            "save array.astype('<f4') or '<f8'");
-  array.bytes = type[3] == '4' ? 4 : 8;
+  array.kind = type[2];
+  array.bytes = static_cast<std::size_t>(type[3] - '0');
   array.swapped = type[1] == '>';
   array.fortran = order == "True";
   if (!array.fortran && order != "False") refuse(file, "does not say its fortran_order", "numpy.save writes it");

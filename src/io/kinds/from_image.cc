@@ -56,7 +56,11 @@ class Lines {
 
 std::string quoted(const std::string& path) {
   std::string out = "\"";
-  for (const char c : path) out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+  for (const char c : path)
+    if (c == '\n')
+      out += "\\n";
+    else
+      out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
   return out + "\"";
 }
 
@@ -91,10 +95,12 @@ void fill_image(const std::string& file, const OpenedImage& opened, const Stated
   }
   if (const auto line = lines.find("image: ")) return lines.replace(*line, keys);
   // A list names its images itself; what is said of how they are read stands in the block they share.
+  const auto block = lines.find("micrograph:");
+  if (!block) return;
   keys.erase(keys.begin());
   for (std::string& key : keys) key = "  " + key;
-  keys.insert(keys.begin(), lines.all()[*lines.find("micrograph:")]);
-  lines.replace(*lines.find("micrograph:"), keys);
+  keys.insert(keys.begin(), lines.all()[*block]);
+  lines.replace(*block, keys);
 }
 
 /// The pixel's size; 0 when the file does not state it.
@@ -174,7 +180,10 @@ void fill_list(const std::string& file, Lines& lines, FilledConfig& filled) {
   if (!list) return;
   std::size_t at = *list + 1;
   static const std::regex name("image: [^,}]*");
-  const std::string item = std::regex_replace(lines.all().at(at), name, "image: " + quoted(file));
+  std::string item = lines.all().at(at);
+  if (std::smatch found; std::regex_search(item, found, name))
+    item.replace(static_cast<std::size_t>(found.position()), static_cast<std::size_t>(found.length()),
+                 "image: " + quoted(file));
   while (at < lines.all().size() && lines.all()[at].starts_with("  ")) lines.erase(at);
   lines.replace(*list, {lines.all()[*list], item,
                         "  # - {image: .., set: {..}}   # and so on: one image tells less than the fit asks for"});
@@ -212,11 +221,11 @@ OpenedImage open_image(const std::string& file) {
 }
 
 FilledConfig config_from_image(const Kind& kind, const std::string& file, const Stated& stated) {
-  if (kind.config.find("image: ") == std::string::npos && kind.command != "series")
+  Lines lines(kind.config);
+  if (!lines.find("micrograph:") && !lines.find("micrographs:") && kind.command != "series")
     throw UserError({}, "new " + kind.name + ": its config reads no image", "birefit new " + kind.name + " prints it");
   const OpenedImage opened = open_image(file);
   const std::string name = stated.file_name.empty() ? file : stated.file_name;
-  Lines lines(kind.config);
   FilledConfig filled;
   if (kind.command == "series") {
     const fs::path path(name);

@@ -357,6 +357,8 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   settings.attribute("bmp:monochrome_detect", 1);
   if (!input->open(request.path.string(), spec, settings)) refuse_damaged(request, signature, decoder_message(*input));
 
+  // Of a stack the first page alone may say what all of them are (OME, ImageJ, tifffile).
+  const OIIO::ImageSpec first = spec;
   const bool several = input->seek_subimage(1, 0);
   (void)input->geterror();
   if (several && (signature.format == "gif" || spec.get_int_attribute("oiio:Movie", 0) != 0))
@@ -369,7 +371,10 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   check_header(request, signature, spec, stored);
 
   LoadedImage loaded;
-  const std::string description = spec.get_string_attribute("ImageDescription", "");
+  const bool says_itself = !spec.get_string_attribute("ImageDescription", "").empty() || spec.width != first.width ||
+                           spec.height != first.height;
+  const OIIO::ImageSpec& speaks = says_itself ? spec : first;
+  const std::string description = speaks.get_string_attribute("ImageDescription", "");
   const std::vector<int> channels = chosen_channels(request, spec, stored.palette, loaded.notes);
   loaded.colour = spec.nchannels >= 3;
   const PixelRect part = part_asked(request, spec.width, spec.height);
@@ -388,9 +393,9 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
       refuse_image(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
     loaded.notes.push_back("it " + found + ": the first is used");
   }
-  const StatedResolution resolution{spec.get_float_attribute("XResolution", 0),
-                                    spec.get_float_attribute("YResolution", 0),
-                                    spec.get_string_attribute("ResolutionUnit", "")};
+  const StatedResolution resolution{speaks.get_float_attribute("XResolution", 0),
+                                    speaks.get_float_attribute("YResolution", 0),
+                                    speaks.get_string_attribute("ResolutionUnit", "")};
   loaded.pixel_size_um = stated_pixel_size_um(resolution, description, loaded.notes, loaded.uneven_pixel_um);
   const StatedOptics optics = stated_optics(description);
   loaded.objective_na = optics.objective_na, loaded.emission_nm = optics.emission_nm;
@@ -493,11 +498,12 @@ std::string encode_channels(std::span<const Image> channels, const fs::path& pat
   // TIFFs unpacked: no two of ImageJ, tifffile and scikit-image read the same packing of floats.
   spec.attribute("compression", extension == ".exr" ? "zip" : "none");
   if (pixel_size_um > 0) {
-    constexpr double kMicrometresPerCentimetre = 1e4;
-    const auto pixels_per_cm = static_cast<float>(kMicrometresPerCentimetre / pixel_size_um);
-    spec.attribute("ResolutionUnit", "cm");
-    spec.attribute("XResolution", pixels_per_cm);
-    spec.attribute("YResolution", pixels_per_cm);
+    // OpenEXR counts by the inch alone.
+    const bool by_inch = extension == ".exr";
+    const auto density = static_cast<float>((by_inch ? 2.54e4 : 1e4) / pixel_size_um);
+    spec.attribute("ResolutionUnit", by_inch ? "in" : "cm");
+    spec.attribute("XResolution", density);
+    spec.attribute("YResolution", density);
   }
   const auto samples = samples_by.operator()<float>([](double value) { return static_cast<float>(value); });
   return encode(extension == ".exr" ? "openexr" : "tiff", spec, samples);

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/printable.h"
 #include "io/files/csv.h"
 #include "io/files/file.h"
 
@@ -119,6 +120,19 @@ std::vector<FileContent> result_files(const Config& config, const FitResult& res
   return files;
 }
 
+void refuse_to_replace_inputs(const fs::path& folder, const Config& config) {
+  static const std::regex kOurs(
+      R"((fitted|residual)(_[0-9]+)?\.(tif|npy|csv)|samples\.csv|log\.txt|report\.html|fit\.json)");
+  std::error_code code;
+  for (const fs::path& input : config.inputs)
+    if (std::regex_match(input.filename().string(), kOurs) &&
+        fs::equivalent(input.parent_path().empty() ? "." : input.parent_path(), folder, code))
+      throw UserError(
+          {folder.string()},
+          "holds " + printable(input.filename().string()) + ", which the config reads and the results would replace",
+          "choose another --out");
+}
+
 void write_result_files(const fs::path& folder, std::vector<FileContent> files) {
   std::error_code code;
   fs::create_directories(folder, code);
@@ -132,6 +146,7 @@ void write_result_files(const fs::path& folder, std::vector<FileContent> files) 
 
 void write_results(const fs::path& folder, const Config& config, const FitResult& result,
                    const std::vector<std::string>& picture_formats) {
+  refuse_to_replace_inputs(folder, config);
   write_result_files(folder, result_files(config, result, picture_formats));
 }
 

@@ -184,6 +184,33 @@ void plan_fringe_blocks(const Planning& planning, RenderPlan& plan) {
                   choices(plan).fringe_blocks.size(), choices(plan).fringe_block_px, FringeTable<Pack>::kRays));
 }
 
+/// Steps below which those of the 4 x 4 transport need not converge where the medium changes within them: its waves run
+/// both ways, and a step must be shorter than half a wave (Magnus series, |k| h < pi: S. Blanes, F. Casas, J. A. Oteo &
+/// J. Ros, Phys. Rep. 470, 151 (2009), section 2.7). With fewer the averages over a step are those of another medium,
+/// a mirror say, and twice as many agree with that. 1 where layers are even.
+int fewest_steps(const PlanarOptics<double>& o) {
+  constexpr int kWithin = 32;
+  constexpr double kSame = 1e-12;
+  const Mesh layers = uniform_mesh(1, o.column->breaks);
+  double phase = 0;  // of the faster wave through all of it
+  bool even = true;
+  for (std::size_t layer = 1; layer < layers.size(); ++layer) {
+    std::array<double, kWithin> u{};
+    for (int i = 0; i < kWithin; ++i)
+      u[static_cast<std::size_t>(i)] = layers[layer - 1] + (i + 0.5) / kWithin * (layers[layer] - layers[layer - 1]);
+    std::array<OpticalPoint<double>, kWithin> at;
+    o.column->sample(u, at.data());
+    for (const OpticalPoint<double>& p : at) {
+      phase += o.k0 * std::sqrt(std::max(std::abs(p.ordinary), std::abs(p.extraordinary))) *
+               std::abs(p.depth_slope_um) * (layers[layer] - layers[layer - 1]) / kWithin;
+      const double along = dot(p.axis, at[0].axis);
+      even = even && std::abs(along * along - 1) < kSame && std::abs(p.ordinary - at[0].ordinary) < kSame &&
+             std::abs(p.extraordinary - at[0].extraordinary) < kSame;
+    }
+  }
+  return even ? 1 : static_cast<int>(std::ceil(phase / kPi));
+}
+
 /// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.
 RenderPlan plan_reflections(const Planning& planning, const PlanarOptics<double>& o,
                             const std::vector<std::pair<double, double>>& directions) {
@@ -201,7 +228,10 @@ RenderPlan plan_reflections(const Planning& planning, const PlanarOptics<double>
                                                      planar_jones<double>(o, method, halved, tx, ty)));
     return largest;
   };
-  plan.steps = choose(kSteps, plan.demand.intensity_accuracy, change, plan.numerical_error);
+  std::vector<int> enough{kSteps.back()};
+  if (const auto first = std::lower_bound(kSteps.begin(), kSteps.end(), fewest_steps(o)); first != kSteps.end())
+    enough.assign(first, kSteps.end());
+  plan.steps = choose(enough, plan.demand.intensity_accuracy, change, plan.numerical_error);
   plan.reasons.push_back(
       fmt::format("{} steps of the 4 x 4 transport hold the intensity to {} on {} directions (asked: {})", plan.steps,
                   sci(plan.numerical_error), directions.size(), sci(plan.demand.intensity_accuracy)));
