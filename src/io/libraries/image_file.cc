@@ -364,6 +364,10 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   if (several && (signature.format == "gif" || spec.get_int_attribute("oiio:Movie", 0) != 0))
     refuse_image(request, "is animated (" + signature.format_name + ")",
                  "extract the frame to be fitted as a still image");
+  // What has looked for a second picture in a still WebP can decode the first no more.
+  if (signature.format == "webp" && !several &&
+      (!input->close() || !input->open(request.path.string(), spec, settings)))
+    refuse_damaged(request, signature, decoder_message(*input));
   const int page = page_asked(request, *input, several);
   if (!input->seek_subimage(page, 0)) refuse_damaged(request, signature, decoder_message(*input));
   spec = input->spec(page, 0);
