@@ -100,6 +100,7 @@ TEST(Inputs, ShiftTheEstimateAsAFitWithAnotherInputDoes) {
   bar.free(bar.bias, 650, 400, 1000);
   bar.free_linear();
   Picture& m = bar.add_image(40, 30, bar.bias);
+  bar.under_even_light();
   m.noise = NoiseModel{1, 0, false};
   Gaussian gaussian(29);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return gaussian(); });
@@ -133,6 +134,7 @@ TEST(Coverage, OfAPlainFitIsNominalAndTheSameTwice) {
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
   Picture& m = bar.add_image(24, 20, bar.bias);
+  bar.under_even_light();
   m.noise = NoiseModel{20, 0.5, false};
   Gaussian gaussian(11);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double signal) { return std::sqrt(400 + 0.5 * signal) * gaussian(); });
@@ -168,6 +170,7 @@ TEST(Coverage, SeesAnIntervalThatIsTooNarrow) {
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
   Picture& m = bar.add_image(24, 20, bar.bias);
+  bar.under_even_light();
   m.noise = NoiseModel{20, 0, false};
   Gaussian gaussian(12);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
@@ -233,6 +236,7 @@ TEST(Coverage, OfAMaskedImageHasItsNoise) {
   bar.free(bar.bias, 600, 300, 1400);
   bar.free_linear();
   Picture& m = bar.add_image(40, 40, bar.bias);
+  bar.under_even_light();
   m.noise = NoiseModel{10, 0, false};  // half the truth
   Gaussian gaussian(19);
   expose(m, 3000, 150, 700, 0.4, [&](int, int, double) { return 20 * gaussian(); });
@@ -254,6 +258,7 @@ TEST(Outlook, IsTheStandardErrorThatTheFitThenHas) {
   bar.job.parameters[bar.gain].value = 3000;
   bar.job.parameters[bar.offset].value = 150;
   Picture& m = bar.add_image(40, 30, bar.bias);
+  bar.under_even_light();
   m.noise = NoiseModel{20, 0.5, false};
   Gaussian gaussian(21);
   expose(m, 3000, 150, 2400, 0.9, [&](int, int, double signal) { return std::sqrt(400 + 0.5 * signal) * gaussian(); });
@@ -293,6 +298,7 @@ TEST(NextShot, IsWorthWhatTheFitWithItThenShows) {
   bar.job.parameters[bar.gain].value = 3000;
   bar.job.parameters[bar.offset].value = 150;
   Picture& m = bar.add_image(30, 20, bar.bias);
+  bar.under_even_light();
   m.noise = NoiseModel{20, 0, false};
   m.values = {};
   m.mask = {};

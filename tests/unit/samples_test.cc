@@ -27,6 +27,7 @@ Bar bar_with_picture(int frames = 1, double scatter = 0, double noise = kNoise) 
     const double off = scatter * gaussian();
     expose(picture, 3000, 100, 700, 0.4, [&](int, int, double) { return off + noise * gaussian(); });
   }
+  bar.under_even_light();
   return bar;
 }
 

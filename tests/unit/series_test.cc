@@ -137,6 +137,8 @@ class SeriesFiles : public ::testing::Test {
   std::string config(const std::string& micrographs) {
     return micrographs + R"(
 micrograph:
+  illumination: {x: 0, y: 0, square: 0}
+  background: {x: 0, y: 0, square: 0}
   gain: {fit: auto}
   offset: {fit: auto}
   noise: {read_counts: 2}

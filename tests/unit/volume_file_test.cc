@@ -191,7 +191,7 @@ TEST_F(VolumeFile, BadNumpyFiles) {
   const std::string good = npy_data<float>(false, false, 3, component), shape = "(4, 3, 2, 3)";
   EXPECT_THAT(npy_error("PK\3\4 something else"), HasSubstr("damaged or cut off archive"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, shape), good, 9)), HasSubstr("version 9"));
-  EXPECT_THAT(npy_error(npy_text(header("<i8", false, shape), good)), HasSubstr("astype"));
+  EXPECT_THAT(npy_error(npy_text(header("<c8", false, shape), good)), HasSubstr("astype"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(4, 3, 2)"), good)), HasSubstr("expected (nz, ny, nx, 3)"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(3, 4, 3, 2)"), good)), HasSubstr("moveaxis"));
   EXPECT_THAT(npy_error(npy_text(header("<f4", false, "(1, 3, 8, 3)"), good)), HasSubstr("at least 2"));
