@@ -196,7 +196,8 @@ Command add_audit_command(CLI::App& app) {
       ->add_option("--without", arguments->without,
                    "fits that do not ask for this where something is left over; may be repeated")
       ->allow_extra_args(false)
-      ->check(CLI::IsMember({"light", "background", "blur", "gamma", "curve", "stretch", "specks", "outside"}));
+      ->check(
+          CLI::IsMember({"light", "background", "blur", "gamma", "curve", "stretch", "specks", "outside", "charge"}));
   command->add_option("--seed", arguments->seed, "of the random numbers")->capture_default_str();
   command
       ->add_option("--samples", arguments->samples,

@@ -63,8 +63,25 @@ grep -q '^  transfer: srgb' photo.yaml || fail 'photo.yaml has no transfer'
 "$birefit" new crystal --image crystal/300V.png > list.yaml 2> list.txt || fail 'new crystal --image'
 grep -q 'image: "crystal/300V.png", set' list.yaml || fail 'list.yaml does not list the image'
 says list.txt 'missing: micrographs: more images'
-"$birefit" new slab --image photo.png > none.txt 2>&1 && fail 'a slab of an image'
-says none.txt 'reads no image'
+for kind in slab freedericksz; do
+  "$birefit" new $kind --image photo.png > none.txt 2>&1
+  [ $? -eq 2 ] || fail "a $kind of an image"
+  says none.txt 'reads no image'
+done
+# Whatever a file is called.
+cp crystal/300V.png 'cost$1 of.png'
+"$birefit" new crystal --image 'cost$1 of.png' > named.yaml 2> named.txt || fail 'a name with a dollar'
+grep -qF 'image: "cost$1 of.png", set' named.yaml || fail "named.yaml: $(grep image: named.yaml)"
+"$birefit" new disc --demo 'a folder' > spaces.txt 2>&1 || fail 'a demonstration in a folder with a blank'
+says spaces.txt "fit 'a folder/disc.yaml' --out 'a folder/out'"
+# Results do not replace what the config reads.
+mkdir own_name && cp droplet/droplet.png own_name/fitted.tif && sed 's/droplet.png/fitted.tif/' droplet/droplet.yaml > own_name/droplet.yaml
+"$birefit" fit own_name/droplet.yaml --out own_name > replaced.txt 2>&1
+[ $? -eq 2 ] || fail 'a fit over its own image'
+says replaced.txt 'which the config reads and the results would replace'
+cmp -s droplet/droplet.png own_name/fitted.tif || fail 'the image was replaced'
+"$birefit" render droplet/droplet.yaml --out droplet/droplet.png > replaced.txt 2>&1
+[ $? -eq 2 ] || fail 'a picture over the image of its config'
 "$birefit" new droplet --image nothing.png > none.txt 2>&1
 [ $? -eq 2 ] || fail 'an image that is missing'
 [ $failures -eq 0 ] && echo "all as required" || echo "$failures failures"

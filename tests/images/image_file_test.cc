@@ -20,6 +20,7 @@
 #include <gtest/gtest.h>
 
 #include "birefit/io.h"
+#include "io/files/file.h"
 
 namespace birefit {
 namespace {
@@ -514,12 +515,45 @@ TEST_F(ImageFile, OmeStatesTheObjectiveAndTheLight) {
   EXPECT_EQ(none.emission_nm, 0);
 }
 
+// OME, ImageJ and tifffile say in the first page what all of a stack are; a page of another size, a thumbnail, is not
+// meant, and what a page says itself counts.
+TEST_F(ImageFile, PagesOfAStackAreWhatTheFirstSays) {
+  const std::string ome =
+      "<?xml version=\"1.0\"?><OME xmlns=\"x\"><Image ID=\"Image:0\"><Pixels ID=\"Pixels:0\" "
+      "SizeX=\"4\" PhysicalSizeX=\"0.3\" PhysicalSizeY=\"0.3\"><Channel EmissionWavelength=\"633\"/>"
+      "</Pixels></Image></OME>";
+  ImageSpec first(4, 3, 1, TypeDesc::UINT8), plain = first, thumbnail(2, 2, 1, TypeDesc::UINT8), own = first;
+  first.attribute("ImageDescription", ome);
+  own.attribute("XResolution", 100000.f), own.attribute("YResolution", 100000.f), own.attribute("ResolutionUnit", "cm");
+  own.attribute("ImageDescription", "by itself");
+  const fs::path file = write_pages("a.tif", {first, plain, thumbnail, own});
+  const auto page = [&](int number) { return load_image({file, number, "", {}}); };
+  for (const int number : {0, 1}) {
+    EXPECT_NEAR(page(number).pixel_size_um, 0.3, 1e-9) << number;
+    EXPECT_NEAR(page(number).emission_nm, 633, 1e-9) << number;
+  }
+  EXPECT_EQ(page(2).pixel_size_um, 0);
+  EXPECT_NEAR(page(3).pixel_size_um, 0.1, 1e-6);
+}
+
+TEST_F(ImageFile, AStillWebPIsRead) {
+  const std::vector<std::uint8_t> samples(16 * 12 * 3, 77);
+  EXPECT_NEAR(load(write("a.webp", ImageSpec(16, 12, 3, TypeDesc::UINT8), samples), "g").values(5, 5), 77, 1);
+}
+
 // ---- writing --------------------------------------------------------------------------------------------------------
 
 Image ramp() {
   Image image(31, 17);
   for (std::size_t i = 0; i < image.size(); ++i) image.values()[i] = static_cast<double>(i) / (image.size() - 1);
   return image;
+}
+
+TEST_F(ImageFile, SavedPicturesStateTheirPixels) {
+  for (const char* name : {"a.tif", "a.exr"}) {
+    const std::vector<Image> channels{ramp()};
+    EXPECT_NEAR(load(write_bytes(name, encode_channels(channels, path(name), 0.3))).pixel_size_um, 0.3, 1e-6) << name;
+  }
 }
 
 TEST_F(ImageFile, SavedFloatsAreReadBackExactlyAndAreNotHalf) {

@@ -92,8 +92,8 @@ TEST(CrystalRecovery, OneVoltageDoesNotTellWhatIsBuiltIn) {
 }
 
 /// A bar whose field is 1 + c1 P1 + c2 P2 from one electrode to the other, at five voltages in one light, which falls
-/// off outwards by the part `vignetting` at the edge of the longer side; a camera
-/// shows it to the power of `gamma`. `charge` in the bar adds that part of the half-wave voltage to each of them.
+/// off outwards by the part `vignetting` at the edge of the longer side; a camera shows it to the power of `gamma`.
+/// `charge` in the bar adds that part of the half-wave voltage to each of them.
 struct VaryingField {
   double half_wave_v = 1500, c1 = 0, c2 = 0, vignetting = 0, gamma = 1, charge = 0;
 };

@@ -12,6 +12,7 @@
 
 namespace birefit {
 namespace {
+using namespace std::string_literals;
 
 using Config = testing::ConfigFolder;
 class ConfigSignal : public Config {};
@@ -216,6 +217,14 @@ TEST_F(ConfigSignal, TakesTheRowsAndUnitsThatASignalAsksFor) {
   EXPECT_NE(mistakes(replaced(kBirefringence, ", scale: 1, plus: 273.15", ""), ConfigUse::fit)
                 .find("celsius is in C by the table's line of units, sample.material.temperature_k in K"),
             std::string::npos);
+  // Without a line of units the name may tell.
+  for (const char* name : {"T (C)", "temperature_C"}) {
+    write("a.csv", "kind,"s + name + ",dn\nnematic,20,0.1\nnematic,30,0.09\nnematic,40,0.08\n");
+    const std::string named = replaced(kBirefringence, "celsius", name);
+    EXPECT_NE(mistakes(replaced(named, ", scale: 1, plus: 273.15", ""), ConfigUse::fit)
+                  .find(name + " is in C by its name, sample.material.temperature_k in K"s),
+              std::string::npos);
+  }
   EXPECT_NE(mistakes(replaced(kBirefringence, "quantity: birefringence", "quantity: retardance"), ConfigUse::fit)
                 .find("retardance_um"),
             std::string::npos);

@@ -10,6 +10,7 @@
 
 namespace birefit {
 namespace {
+using namespace std::string_literals;
 
 namespace fs = std::filesystem;
 using Config = testing::ConfigFolder;
@@ -475,6 +476,35 @@ microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}
   };
   EXPECT_EQ(known_to("", "80"), (std::array{2.0, 2.0, 0.5}));
   EXPECT_EQ(known_to(", center_px: [15.5, 15.5]", "{value: 80, exact: true}"), (std::array{0.0, 0.0, 0.0}));
+}
+
+// One picture that counts as two would halve the variance of what it tells.
+TEST_F(Config, APictureIsListedOnce) {
+  save("a.tif", counts(100, 1));
+  save("b.tif", counts(200, 2));
+  EXPECT_EQ(mistakes(kCrystal, ConfigUse::fit), "");
+  for (const char* again : {"a.tif", "./a.tif"})
+    EXPECT_NE(mistakes(replaced(kCrystal, "b.tif", again), ConfigUse::fit)
+                  .find("config.yaml:3:13: "s + again + " is listed twice: it is one measurement"),
+              std::string::npos);
+  const std::string regions = replaced(replaced(replaced(kCrystal, "micrograph: {roi_px: [2, 4, 30, 28]}\n", ""),
+                                                "image: a.tif,", "image: a.tif, roi_px: [0, 0, 32, 16],"),
+                                       "image: b.tif,", "image: a.tif, roi_px: [0, 16, 32, 32],");
+  EXPECT_EQ(mistakes(regions, ConfigUse::fit), "");
+}
+
+// A field in metres or nm is no picture of a sample.
+TEST_F(Config, AFieldIsAsLargeAsWhatIsSeen) {
+  const auto said = [&](const std::string& spacing, const std::string& more = "") {
+    return mistakes("image_size_px: [32, 32]\nmicrograph: {pixel_size_um: 0.02}\nsample:\n  volume: {file: " +
+                    std::string(BIREFIT_SOURCE_DIR) + "/tests/data/files/field_stored.npz, spacing_um: [" + spacing +
+                    "]" + more + "}\n  material: {ordinary: 1.5, birefringence: 0.1}\n  surround: {index: 1.5}\n" +
+                    "microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}\n");
+  };
+  EXPECT_EQ(said("0.2, 0.3, 0.4"), "");
+  EXPECT_NE(said("2e-7, 3e-7, 4e-7").find("less than a pixel"), std::string::npos);
+  EXPECT_EQ(said("2e-7, 3e-7, 4e-7", ", scale: 1e6"), "");
+  EXPECT_NE(said("500, 700, 900").find("a thousand times what is seen"), std::string::npos);
 }
 
 // Each names the place and what to do, not what the parser expected.

@@ -49,6 +49,21 @@ TEST(CutEnd, IsNotTheLowestOfFewCodes) {
     EXPECT_FALSE(find_cut_end(End::lowest, picture(3 * noise, noise, 1).values, kAll)) << noise;
 }
 
+// Of a small picture the one darkest pixel is a share above that of a pile, and next to none has its code.
+TEST(CutEnd, IsNotThePixelThatHappensToBeDarkest) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  for (const int size : {8, 10, 12, 14}) {
+    Image image(size, size);
+    for (double& value : image.values()) value = std::round(20000 + 100 * normal(random));
+    for (const End end : {End::lowest, End::highest})
+      EXPECT_FALSE(find_cut_end(end, image, {0, 0, size, size})) << size;
+    // A twelfth of it cut off is found all the same.
+    for (double& value : image.values()) value = std::max(value, 19862.0);
+    EXPECT_TRUE(find_cut_end(End::lowest, image, {0, 0, size, size})) << size;
+  }
+}
+
 TEST(CutEnd, IsFoundWhereLightWasTooBright) {
   LoadedImage image = picture(100, 5, 1);
   for (double& value : image.values.values()) value = std::min(value, 2500.0);

@@ -68,7 +68,8 @@ INSTANTIATE_TEST_SUITE_P(Programs, FieldFile,
                                          "field_big_endian.vti", "field_big_endian_zlib.vti", "points_ascii.vtk",
                                          "points_binary.vtk", "grid_ascii.vtk", "grid_binary.vtk", "tensors_ascii.vtk",
                                          "field_stored.npz", "field_deflated.npz", "field_big_endian.npy", "q.npy",
-                                         "q_three_halves_small.npy", "open_qmin_small.txt"),
+                                         "q_three_halves_small.npy", "open_qmin_small.txt", "field_masked.npz",
+                                         "field_integers.npy"),
                          [](const auto& info) {
                            std::string name = info.param;
                            for (char& c : name)

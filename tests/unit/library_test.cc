@@ -58,5 +58,32 @@ TEST(Library, AnEmptyReferenceIsSaidWithItsPlace) {
             std::string::npos);
 }
 
+// One rule of directions may agree with light along the axis by chance: between echoes of this cell it does.
+TEST(Library, ACondenserIsLeftOutByNoChance) {
+  const birefit::Config config = load_config_text(R"(image_size_px: [1, 1]
+accuracy: {intensity: 1e-5}
+physics: {ceiling: reflections, model_tolerance: 0}
+microscope:
+  light: {wavelength_nm: 471.415}
+  polarizer_deg: 156.858
+  analyzer_deg: 153.567
+  before: [{rotator: {angle_deg: 43.604}}, {retarder: {retardance_nm: 454.164, azimuth_deg: 176.206}}]
+  condenser: {na: 0.517}
+sample:
+  cell:
+    thickness_um: 2.416
+    director: {freedericksz: {reduced_voltage: 2.727, k33_over_k11: 1.654, k22_over_k11: 0.6, eps_ratio: 3.556, pretilt_deg: 1.326, twist_deg: 5.571, azimuth_deg: 26.014}}
+  material: {ordinary: {sellmeier: [[1.239, 0.005]], range_nm: [300, 1000]}, extraordinary: {sellmeier: [[1.425, 0.009], [0.1, 100]], range_nm: [300, 1000]}, absorption: {ordinary: 0.006, extraordinary: 0.007}}
+  surround: {index: 1.42399}
+)",
+                                                  "cell.yaml", ConfigUse::render);
+  const Theta theta = config.job.parameters.values();
+  const RenderPlan planned = plan(config.scene, config.job.demand, theta);
+  RenderPlan fine = planned;
+  fine.condenser_rings = 24;
+  EXPECT_NEAR(render(config.scene, planned, theta, {}, 1).intensity(0, 0),
+              render(config.scene, fine, theta, {}, 1).intensity(0, 0), 2e-5);
+}
+
 }  // namespace
 }  // namespace birefit

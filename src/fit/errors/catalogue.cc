@@ -69,8 +69,6 @@ bool are_alike(const Task& task) {
   return !even;
 }
 
-const std::string kCharge = "sample.crystal.built_in_bias_v";
-
 /// Of bars at several voltages whose charge is not given it is a number, stated as none; nothing where it is given.
 ParameterRef with_charge(FitJob& job, const Theta& theta) {
   constexpr double kOfHalfWave = 0.03;  // a standard deviation
@@ -79,7 +77,7 @@ ParameterRef with_charge(FitJob& job, const Theta& theta) {
     if (Crystal* bar = std::get_if<Crystal>(&scene.sample); bar && !bar->built_in_bias_v) bars.push_back(bar);
   });
   if (bars.size() < 2 || bars.size() != job.measurements.size()) return {};
-  const ParameterRef charge = job.parameters.add_constant(kCharge, 0, "V");
+  const ParameterRef charge = job.parameters.add_constant("sample.crystal.built_in_bias_v", 0, "V");
   job.parameters[charge].known_to.sd = kOfHalfWave * std::abs(bars.front()->half_wave_voltage_v.in(theta));
   for (Crystal* bar : bars) bar->built_in_bias_v = charge;
   return charge;
@@ -112,7 +110,7 @@ bool believes_catalogue(double missed_before, double missed_after) {
 FitJob with_catalogue(const Task& task, const Optimum& optimum) {
   std::vector<int> numbers = told_numbers(task, optimum);
   FitJob wider = task.job;
-  if (is_asked(task.job.options, kCharge))
+  if (is_asked(task.job.options, "charge"))
     if (const ParameterRef charge = with_charge(wider, optimum.theta)) numbers.push_back(charge.index);
   wider = with_nuisances(wider, numbers);
   const double gain = std::abs(task.gain_of(0, optimum.theta));

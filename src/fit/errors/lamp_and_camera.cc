@@ -80,10 +80,11 @@ Columns columns_of(const Task& task, const Optimum& optimum) {
       return drift * (static_cast<double>(g) / (task.frames() - 1) - 0.5) * light;
     });
   if (!are_pictures_of_what_is_flat(task)) return columns;
+  const bool even = are_even(task);
   for (const auto& [of_intensity, usual, behind_calibration] :
        {std::tuple{true, kUneven, kUnevenOfCalibrated}, std::tuple{false, kBackground, kBackgroundOfCalibrated}})
     for (const auto shape : {UnevenLight::Shape::x, UnevenLight::Shape::y, UnevenLight::Shape::square}) {
-      if (are_even(task) || is_stated(task.picture(0), of_intensity, shape)) continue;
+      if (even || is_stated(task.picture(0), of_intensity, shape)) continue;
       LightTerm uneven;
       uneven.shape = shape;
       // About its mean: what all of the light is off by is the gain's.

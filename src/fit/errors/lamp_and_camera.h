@@ -14,10 +14,9 @@ namespace birefit::estimation {
 ///   gain; unless the picture's own is stated.
 /// - A camera's values are not proportional to light, in several pictures of one gain of a flat sample: light to the
 ///   power of 1 + gamma, 0.3 %; not where the gain is exact.
-/// Empty: there is nothing of the kind.
 struct LampAndCamera {
-  Eigen::MatrixXd covariance;
-  bool of_drift_alone = false;
+  Eigen::MatrixXd covariance;    ///< of all unknowns, the searched ones first; empty: nothing
+  bool of_drift_alone = false;  ///< nothing but the lamp's drift is in it
 };
 /// By the weights of the problem; `covariance` of the unknowns by the same.
 LampAndCamera by_lamp_and_camera(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);

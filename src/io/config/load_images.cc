@@ -1,9 +1,12 @@
 // What the images of a config tell, and what is made of them.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -220,14 +223,17 @@ void Loading::take_images() {
     if (!micrograph.node || !micrograph.node->find("image")) reader_.missing(micrograph, "image");
   }
   // One picture that counts as two halves the variance of what it tells.
-  for (std::size_t i = 0; list_ && i < items_.size(); ++i)
-    for (std::size_t before = 0; before < i; ++before)
-      if (const Item& item = items_[i], &other = items_[before];
-          item.image && item.image == other.image && item.page.words() == other.page.words() && item.roi == other.roi) {
-        reader_.problems.add(item.image_where, *item.image + " is listed twice: it is one measurement",
-                             "leave one out, or give each a page or roi_px of its own");
-        break;
-      }
+  std::set<std::tuple<std::string, std::string, std::array<int, 4>>> listed;
+  for (const Item& item : items_) {
+    if (!list_ || !item.image) continue;
+    const PixelRect roi = item.roi.value_or(PixelRect{});
+    if (!listed
+             .emplace(reader_.resolve(*item.image).lexically_normal().string(), item.page.words(),
+                      std::array{roi.x0, roi.y0, roi.x1, roi.y1})
+             .second)
+      reader_.problems.add(item.image_where, *item.image + " is listed twice: it is one measurement",
+                           "leave one out, or give each a page or roi_px of its own");
+  }
   // Images are loaded although something else is wrong: their mistakes are reported in the same run.
   const Beside beside = load_beside();
   Taken taken;

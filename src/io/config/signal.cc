@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <regex>
 #include <utility>
 
 #include <fmt/format.h>
@@ -196,12 +195,11 @@ std::vector<Row> wanted_rows(ConfigReader& reader, const TextTable& text, const 
   return rows;
 }
 
-/// "angle (rad)", "angle [rad]" and "angle_rad" are in rad; empty where a name says nothing of a unit.
-std::string unit_in_name(const std::string& name) {
-  static const std::regex bracketed(R"(.*[(\[]([^()\[\]]+)[)\]] *)"),
-      appended(".*_(rad|mrad|deg|nm|um|mm|cm|mV|kV|V|C)");
-  std::smatch found;
-  return std::regex_match(name, found, bracketed) || std::regex_match(name, found, appended) ? found[1].str() : "";
+/// What a table says of a column's unit, and where: in its line of units or in the column's name; empty: nothing.
+std::pair<std::string, const char*> unit_of(const TextTable& text, int column, const std::string& name) {
+  if (!text.units.empty() && !text.units[static_cast<std::size_t>(column)].empty())
+    return {text.units[static_cast<std::size_t>(column)], " by the table's line of units, "};
+  return {unit_in_name(name), " by its name, "};
 }
 
 /// A table that says "mV" under a column that sets volts, and a config that takes the numbers as they are.
@@ -209,13 +207,9 @@ void check_unit(ConfigReader& reader, const TextTable& text, int column, const S
                 const std::string& unit) {
   const SignalItem::Column& taken = item.columns[i];
   if (column < 0 || taken.scale != 1 || taken.plus != 0) return;
-  const bool by_line = !text.units.empty() && !text.units[static_cast<std::size_t>(column)].empty();
-  const std::string given = by_line ? text.units[static_cast<std::size_t>(column)] : unit_in_name(taken.name);
+  const auto [given, by] = unit_of(text, column, taken.name);
   if (contradicts_unit(given, unit))
-    reader.problems.add(taken.where,
-                        taken.name + " is in " + given +
-                            (by_line ? " by the table's line of units, " : " by its name, ") + taken.path + " in " +
-                            unit,
+    reader.problems.add(taken.where, taken.name + " is in " + given + by + taken.path + " in " + unit,
                         "{column: " + taken.name + ", scale: .., plus: ..} converts it");
 }
 
@@ -347,12 +341,10 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
   const Header header(reader, item, text);
   reader.warnings.insert(reader.warnings.end(), text.notes.begin(), text.notes.end());
   const int value_column = header.at(item.value_column, item.file_where);
-  if (value_column >= 0 && !text.units.empty() && item.quantity == Quantity::retardance_um &&
-      contradicts_unit(text.units[static_cast<std::size_t>(value_column)], "um"))
-    reader.problems.add(item.file_where,
-                        item.value_column + " is in " + text.units[static_cast<std::size_t>(value_column)] +
-                            " by the table's line of units, quantity retardance_um in um",
-                        "give the retardances in um");
+  if (value_column >= 0 && item.quantity == Quantity::retardance_um)
+    if (const auto [given, by] = unit_of(text, value_column, item.value_column); contradicts_unit(given, "um"))
+      reader.problems.add(item.file_where, item.value_column + " is in " + given + by + "quantity retardance_um in um",
+                          "give the retardances in um");
   const std::vector<SetColumn> columns = set_columns(reader, item, text, header);
   std::vector<int> only;
   for (const SignalItem::Only& each : item.only) only.push_back(header.at(each.column, each.where));

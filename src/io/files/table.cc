@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <regex>
 #include <string>
 #include <utility>
 
@@ -155,6 +156,13 @@ bool contradicts_unit(const std::string& given, const std::string& wanted) {
            return std::find(kind.begin(), kind.end(), a) != kind.end() &&
                   std::find(kind.begin(), kind.end(), b) != kind.end();
          });
+}
+
+std::string unit_in_name(const std::string& name) {
+  static const std::regex bracketed(R"(.*[(\[]([^()\[\]]+)[)\]] *)"),
+      appended(".*_(rad|mrad|deg|nm|um|mm|cm|mV|kV|V|C)");
+  std::smatch found;
+  return std::regex_match(name, found, bracketed) || std::regex_match(name, found, appended) ? found[1].str() : "";
 }
 
 std::string describe_left_out(const std::string& name, const std::vector<int>& lines) {

@@ -375,10 +375,10 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   check_header(request, signature, spec, stored);
 
   LoadedImage loaded;
-  const bool says_itself = !spec.get_string_attribute("ImageDescription", "").empty() || spec.width != first.width ||
-                           spec.height != first.height;
-  const OIIO::ImageSpec& speaks = says_itself ? spec : first;
-  const std::string description = speaks.get_string_attribute("ImageDescription", "");
+  const auto who_states = [&](const char* what) -> const OIIO::ImageSpec& {
+    return !spec.find_attribute(what) && spec.width == first.width && spec.height == first.height ? first : spec;
+  };
+  const std::string description = who_states("ImageDescription").get_string_attribute("ImageDescription", "");
   const std::vector<int> channels = chosen_channels(request, spec, stored.palette, loaded.notes);
   loaded.colour = spec.nchannels >= 3;
   const PixelRect part = part_asked(request, spec.width, spec.height);
@@ -397,9 +397,10 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
       refuse_image(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
     loaded.notes.push_back("it " + found + ": the first is used");
   }
-  const StatedResolution resolution{speaks.get_float_attribute("XResolution", 0),
-                                    speaks.get_float_attribute("YResolution", 0),
-                                    speaks.get_string_attribute("ResolutionUnit", "")};
+  const OIIO::ImageSpec& scaled = who_states("XResolution");
+  const StatedResolution resolution{scaled.get_float_attribute("XResolution", 0),
+                                    scaled.get_float_attribute("YResolution", 0),
+                                    scaled.get_string_attribute("ResolutionUnit", "")};
   loaded.pixel_size_um = stated_pixel_size_um(resolution, description, loaded.notes, loaded.uneven_pixel_um);
   const StatedOptics optics = stated_optics(description);
   loaded.objective_na = optics.objective_na, loaded.emission_nm = optics.emission_nm;

@@ -15,6 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Of a fit's results, the names of those whose number follows from the config.
+const std::string kPictures = R"((fitted|residual)(_[0-9]+)?\.(tif|npy|csv))";
+
 std::string table_csv(const SignalTable& table, const FitResult& result) {
   std::string text = table.path + ",measured,fitted,residual,sigma\n";
   for (std::size_t r = 0; r < table.x.size() && table.first + r < result.micrographs.size(); ++r) {
@@ -77,7 +80,7 @@ std::vector<fs::path> left_by_earlier_fit(const fs::path& folder, const std::vec
   std::vector<fs::path> left;
   std::error_code code;
   if (!fs::exists(folder / "fit.json", code)) return left;
-  static const std::regex kOurs(R"((fitted|residual)(_[0-9]+)?\.(tif|npy|csv)|samples\.csv)");
+  static const std::regex kOurs(kPictures + R"(|samples\.csv)");
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, code))
     if (std::regex_match(entry.path().filename().string(), kOurs) &&
         std::none_of(files.begin(), files.end(),
@@ -121,8 +124,7 @@ std::vector<FileContent> result_files(const Config& config, const FitResult& res
 }
 
 void refuse_to_replace_inputs(const fs::path& folder, const Config& config) {
-  static const std::regex kOurs(
-      R"((fitted|residual)(_[0-9]+)?\.(tif|npy|csv)|samples\.csv|log\.txt|report\.html|fit\.json)");
+  static const std::regex kOurs(kPictures + R"(|samples\.csv|log\.txt|report\.html|fit\.json)");
   std::error_code code;
   for (const fs::path& input : config.inputs)
     if (std::regex_match(input.filename().string(), kOurs) &&

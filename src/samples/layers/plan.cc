@@ -191,24 +191,27 @@ void plan_fringe_blocks(const Planning& planning, RenderPlan& plan) {
 int fewest_steps(const PlanarOptics<double>& o) {
   constexpr int kWithin = 32;
   constexpr double kSame = 1e-12;
+  // Golden section: the turns of a helix, however many, do not keep in step with it.
+  constexpr double kGolden = 0.6180339887498949;
   const Mesh layers = uniform_mesh(1, o.column->breaks);
-  double phase = 0;  // of the faster wave through all of it
+  double rate = 0;  // the most that a phase grows with u, of the slower wave
   bool even = true;
   for (std::size_t layer = 1; layer < layers.size(); ++layer) {
     std::array<double, kWithin> u{};
     for (int i = 0; i < kWithin; ++i)
-      u[static_cast<std::size_t>(i)] = layers[layer - 1] + (i + 0.5) / kWithin * (layers[layer] - layers[layer - 1]);
+      u[static_cast<std::size_t>(i)] =
+          layers[layer - 1] + std::fmod((i + 0.5) * kGolden, 1.0) * (layers[layer] - layers[layer - 1]);
     std::array<OpticalPoint<double>, kWithin> at;
     o.column->sample(u, at.data());
     for (const OpticalPoint<double>& p : at) {
-      phase += o.k0 * std::sqrt(std::max(std::abs(p.ordinary), std::abs(p.extraordinary))) *
-               std::abs(p.depth_slope_um) * (layers[layer] - layers[layer - 1]) / kWithin;
+      rate = std::max(rate, o.k0 * std::sqrt(std::max(std::abs(p.ordinary), std::abs(p.extraordinary))) *
+                                std::abs(p.depth_slope_um));
       const double along = dot(p.axis, at[0].axis);
       even = even && std::abs(along * along - 1) < kSame && std::abs(p.ordinary - at[0].ordinary) < kSame &&
              std::abs(p.extraordinary - at[0].extraordinary) < kSame;
     }
   }
-  return even ? 1 : static_cast<int>(std::ceil(phase / kPi));
+  return even ? 1 : static_cast<int>(std::ceil(rate / kPi));
 }
 
 /// All reflections: as many steps of the 4 x 4 transport as change nothing when doubled.

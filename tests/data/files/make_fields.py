@@ -100,6 +100,9 @@ legacy("tensors_ascii.vtk", "STRUCTURED_POINTS",
 
 np.savez(folder / "field_stored.npz", n=n)
 np.savez_compressed(folder / "field_deflated.npz", n=n.astype("f4"), S=np.full((4, 3, 2), S), other=np.arange(5.0))
+np.savez(folder / "field_masked.npz", n=n, domain_mask=np.ones((4, 3, 2), bool))
+z, y, x = np.meshgrid(range(4), range(3), range(2), indexing="ij")
+np.save(folder / "field_integers.npy", np.stack([2 + 2 * x, 4 - 2 * y, 1 + 2 * z], -1).astype(">i2"))
 np.savez(folder / "field_named.npz", directors=n, other=np.arange(5.0))
 np.save(folder / "field_big_endian.npy", n.astype(">f8"))
 np.save(folder / "q.npy", Q)
