@@ -79,6 +79,14 @@ void make_demo(const Kind& kind, const fs::path& folder) {
     throw UserError({config.string()}, "is there already", "give --demo a folder of its own");
   OutputFolder made(folder);
   made.keep();
+  // What is there tells that a demonstration is: not where it could not be finished.
+  struct Unfinished {
+    fs::path config;
+    ~Unfinished() {
+      std::error_code ignored;
+      if (!config.empty()) fs::remove(config, ignored);
+    }
+  } unfinished{config};
   write_file(config, kind.config);
   for (const auto& [name, content] : kind.files) write_file(folder / name, content);
   Noise noise;
@@ -92,6 +100,7 @@ void make_demo(const Kind& kind, const fs::path& folder) {
     std::cout << "A picture made with what the config does not know (" << (folder / "truth.csv").string() << "):\n";
     for (const auto& [path, value] : kind.truth) std::cout << fmt::format("  {} = {}\n", path, value);
   }
+  unfinished.config.clear();
   const fs::path out = folder / (kind.command == "jones" ? "jones.csv" : "out");
   std::cout << "Run it:\n  birefit " << kind.command << " " << for_shell(config) << " --out " << for_shell(out) << "\n";
 }

@@ -149,6 +149,17 @@ int Job::index_of(const std::string& name, const std::string& call) const {
   return parameter_named(pictured_.job.parameters, name, {call}).index;
 }
 
+std::vector<int> Job::indices_of(const std::vector<std::string>& names, const std::string& call) const {
+  std::vector<int> indices;
+  for (const std::string& name : names) {
+    indices.push_back(index_of(name, call));
+    const std::size_t first = static_cast<std::size_t>(std::ranges::find(indices, indices.back()) - indices.begin());
+    if (first + 1 < indices.size())
+      throw UserError({call}, "'" + names[first] + "' and '" + name + "' are one number", "name every number once");
+  }
+  return indices;
+}
+
 std::array<int, 3> Job::shape() const {
   check_pictured();
   const View& view = pictured_.scene.view;
@@ -170,16 +181,15 @@ py::tuple Job::render(const std::vector<std::pair<std::string, double>>& changes
   check_pictured();
   const ParameterTable& table = pictured_.job.parameters;
   Theta theta = table.values();
-  std::vector<int> given;
-  for (const auto& [name, value] : changes) {
-    const int index = index_of(name, "render");
-    ranges_->check(table, index, value, {"render"});
-    theta[static_cast<std::size_t>(index)] = value;
-    given.push_back(index);
+  std::vector<std::string> changed;
+  for (const auto& change : changes) changed.push_back(change.first);
+  const std::vector<int> given = indices_of(changed, "render");
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    ranges_->check(table, given[i], changes[i].second, {"render"});
+    theta[static_cast<std::size_t>(given[i])] = changes[i].second;
   }
   follow(table, *ranges_, given, {"render"}, theta);
-  std::vector<int> indices;
-  for (const std::string& name : active) indices.push_back(index_of(name, "derivatives"));
+  std::vector<int> indices = indices_of(active, "derivatives");
   const std::vector<Link> links = links_of(table, given, theta, indices);
   std::vector<Rendering> colours;
   {
@@ -212,8 +222,7 @@ py::array Job::render_many(const std::vector<std::string>& names, const Doubles&
   if (values.ndim() != 2 || values.shape(1) != std::ssize(names))
     throw UserError(where, "the values have another shape than (pictures, " + std::to_string(names.size()) + ")",
                     "a row a picture, and in it a number for each of " + list_words(names));
-  std::vector<int> indices;
-  for (const std::string& name : names) indices.push_back(index_of(name, "render_many"));
+  const std::vector<int> indices = indices_of(names, "render_many");
   const py::ssize_t pictures = values.shape(0);
   std::vector<Theta> thetas(static_cast<std::size_t>(pictures), table.values());
   for (py::ssize_t i = 0; i < pictures; ++i)

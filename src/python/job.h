@@ -43,6 +43,8 @@ class Job {
   std::vector<std::string> free_names() const;
   /// Place in the table of the number that a name means; `call`: who asks.
   int index_of(const std::string& name, const std::string& call) const;
+  /// Of several; no number may be named twice.
+  std::vector<int> indices_of(const std::vector<std::string>& names, const std::string& call) const;
   /// Rows, columns and colours of render(). Throws UserError where the config does not say.
   std::array<int, 3> shape() const;
 

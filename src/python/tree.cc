@@ -21,9 +21,18 @@ YamlNode scalar(std::string text) {
   return node;
 }
 
+/// As UTF-8, which half of a surrogate pair has none of.
+std::string utf8(const py::handle& text, const std::string& path) {
+  py::ssize_t size = 0;
+  const char* const bytes = PyUnicode_Check(text.ptr()) ? PyUnicode_AsUTF8AndSize(text.ptr(), &size) : nullptr;
+  if (bytes) return {bytes, static_cast<std::size_t>(size)};
+  PyErr_Clear();
+  refuse(path, "has text that is no Unicode");
+}
+
 /// Text that YAML would take for something else stays text.
-YamlNode text_node(const py::handle& value) {
-  YamlNode node = scalar(value.cast<std::string>());
+YamlNode text_node(const py::handle& value, const std::string& path) {
+  YamlNode node = scalar(utf8(value, path));
   const std::string& text = node.text;
   node.quoted = text.empty() || text == "null" || text == "~" || text == "true" || text == "false" ||
                 text.find_first_of("0123456789.+-") == 0;
@@ -34,7 +43,7 @@ YamlNode node_of(const py::handle& value, const std::string& path, int depth) {
   if (depth > kMaxYamlDepth) refuse(path, "is nested too deeply");
   if (value.is_none()) return {};
   if (py::isinstance<py::bool_>(value)) return scalar(value.cast<bool>() ? "true" : "false");
-  if (py::isinstance<py::str>(value)) return text_node(value);
+  if (py::isinstance<py::str>(value)) return text_node(value, path);
   if (py::isinstance<py::int_>(value) || py::isinstance<py::float_>(value))
     return scalar(py::repr(py::isinstance<py::int_>(value) ? py::object(py::int_(value.cast<py::int_>()))
                                                            : py::object(py::float_(value.cast<double>()))));
@@ -43,7 +52,7 @@ YamlNode node_of(const py::handle& value, const std::string& path, int depth) {
     node.kind = YamlNode::Kind::map;
     for (const auto& [key, of_key] : value.cast<py::dict>()) {
       if (!py::isinstance<py::str>(key)) refuse(path, "has a key that is no text");
-      const std::string name = key.cast<std::string>();
+      const std::string name = utf8(key, path);
       node.entries.push_back({name, {}, node_of(of_key, path.empty() ? name : path + "." + name, depth + 1)});
     }
     return node;
@@ -55,7 +64,7 @@ YamlNode node_of(const py::handle& value, const std::string& path, int depth) {
     return node;
   }
   if (py::hasattr(value, "tolist")) return node_of(value.attr("tolist")(), path, depth + 1);  // NumPy's
-  if (py::hasattr(value, "__fspath__")) return text_node(value.attr("__fspath__")());
+  if (py::hasattr(value, "__fspath__")) return text_node(value.attr("__fspath__")(), path);
   refuse(path, "is " + py::str(py::type::of(value).attr("__name__")).cast<std::string>());
 }
 

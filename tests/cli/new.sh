@@ -38,6 +38,11 @@ done
 "$birefit" new droplet --demo droplet > again.txt 2>&1 && fail 'a demonstration is written over'
 says again.txt 'is there already'
 
+# What could not be finished is begun again.
+mkdir half && mkdir half/truth.csv
+"$birefit" new droplet --demo half > half.txt 2>&1 && fail 'a demonstration without its truth'
+rmdir half/truth.csv && "$birefit" new droplet --demo half > half.txt 2>&1 || { fail 'a demonstration that failed stays'; cat half.txt; }
+
 # Words that people use.
 "$birefit" new conoscopy > word.txt 2>&1 && fail 'conoscopy is a kind'
 says word.txt 'did you mean plate?'

@@ -536,6 +536,43 @@ TEST_F(ImageFile, PagesOfAStackAreWhatTheFirstSays) {
   EXPECT_NEAR(page(3).pixel_size_um, 0.1, 1e-6);
 }
 
+// A copy that broke off behind the first page is no single picture, unless that page is what is asked for.
+TEST_F(ImageFile, AStackThatIsCutBehindItsFirstPageIsCut) {
+  const ImageSpec page(4, 3, 1, TypeDesc::UINT8);
+  std::string bytes = content(write_pages("a.tif", {page, page}));
+  const auto number = [&](std::size_t at, int size) {
+    std::size_t value = 0;
+    for (int i = size; i-- > 0;)
+      value = value << 8 | static_cast<unsigned char>(bytes[at + static_cast<std::size_t>(i)]);
+    return value;
+  };
+  ASSERT_EQ(bytes.substr(0, 2), "II");
+  const std::size_t first = number(4, 4), second = number(first + 2 + 12 * number(first, 2), 4);
+  ASSERT_GT(second, first);
+  const fs::path cut = write_bytes("cut.tif", bytes.substr(0, second));
+  EXPECT_THAT(refusal(cut), ::testing::AllOf(HasSubstr("further pages are announced"), HasSubstr("page: 0")));
+  EXPECT_EQ(load_image({cut, 0, "", {}}).values.width(), 4);
+}
+
+// What is whole and stored otherwise is not called damaged.
+TEST_F(ImageFile, UnknownCompressionsAndTypesAreNamed) {
+  std::vector<Tag> compressed = tiff_tags(4, 4, 16, 1), wide = tiff_tags(4, 4, 64, 1);
+  compressed[3].values = {12345};
+  wide.push_back({339, 3, {2}});
+  EXPECT_THAT(refusal(write_bytes("a.tif", tiff_bytes(compressed, std::string(32, '\1')))),
+              HasSubstr("compressed in a way"));
+  EXPECT_THAT(refusal(write_bytes("a.tif", tiff_bytes(wide, std::string(128, '\1')))), HasSubstr("64-bit integers"));
+}
+
+TEST_F(ImageFile, AlphaThatIsAskedForIsSaid) {
+  ImageSpec spec(1, 1, 4, TypeDesc::UINT8);
+  spec.attribute("oiio:UnassociatedAlpha", 1);
+  const LoadedImage image = load(write<std::uint8_t>("a.png", spec, {100, 150, 200, 10}), "3");
+  EXPECT_EQ(image.values(0, 0), 10);
+  EXPECT_THAT(image.notes, Contains(HasSubstr("channel 3 is called A")));
+  EXPECT_THAT(image.notes, ::testing::Not(Contains("alpha channel ignored")));
+}
+
 TEST_F(ImageFile, AStillWebPIsRead) {
   const std::vector<std::uint8_t> samples(16 * 12 * 3, 77);
   EXPECT_NEAR(load(write("a.webp", ImageSpec(16, 12, 3, TypeDesc::UINT8), samples), "g").values(5, 5), 77, 1);

@@ -76,6 +76,44 @@ def test_images_that_are_none(droplet, image, words):
         birefit.Job(droplet).fit(image)
 
 
+@pytest.mark.parametrize("call, words", [
+    (lambda job: job.render(birefringence=0.1 + 0j), "birefringence is"),
+    (lambda job: job.render(birefringence="0.1"), "birefringence is"),
+    (lambda job: job.render({"birefringence": 0.1, "sample.material.birefringence": 0.2}), "one number"),
+    (lambda job: job.render(derivatives=["birefringence", "birefringence"]), "one number"),
+    (lambda job: job.render(threads=-1), "threads is -1"),
+    (lambda job: job.render(threads="2"), "threads is '2'"),
+    (lambda job: job.render_many([[0.1, 0.2]], names=["birefringence", "material.birefringence"]), "one number"),
+    (lambda job: job.render_many([[0.1], [0.2, 0.3]], names=["birefringence"]), "no array"),
+    (lambda job: job.render_many({"birefringence": [0.1, 0.2], "diameter_um": [9, 9, 9]}), "several lengths"),
+    (lambda job: job.render_many([["0.1"]], names=["birefringence"]), "numbers are"),
+    (lambda job: job.fit(samples=-1), "samples is -1"),
+    (lambda job: job.fit(threads=1.5), "threads is 1.5"),
+    (lambda job: job.residual(job.theta0[:-1]), "a number for each of"),
+    (lambda job: job.residual(job.theta0 + 0j), "complex"),
+    (lambda job: job.log_posterior(np.zeros((2, 2, 2))), "has the shape"),
+])
+def test_numbers_that_are_none(droplet, call, words):
+    job = birefit.Job(droplet)
+    job = birefit.Job(droplet, image=job.render() * 1000)
+    with pytest.raises(birefit.Error, match=words):
+        call(job)
+
+
+@pytest.mark.parametrize("tree", [None, 5, ["sample"], "sample: \ud800", {"sample": "\ud800"}])
+def test_what_is_no_tree(tree):
+    with pytest.raises(birefit.Error):
+        birefit.Job(tree)
+
+
+def test_one_name_is_a_name(droplet):
+    job = birefit.Job(droplet)
+    _, one = job.render(derivatives="birefringence")
+    _, listed = job.render(derivatives=["birefringence"])
+    assert np.array_equal(one, listed)
+    assert np.array_equal(job.render_many([[0.1]], names="birefringence"), job.render_many({"birefringence": 0.1}))
+
+
 @pytest.mark.parametrize("tree", [{}, {"sample": None}, {"sample": {"droplet": []}}, {3: 4}, {"image_size_px": [1, object()]}])
 def test_trees_that_are_no_configs(tree):
     with pytest.raises(birefit.Error) as error:

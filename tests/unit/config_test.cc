@@ -456,6 +456,22 @@ TEST_F(Config, RefusesAnImageOptionBesideMicrographs) {
   EXPECT_THROW(load_config(write("config.yaml", kCrystal), ConfigUse::fit, folder_ / "a.tif"), UserError);
 }
 
+// A cone's picture ends where the objective's aperture does: 40 degrees in air need 0.64.
+TEST_F(Config, AConeIsNoWiderThanTheObjectiveTakesIn) {
+  save("a.tif", counts(100, 1));
+  const auto with = [&](const std::string& na) {
+    return mistakes(R"(micrograph: {image: a.tif}
+sample:
+  plate: {thickness_um: 500, director: {uniform: {azimuth_deg: 20, tilt_deg: 80}}, view: {half_angle_deg: 40}}
+  material: {ordinary: 1.54, birefringence: {value: 0.01, fit: [0.005, 0.02]}}
+microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90, objective_na: )" +
+                        na + "}\n",
+                    ConfigUse::fit);
+  };
+  EXPECT_NE(with("0.4").find("needs a numerical aperture of 0.64"), std::string::npos);
+  EXPECT_EQ(with("0.65"), "");
+}
+
 // Where a cone's figure lies is set by eye, and a crystal is not cut exactly; what is stated to be exact is.
 TEST_F(Config, FigureOfAConeAndCutOfAPlateAreNotExact) {
   save("a.tif", counts(100, 1));

@@ -128,6 +128,22 @@ TEST_F(CalibrationFrames, DarkAloneIsSubtracted) {
   EXPECT_TRUE(picture(config.job, 0).variance_scale.empty());
 }
 
+// 8 bits of a camera are 16 bits divided by 256: subtracted, they would be nothing.
+TEST_F(CalibrationFrames, CountsOfTwoKindsAreNotSubtracted) {
+  save_image(Image(8, 6, 120.0 / 65535), folder_ / "image.png");
+  save_image(Image(8, 6, 20.0 / 65535), folder_ / "dark_16.png");
+  const std::vector<unsigned char> small = encode_png(std::vector<unsigned char>(48, 20), 8, 6, 1);
+  write("dark_8.png", {small.begin(), small.end()});
+  const auto of_image = [&](const std::string& dark) {
+    std::string text = with("dark: " + dark);
+    return text.replace(text.find("image.tif"), 9, "image.png");
+  };
+  EXPECT_EQ(picture(load(of_image("dark_16.png")).job, 0).values(0, 0), 100);
+  EXPECT_THAT(problems(of_image("dark_8.png")),
+              HasSubstr("counts of 16 bits, the dark frame that is subtracted has 8"));
+  EXPECT_EQ(problems(with("dark: dark_8.png")), "");  // floats have the scale that their maker gave them
+}
+
 TEST_F(CalibrationFrames, FlatAloneDivides) {
   const Config config = load(with("flat: light.tif"));
   EXPECT_DOUBLE_EQ(picture(config.job, 0).values(0, 0), 120.0 / 220);

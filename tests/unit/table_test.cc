@@ -114,6 +114,19 @@ TEST_F(TableFile, CommasThatCouldPartThousandsAreNoNumbers) {
   EXPECT_EQ(read("a;b\n1,234;1\n").table.rows[0][0], 1.234);
   EXPECT_THAT(read("a;b\n1,234;1\n").notes, ElementsAre(HasSubstr("decimal")));
   EXPECT_THAT(read("a;b\n1.234;1\n").notes, IsEmpty());
+  // Beside a number below a thousand without a comma it may be one; beside one with other decimals it is none.
+  EXPECT_THAT(error("a;b\n1,250;1\n977;2\n"), HasSubstr("a = 1,250 is not a finite number"));
+  EXPECT_EQ(read("a;b\n1,250;1\n977;2\n0,5;3\n").table.rows[0][0], 1.25);
+  EXPECT_EQ(read("a;b\n1,250;1\n0,977;2\n").table.rows[0][0], 1.25);
+}
+
+// What programs and word processors make of numbers is named, not taken for damage.
+TEST_F(TableFile, NumbersInOtherSpellingsAreRecognised) {
+  EXPECT_THAT(error("a,b\n1.02D1,2\n"), HasSubstr("did you mean 1.02E1?"));
+  EXPECT_THAT(error("a,b\n\u22125,2\n"), HasSubstr("did you mean -5?"));
+  EXPECT_THAT(error("a,b\n1\u00a0250,2\n"), HasSubstr("did you mean 1250?"));
+  EXPECT_THAT(error("a,b\n0x0A,2\n"), HasSubstr("in decimals"));
+  EXPECT_THAT(error("volts light\n1.0 0.5\n2.0 0.7\n"), HasSubstr("t.csv:2: has columns with nothing but blanks"));
 }
 
 TEST_F(TableFile, WhatIsNoTableIsRefusedByName) {

@@ -103,6 +103,9 @@ void Loading::take_view() {
   }
   const Item& item = items_[0];
   const std::string name = item.image.value_or("the image");
+  if (asked_.use == ConfigUse::render && list_ && items_.size() > 1)
+    reader_.warnings.push_back(
+        fmt::format("Of {} micrographs the first is shown, {}, with what is set for it.", items_.size(), name));
   if (size_) {
     set_view(reader_, (*size_)[0], (*size_)[1], 0, name, scene);
     demand_pixel_size(scene);

@@ -115,6 +115,16 @@ double share_of(const Mask& mask, const PixelRect& area) {
   return count / std::max(1.0, static_cast<double>(area.width()) * area.height());
 }
 
+/// Counts of 8 bits and of 16 differ by a factor of 256 as a rule, and a dark frame is subtracted.
+void compare_counts(ConfigReader& reader, int dark_bits, const LoadedImage& image, const std::string& name,
+                    const Where& where) {
+  const int bits = image.top_code > 0 ? image.bits : 0;
+  if (dark_bits == 0 || bits == 0 || bits == dark_bits) return;
+  reader.problems.add(
+      where, fmt::format("{} has counts of {} bits, the dark frame that is subtracted has {}", name, bits, dark_bits),
+      "save both as the camera had them, in one type; or as floats, if their scales are equal");
+}
+
 /// Values, mask and the reasons for exclusion; false when a problem left nothing to work with. Of a mosaic only the
 /// pixels of a `part`.
 bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const Calibration* calibration,
@@ -130,7 +140,10 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
                                    std::to_string(image.height));
   };
   if (user_mask) other_size(user_mask->width, user_mask->height, *settings.mask, settings.mask_where);
-  if (calibration) other_size(calibration->width, calibration->height, calibration->name, calibration->where);
+  if (calibration) {
+    other_size(calibration->width, calibration->height, calibration->name, calibration->where);
+    compare_counts(reader, calibration->dark_bits, image, name, where);
+  }
   const PixelRect area = region_in(settings, image);
   if (std::min(area.width(), area.height()) < settings.bin)
     reader.problems.add(settings.bin_where, fmt::format("bin = {} is more than the {} x {} pixels of {}", settings.bin,
@@ -334,6 +347,9 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
                                             std::to_string(image.height) + " pixels, " + *first->name + " is " +
                                             std::to_string(other.width) + " x " + std::to_string(other.height));
   }
+  const int dark_bits = dark.image && dark.image->top_code > 0 ? dark.image->bits : 0;
+  for (const Frame* frame : {&bright, &crossed})
+    if (frame->image) compare_counts(reader, dark_bits, *frame->image, *frame->name, frame->where);
   if (!first || reader.problems.all().size() > before) return std::nullopt;
   const Image& size = first->image->values;
   if (!check_roi(reader, settings, *first->image, *first->name)) return std::nullopt;
@@ -342,6 +358,7 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
   Calibration calibration;
   calibration.width = first->image->width, calibration.height = first->image->height;
   calibration.name = *first->name, calibration.where = first->where;
+  calibration.dark_bits = dark_bits;
   calibration.usable = Mask(size.width(), size.height(), 1);
   calibration.saturated = Mask(size.width(), size.height(), 0);
   const auto noise_of_dark = dark.image ? noise_of_neighbours(dark.image->values, area) : std::nullopt;

@@ -14,6 +14,7 @@ namespace birefit {
 struct Calibration {
   int width = 0, height = 0;  ///< of the files; all else is of the region that was read
   Image dark;                 ///< counts in linear light; empty: nothing is subtracted
+  int dark_bits = 0;          ///< that counts of the dark frame are stored in: 8 or 16; 0: other values, or no frame
   Image light;                ///< the frame of light less dark; empty: nothing divides
   Mask usable;
   Mask saturated;

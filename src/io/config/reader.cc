@@ -149,10 +149,12 @@ std::optional<double> ConfigReader::finite(const YamlNode& node, const std::stri
     problems.add(node.where, name + " = " + node.describe() + " is not a finite number");
     return std::nullopt;
   }
-  std::string hint;
   const std::size_t digits = node.text.find_first_not_of("0123456789+-.eE");
   const std::size_t comma = node.text.find(',');
-  if (comma != std::string::npos && comma == digits) {
+  std::string hint = comma == std::string::npos ? number_hint(node.text) : "";
+  if (!hint.empty()) {
+    // Said.
+  } else if (comma != std::string::npos && comma == digits) {
     std::string with_point = node.text;
     with_point[comma] = '.';
     if (parse_number(with_point)) hint = "did you mean " + with_point + "? write a decimal point";

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "birefit/render.h"
 #include "io/config/described.h"
@@ -548,12 +551,36 @@ void add_defocus_problem(ConfigReader& reader, const Scene& scene) {
                       "ceiling: wave, with objective_na, for droplets, shells and sampled fields");
 }
 
+namespace {
+
+/// A picture in a cone ends where the objective's aperture does.
+void check_cone(ConfigReader& reader, const Scene& scene) {
+  ParameterRef half_angle, na = scene.microscope.objective_na;
+  if (const auto* plate = std::get_if<Plate>(&scene.sample)) half_angle = plate->half_angle_deg;
+  if (const auto* slab = std::get_if<Slab>(&scene.sample); slab && slab->half_angle_deg)
+    half_angle = slab->half_angle_deg;
+  if (!half_angle || !na || reader.varies(half_angle) || reader.varies(na) || scene.surround_dispersion) return;
+  constexpr double kEngraved = 0.03;  // what such numbers are known to
+  const double outside = scene.surround_index ? reader.table[scene.surround_index].value : 1,
+               seen = outside * std::sin(reader.table[half_angle].value * std::numbers::pi / 180),
+               taken = reader.table[na].value;
+  if (seen > (1 + kEngraved) * taken)
+    reader.problems.add(reader.table[half_angle].where,
+                        fmt::format("half_angle_deg = {:g} needs a numerical aperture of {:.2f}, objective_na is {:g}",
+                                    reader.table[half_angle].value, seen, taken),
+                        "the picture ends where the objective does: state the angle at its edge, or leave "
+                        "objective_na out");
+}
+
+}  // namespace
+
 Scene read_scene(ConfigReader& reader, const Block& root) {
   Scene scene;
   // Which kind it is steers what the microscope needs, so the sample comes first.
   read_sample(reader, root, scene);
   read_microscope(reader, root, scene);
   check_material_ranges(reader, root, scene);
+  check_cone(reader, scene);
   read_demand(reader, root, scene);
   return scene;
 }

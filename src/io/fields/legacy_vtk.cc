@@ -134,6 +134,8 @@ class LegacyReader {
         box(places);
       } else if (key == "X_COORDINATES" || key == "Y_COORDINATES" || key == "Z_COORDINATES") {
         const std::size_t axis = static_cast<std::size_t>(key[0] - 'X'), steps = count(key);
+        if (static_cast<double>(steps) != n_[axis])
+          refuse(raw_.file, fmt::format("has {} {}, DIMENSIONS say {:.0f}", steps, key, n_[axis]), "save it again");
         const std::vector<double> places = numbers(steps, word(), key);
         if (steps >= 2) raw_.spacing_um[axis] = (places.back() - places.front()) / static_cast<double>(steps - 1);
         for (std::size_t i = 0; i < steps; ++i)

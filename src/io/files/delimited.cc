@@ -5,6 +5,9 @@
 #include <cctype>
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "birefit/error.h"
 
@@ -184,10 +187,30 @@ std::optional<MarkedNumber> marked_number(std::string_view text, char mark) {
   return i == text.size() ? std::optional(found) : std::nullopt;
 }
 
-/// Makes decimal commas points. "1,234" may be a thousand and some: it is a decimal where semicolons separate (who
-/// writes them does so because the comma is taken) or another number shows what commas are.
+/// "977": what a column of thousands has beside "1,250".
+bool below_a_thousand(const std::string& text) {
+  return !text.empty() && text.size() <= 3 && text.front() != '0' &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
+}
+
+/// Has a column both "1,250" and "977"? Decimals would all show what is behind their comma, or vary in length.
+bool has_mixed_column(const DelimitedText& table) {
+  std::vector<std::pair<bool, bool>> of_column;
+  for (const TableRecord& record : table.records) {
+    of_column.resize(std::max(of_column.size(), record.cells.size()));
+    for (std::size_t i = 0; i < record.cells.size(); ++i) {
+      if (marked_number(record.cells[i].text, ',')) of_column[i].first = true;
+      if (below_a_thousand(record.cells[i].text)) of_column[i].second = true;
+    }
+  }
+  return std::any_of(of_column.begin(), of_column.end(), [](const auto& both) { return both.first && both.second; });
+}
+
+/// Makes decimal commas points. "1,234" may be a thousand and some: it is a decimal where another number shows what
+/// commas are, or where semicolons separate (who writes them does so because the comma is taken) and nothing speaks
+/// for thousands.
 bool settle_decimal_commas(DelimitedText& table) {
-  bool any = false, points = false, sure = table.separator == ';';
+  bool any = false, points = false, sure = table.separator == ';' && !has_mixed_column(table);
   for (const TableRecord& record : table.records)
     for (const TableCell& cell : record.cells) {
       points = points || marked_number(cell.text, '.');

@@ -1,12 +1,14 @@
 #include "io/files/table.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <limits>
 #include <regex>
+#include <sstream>
 #include <string>
 #include <utility>
 
@@ -103,6 +105,19 @@ void read_row(TableRecord& record, const std::string& file, char separator, Text
                hint);
 }
 
+/// Names and numbers with nothing but blanks between them would be one column of no numbers.
+void refuse_blanks(const std::vector<TableRecord>& records, std::size_t first, const std::string& file) {
+  if (records.size() <= first || records[0].cells.size() != 1 || records[first].cells.size() != 1) return;
+  const auto words = [](const TableRecord& record) {
+    std::istringstream stream(record.cells[0].text);
+    return std::vector<std::string>{std::istream_iterator<std::string>(stream), {}};
+  };
+  const std::vector<std::string> numbers = words(records[first]);
+  if (numbers.size() > 1 && std::all_of(numbers.begin(), numbers.end(), [](auto& w) { return parse_number(w); }))
+    throw UserError({file, records[first].line}, "has columns with nothing but blanks between them",
+                    "separate them, names and numbers, by commas, semicolons or tabs");
+}
+
 std::string read_table(const std::filesystem::path& path, const Where& where) {
   std::error_code code;
   if (!std::filesystem::exists(path, code)) throw UserError(where, path.string() + " does not exist");
@@ -144,6 +159,18 @@ std::optional<double> parse_number(std::string_view text) {
 bool is_missing_number(std::string_view text) { return text.find_first_of("0123456789") == std::string_view::npos; }
 
 std::string number_hint(std::string_view text) {
+  // Signs and blanks as word processors set them, and the exponent as Fortran writes it.
+  static const std::array<std::pair<std::string_view, std::string_view>, 6> kSpellings = {
+      {{"\u2212", "-"}, {"\u2013", "-"}, {"\u00a0", ""}, {"\u2009", ""}, {"\u202f", ""}, {"\u2007", ""}}};
+  std::string plain(text);
+  for (const auto& [from, to] : kSpellings)
+    for (std::size_t at; (at = plain.find(from)) != std::string::npos;) plain.replace(at, from.size(), to);
+  const bool set = plain != text;
+  if (const std::size_t at = plain.find_first_of("dD"); at != std::string::npos && at > 0) plain[at] = 'E';
+  if (plain != text && parse_number(plain))
+    return "did you mean " + plain + "?" + (set ? " it has signs or blanks that are not the keyboard's" : "");
+  if (static const std::regex hexadecimal("[+-]?0[xX][0-9a-fA-F]+"); std::regex_match(plain, hexadecimal))
+    return "write it in decimals";
   if (text.find(',') == std::string_view::npos) return {};
   return "a comma that may be a decimal mark or part thousands: write decimals with a point, thousands with nothing";
 }
@@ -193,6 +220,7 @@ TextTable load_text_table(const std::filesystem::path& path, const Where& where,
                           " holds no numbers and is taken for the columns' units.");
     first = 2;
   }
+  refuse_blanks(records, first, file);
   for (std::size_t r = first; r < records.size() && problems.all().size() < kMostProblems; ++r)
     read_row(records[r], file, text.separator, table, problems);
   if (table.rows.empty() && problems.empty())

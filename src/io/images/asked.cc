@@ -57,16 +57,18 @@ std::vector<int> channels_asked(const ImageRequest& request, const std::vector<S
     for (int i = 0; i < 3; ++i)
       if (last == std::array{"r", "g", "b"}[i] || last == std::array{"red", "green", "blue"}[i]) rgb[i] = c;
   }
-  if (colours.size() < stored.size()) notes.push_back("alpha channel ignored");
-  if (colours.empty() && count == 1) colours.push_back(0);
-
   if (by_number) {
     const int number = choice.size() < 9 ? std::stoi(choice) : count;
     if (number >= count)
       refuse_image(request, fmt::format("has no channel {}: it has {} ({})", choice, count, names),
                    "channels count from 0");
+    if (count > 1 && std::find(colours.begin(), colours.end(), number) == colours.end())
+      notes.push_back(fmt::format("channel {} is called {}: what is covered, and no light, as a rule", number,
+                                  stored[static_cast<std::size_t>(number)].name));
     return {number};
   }
+  if (colours.size() < stored.size()) notes.push_back("alpha channel ignored");
+  if (colours.empty() && count == 1) colours.push_back(0);
   if (colours.size() == 1) {
     if (!choice.empty() && !request.mask && !request.cells)
       notes.push_back("channel: " + choice + " has no effect: the image is grey");

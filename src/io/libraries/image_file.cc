@@ -48,7 +48,19 @@ std::string decoder_message(OIIO::ImageInput& input) {
   return text.empty() ? text : " (" + text + ")";
 }
 
+/// Whole, but stored in a way that the decoder does not know, by what it says.
+void refuse_unknown_storage(const ImageRequest& request, const std::string& detail) {
+  for (const char* words : {"is not implemented", "not configured", "driver doesn't support"})
+    if (detail.find(words) != std::string::npos)
+      refuse_image(request, "is compressed in a way that this program cannot read" + detail,
+                   "save it without compression, or with LZW or deflate");
+  if (detail.find("No support for data format") != std::string::npos)
+    refuse_image(request, "has samples of a type that is no picture's, such as 64-bit integers or complex numbers",
+                 "save it as 8- or 16-bit integers or float");
+}
+
 [[noreturn]] void refuse_damaged(const ImageRequest& request, const Signature& signature, const std::string& detail) {
+  refuse_unknown_storage(request, detail);
   refuse_image(request,
                fmt::format("is truncated or damaged: it starts like a {} file but cannot be read completely{}",
                            signature.format_name, detail),
@@ -368,6 +380,10 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   if (signature.format == "webp" && !several &&
       (!input->close() || !input->open(request.path.string(), spec, settings)))
     refuse_damaged(request, signature, decoder_message(*input));
+  if (signature.format == "tiff" && memory == nullptr && !several && !request.page &&
+      read_tiff_tags(request.path, 2).cut_off)
+    refuse_image(request, "is cut off: further pages are announced behind the end of the file",
+                 "copy it again from its source, or add `page: 0` for the one that is left");
   const int page = page_asked(request, *input, several);
   if (!input->seek_subimage(page, 0)) refuse_damaged(request, signature, decoder_message(*input));
   spec = input->spec(page, 0);

@@ -48,8 +48,7 @@ Errors
 Every mistake in a config, an image, a name or a number is a :class:`birefit.Error`, whose ``problems`` say where, what
 and what to do about it; all that can be found at once are reported at once. A fit without an answer is no error: see
 ``result.has_answer`` and ``result.verdict``. Ctrl-C ends a fit with :class:`birefit.Interrupted`, which is a
-KeyboardInterrupt and has the best ``result`` so far. What has other types or lengths than are asked for is a TypeError
-or ValueError of Python's own.
+KeyboardInterrupt and has the best ``result`` so far.
 
 Threads
 -------

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from . import _birefit
 from ._errors import Interrupted
+from ._given import count, real, reals, refuse, threads_of
 from ._result import Named, Objective, Result
 
 Array = npt.NDArray[np.float64]
@@ -72,7 +73,7 @@ class Job:
         set: Settings = None,
         name: str = "config",
     ) -> None:
-        text = tree if isinstance(tree, (str, bytes)) else _birefit.text_of_tree(dict(tree))
+        text = _text(tree)
         images, fields = _held(arrays or {})
         self._state = (text, name, _items(set), images, fields, _in_place(image))
         self._job = _birefit.Job(text, os.fsencode(name), *self._state[2:])
@@ -132,7 +133,7 @@ class Job:
         values
             numbers by name, in their units; a fit's ``result.values`` will do.
         derivatives
-            names of numbers (fitted or not) by which to differentiate as well.
+            names of numbers (fitted or not), or the name of one, by which to differentiate as well.
         threads
             0 = all cores.
 
@@ -142,9 +143,10 @@ class Job:
         for the picture follows the values, as of ``birefit render``; equal values give equal bits, with derivatives equal
         numbers to rounding.
         """
-        changes = [(name, float(value)) for name, value in {**(values or {}), **more}.items()]
-        active = list(derivatives) if derivatives is not None else []
-        picture, jacobian = self._job.render(changes, active, threads)
+        given = {**(values or {}), **more}
+        changes = [(name, real("render", name, value)) for name, value in given.items()]
+        active = [derivatives] if isinstance(derivatives, str) else list(derivatives or [])
+        picture, jacobian = self._job.render(changes, active, threads_of("render", threads))
         if derivatives is None:
             return picture
         return picture, np.empty((*picture.shape, 0)) if jacobian is None else jacobian
@@ -162,9 +164,13 @@ class Job:
         """
         if isinstance(thetas, Mapping):
             names = list(thetas)
-            columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(c, dtype=float)) for c in thetas.values()))
-            thetas = np.stack(columns, axis=1) if columns else np.empty((1, 0))
-        return self._job.render_many(list(names) if names is not None else self.names, np.asarray(thetas, float), threads)
+            each = [np.atleast_1d(reals("render_many", c, "one a picture")) for c in thetas.values()]
+            if any(column.ndim > 1 for column in each) or len({column.size for column in each} - {1}) > 1:
+                refuse("render_many", "the columns have several lengths", "one number a picture in each, or a single number")
+            thetas = np.stack(np.broadcast_arrays(*each), axis=1) if each else np.empty((1, 0))
+        columns = [names] if isinstance(names, str) else list(names) if names is not None else self.names
+        rows = reals("render_many", thetas, "(pictures, parameters)")
+        return self._job.render_many(columns, rows, threads_of("render_many", threads))
 
     # Fits ------------------------------------------------------------------------------------------------------------
 
@@ -192,7 +198,8 @@ class Job:
         Raises birefit.Error for images that cannot be read or fitted, and birefit.Interrupted on Ctrl-C, with what was
         found so far. A fit without an answer is a result that says why.
         """
-        fitted = self._job.fit(_in_place(image), progress, threads, samples)
+        draws = count("fit", "samples", samples, "0 for none, or how many to draw")
+        fitted = self._job.fit(_in_place(image), progress, threads_of("fit", threads), draws)
         if isinstance(fitted, tuple):
             raise Interrupted(Result(fitted[0]))
         return Result(fitted)
@@ -202,7 +209,7 @@ class Job:
     def objective(self, *, threads: int = 0) -> Objective:
         """What a fit of the config's image makes small, by the weights that a fit begins with; see :class:`Objective`.
         It is made once, and read the image then; ``threads`` other than 0 makes another."""
-        if threads != 0:
+        if threads_of("objective", threads) != 0:
             return Objective(self._job.objective(threads))
         if self._objective is None:
             self._objective = Objective(self._job.objective(0))
@@ -244,6 +251,19 @@ class Job:
 
 def _job_again(cls: type[Job], text: str | bytes, name: str, set: list[str], images: Any, fields: Any, image: Any) -> Job:
     return cls(text, arrays={**images, **fields}, image=image, set=set, name=name)
+
+
+def _text(tree: Any) -> str | bytes:
+    if isinstance(tree, str):
+        try:
+            return tree.encode()
+        except UnicodeEncodeError:
+            refuse("config", "has text that is no Unicode", "give UTF-8")
+    if isinstance(tree, bytes):
+        return tree
+    if not isinstance(tree, Mapping):
+        refuse("config", f"the tree is {type(tree).__name__}", "give a dictionary, nested like the YAML, or the text of one")
+    return _birefit.text_of_tree(dict(tree))
 
 
 def _items(set: Settings) -> list[str]:
@@ -295,6 +315,8 @@ def _held(arrays: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, b
             np.savez(file, **value)
         else:
             array = _unmasked(value) if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
+            if array.dtype.hasobject:
+                refuse(f"array '{name}'", "has elements that are no numbers", "a picture or a field has integers or floats")
             if array.ndim < 4:
                 images[name] = array
                 continue

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _birefit
-from ._errors import Error
+from ._given import reals, refuse, threads_of
 
 Array = npt.NDArray[np.float64]
 
@@ -60,16 +60,23 @@ class Objective:
     def residual(self, theta: npt.ArrayLike) -> Array:
         """(rows,): (model - value) / standard deviation of every pixel that is used, picture after picture, row by row,
         then (parameter - mean) / sd of every prior. Its sum of squares is chi-square with the priors."""
-        return self._objective.residual(np.asarray(theta, dtype=float))
+        return self._objective.residual(self._theta(theta, 1))
 
     def jacobian(self, theta: npt.ArrayLike) -> Array:
         """(rows, parameters): the derivatives of :meth:`residual`, per unit of each parameter."""
-        return self._objective.jacobian(np.asarray(theta, dtype=float))
+        return self._objective.jacobian(self._theta(theta, 1))
 
     def log_posterior(self, theta: npt.ArrayLike) -> Any:
         """-(sum of squares of :meth:`residual`) / 2, the logarithm of the posterior density but for a constant;
         -infinity outside of the bounds. theta (points, parameters) gives (points,), as emcee's ``vectorize`` asks."""
-        return self._objective.log_posterior(np.asarray(theta, dtype=float))
+        return self._objective.log_posterior(self._theta(theta, 2))
+
+    def _theta(self, theta: npt.ArrayLike, most: int) -> Array:
+        shapes = "(parameters,)" if most == 1 else "(parameters,) or (points, parameters)"
+        numbers = reals("theta", theta, shapes)
+        if not 1 <= numbers.ndim <= most or numbers.shape[-1] != len(self.names):
+            refuse("theta", f"has the shape {numbers.shape}", f"{shapes}, a number for each of {', '.join(self.names)}")
+        return numbers
 
 
 class Result:
@@ -241,7 +248,7 @@ class Result:
         pictures (.tif; with ``npy`` also .npy). Returns the path of the report."""
         where = os.fspath(folder)
         if npy and self._fitted is None:
-            raise Error([("report", "a result that was pickled has its pictures as .tif alone", "numpy.save(.., result.fitted[0])")])
+            refuse("report", "a result that was pickled has its pictures as .tif alone", "numpy.save(.., result.fitted[0])")
         _birefit.write_files(os.fsencode(where), self._fitted.files([".tif", ".npy"]) if npy else self._report_files())
         return os.path.join(where, "report.html")
 
@@ -286,8 +293,8 @@ class Result:
     def objective(self, *, threads: int = 0) -> Objective:
         """What the fit made small, by the plans, pixels and noise that it ended with; see :class:`Objective`."""
         if self._fitted is None:
-            raise Error([("objective", "a result that was pickled has none", "use job.objective(), or fit again")])
-        return Objective(self._fitted.objective(threads))
+            refuse("objective", "a result that was pickled has none", "use job.objective(), or fit again")
+        return Objective(self._fitted.objective(threads_of("objective", threads)))
 
     def _of_parameters(self, what: Any) -> Named:
         return Named((name, what(p)) for name, p in self._all["parameters"].items())
