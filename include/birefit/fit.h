@@ -266,7 +266,7 @@ struct FitResult {
   std::vector<DerivedEstimate> derived;       ///< tied entries, then FitJob::derived
   std::vector<std::string> names;             ///< order of correlation and covariance
   Eigen::MatrixXd covariance, correlation;    ///< parameters' own units
-  Eigen::MatrixXd stated_covariance;  ///< the part of it by what is stated: in common to all fits that state the same
+  Eigen::MatrixXd stated_covariance;  ///< the part by what is stated, lamp and camera: common to fits of one set-up
   /// "white noise" | "scaled by reduced chi-square" | "clustered by image" | ..., in words
   std::string covariance_kind;
   double interval_degrees_of_freedom = 0;         ///< of the t quantile behind interval95

@@ -9,6 +9,7 @@
 
 #include "birefit/fit.h"
 #include "core/robust.h"
+#include "fit/errors/lamp_and_camera.h"
 #include "fit/errors/stated.h"
 #include "fit/errors/statistics.h"
 #include "fit/errors/verdict.h"
@@ -120,6 +121,8 @@ Information information(const Planned& p) {
   const Eigen::MatrixXd stated =
       covariance_by(linear_stated_numbers(task, problem, problem.theta(), result.inverse.covariance));
   if (stated.allFinite()) result.covariance += stated;
+  const Eigen::MatrixXd of_light = foretold_by_lamp_and_camera(task, problem, result.inverse.covariance);
+  if (of_light.size() > 0) result.covariance += of_light;
   return result;
 }
 

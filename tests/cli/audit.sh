@@ -47,5 +47,8 @@ says e.txt 'field stop'
 "$birefit" audit "$source/fit_configs/twisted_cell.yaml" --list > cell.txt 2>&1 || fail 'cell'
 says cell.txt '^lamp drift '
 grep -q '^blur ' cell.txt && fail 'a cell is one number a picture'
+grep -q '^charge ' cell.txt && fail 'charge in a cell'
+"$birefit" audit "$source/fit_configs/pockels_field.yaml" --list > bar.txt 2>&1 || fail 'bar'
+says bar.txt '^charge '
 [ "$failures" -eq 0 ] && echo ok
 exit "$failures"

@@ -280,6 +280,48 @@ TEST(Outlook, IsTheStandardErrorThatTheFitThenHas) {
   }
 }
 
+// Light and background that nobody says are even: what is usual of each moves a field by as much as fits of such
+// pictures show.
+TEST(Outlook, KnowsThatLightMayBeUneven) {
+  constexpr int kWidth = 40, kHeight = 30;
+  constexpr double kGain = 3000, kOffset = 150, kVolts = 700, kTilt = 0.4, kLight = 0.02, kBackground = 0.01;
+  const auto bar_with = [&](double share, const std::function<double(double, double)>& shape, bool of_light) {
+    Bar bar(kVolts, kTilt);
+    bar.free(bar.tilt, kTilt, 0.05, 0.8);
+    bar.free_linear();
+    bar.job.parameters[bar.gain].value = kGain;
+    bar.job.parameters[bar.offset].value = kOffset;
+    Picture& picture = bar.add_image(kWidth, kHeight, bar.bias);
+    picture.noise = NoiseModel{30, 0, false};
+    expose(picture, kGain, kOffset, kVolts, kTilt, [&](int x, int y, double) {
+      const double half = 0.5 * kWidth;
+      const double light = of_light ? kLight * intensity(kVolts, kTilt, y, kHeight) : kBackground;
+      return share * kGain * light * shape((x - 0.5 * (kWidth - 1)) / half, (y - 0.5 * (kHeight - 1)) / half);
+    });
+    return bar;
+  };
+  const auto estimated = [&](double share, const std::function<double(double, double)>& shape, bool of_light) {
+    Bar bar = bar_with(share, shape, of_light);
+    bar.under_even_light();
+    return estimate(fit(bar.job), "sample.crystal.field_legendre.c1").value;
+  };
+  const auto none = [](double, double) { return 0.0; };
+  const std::function<double(double, double)> shapes[] = {[](double x, double) { return x; },
+                                                          [](double, double y) { return y; },
+                                                          [](double x, double y) { return x * x + y * y; }};
+  const Bar bar = bar_with(0, none, true);
+  Bar even = bar;
+  even.under_even_light();
+  double variance = std::pow(outlook(even.job).parameters[0].stderr_, 2);
+  constexpr double kShare = 0.1;  // so that it is a derivative
+  for (const auto& shape : shapes)
+    for (const bool of_light : {true, false})
+      variance += std::pow((estimated(kShare, shape, of_light) - estimated(0, none, of_light)) / kShare, 2);
+  const double foretold = outlook(bar.job).parameters[0].stderr_;
+  EXPECT_GT(foretold, 2 * outlook(even.job).parameters[0].stderr_);
+  EXPECT_NEAR(foretold / std::sqrt(variance), 1, 0.03);
+}
+
 TEST(Outlook, SaysWhatThePlannedImageWillNotTell) {
   // A uniform image is one number: neither gain nor voltage.
   OneVoltage one(0.5);

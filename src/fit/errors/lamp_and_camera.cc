@@ -70,12 +70,12 @@ bool is_stated(const Picture& picture, bool of_intensity, UnevenLight::Shape sha
 
 /// All of what round samples depart by is asked for where something is left over (catalogue.h); of flat ones only where
 /// they change over the picture, and field and light can be taken for each other.
-Columns columns_of(const Task& task, const Optimum& optimum) {
-  const LeastSquares& problem = *optimum.problem;
+/// `frames_scatter`: the errors hold what a lamp does from one picture to the next.
+Columns columns_of(const Task& task, const LeastSquares& problem, bool frames_scatter) {
   Columns columns(task, problem);
   const double drift = usual_drift(task);
   // The frames' scatter holds what a lamp does from one to the next, and not what is alike in all of them.
-  if (drift > 0 && !optimum.misfit.frames_scatter)
+  if (drift > 0 && !frames_scatter)
     columns.add([&](int g, int, int, double light) {
       return drift * (static_cast<double>(g) / (task.frames() - 1) - 0.5) * light;
     });
@@ -109,14 +109,19 @@ Columns columns_of(const Task& task, const Optimum& optimum) {
   return columns;
 }
 
+/// What the unknowns move by for each of the columns.
+Eigen::MatrixXd shift_by(const LeastSquares::Beside& sums, const Eigen::MatrixXd& covariance) {
+  return -covariance * sums.with_unknowns;
+}
+
 }  // namespace
 
 LampAndCamera by_lamp_and_camera(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance) {
-  Eigen::MatrixXd columns = columns_of(task, optimum).all();
+  Eigen::MatrixXd columns = columns_of(task, *optimum.problem, optimum.misfit.frames_scatter).all();
   const Eigen::Index k = columns.cols();
   if (k == 0) return {};
   const LeastSquares::Beside sums = optimum.problem->beside(std::move(columns));
-  const Eigen::MatrixXd shift = -covariance * sums.with_unknowns,
+  const Eigen::MatrixXd shift = shift_by(sums, covariance),
                         information = sums.among + sums.with_unknowns.transpose() * shift;
   if (!shift.allFinite() || !information.allFinite()) return {};
   // The estimates are those without any of it: its mean square by the pictures and its prior, not its variance.
@@ -124,6 +129,14 @@ LampAndCamera by_lamp_and_camera(const Task& task, const Optimum& optimum, const
   const Eigen::VectorXd mean = variance * sums.with_residual;
   return {shift * (variance + mean * mean.transpose()) * shift.transpose(),
           k == 1 && !are_pictures_of_what_is_flat(task)};
+}
+
+Eigen::MatrixXd foretold_by_lamp_and_camera(const Task& task, const LeastSquares& problem,
+                                            const Eigen::MatrixXd& covariance) {
+  Eigen::MatrixXd columns = columns_of(task, problem, false).all();
+  if (columns.cols() == 0) return {};
+  const Eigen::MatrixXd shift = shift_by(problem.beside(std::move(columns)), covariance);
+  return shift.allFinite() ? Eigen::MatrixXd(shift * shift.transpose()) : Eigen::MatrixXd();
 }
 
 }  // namespace birefit::estimation

@@ -15,10 +15,13 @@ namespace birefit::estimation {
 /// - A camera's values are not proportional to light, in several pictures of one gain of a flat sample: light to the
 ///   power of 1 + gamma, 0.3 %; not where the gain is exact.
 struct LampAndCamera {
-  Eigen::MatrixXd covariance;    ///< of all unknowns, the searched ones first; empty: nothing
+  Eigen::MatrixXd covariance;   ///< of all unknowns, the searched ones first; empty: nothing
   bool of_drift_alone = false;  ///< nothing but the lamp's drift is in it
 };
 /// By the weights of the problem; `covariance` of the unknowns by the same.
 LampAndCamera by_lamp_and_camera(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& covariance);
+/// Of pictures that are yet to come: what it is on the average, when light and camera are as usual. Empty: nothing.
+Eigen::MatrixXd foretold_by_lamp_and_camera(const Task& task, const LeastSquares& problem,
+                                            const Eigen::MatrixXd& covariance);
 
 }  // namespace birefit::estimation

@@ -194,6 +194,7 @@ void pay_for_stated(const Task& task, const Optimum& optimum, Covariances& covar
   const LampAndCamera light = by_lamp_and_camera(task, optimum, covariances.of_noise.covariance);
   if (light.covariance.size() == 0) return;
   covariance += light.covariance;
+  covariances.of_light = light.covariance;
   constexpr double kOfNote = 0.05;  // of a variance
   if ((light.covariance.diagonal().array() > kOfNote * covariance.diagonal().array()).any())
     covariances.by_light = light.of_drift_alone ? "a lamp that drifts" : "what lamp and camera usually depart by";

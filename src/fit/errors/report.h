@@ -19,8 +19,9 @@ struct Covariances {
   double along = 1;                ///< largest factor on a standard error by the latter
   Eigen::VectorXd by_discrepancy;  ///< standard deviations of all unknowns by one that is left over; empty: none
   bool discrepancy() const { return by_discrepancy.size() > 0; }
-  std::string by_light;  ///< what lamp and camera do that makes a part of note of `with_misfit`; empty: nothing
-  Stated stated;         ///< what it would be to state these otherwise is in `with_misfit`, too
+  std::string by_light;      ///< what lamp and camera do that makes a part of note of `with_misfit`; empty: nothing
+  Eigen::MatrixXd of_light;  ///< all that they make of it; empty: nothing
+  Stated stated;             ///< what it would be to state these otherwise is in `with_misfit`, too
 };
 /// `propagation`: LeftOut::propagation.
 Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);

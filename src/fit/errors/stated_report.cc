@@ -36,6 +36,8 @@ Eigen::MatrixXd stated_covariance(const Task& task, const Covariances& covarianc
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(all, all);
   const Eigen::MatrixXd& shift = covariances.stated.shift;
   if (shift.size() > 0) sum += shift * shift.transpose();
+  // One lamp and one camera, like a number that is stated, are the same in other fits of the set-up.
+  if (covariances.of_light.size() > 0) sum += covariances.of_light;
   for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j) {
     if (!task.searched(j).nuisance) continue;
     // Another draw of what is stated would move the prior's mean, and the estimates by this for each of its deviations.

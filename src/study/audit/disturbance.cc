@@ -159,6 +159,22 @@ void add_instrument(const FitJob& job, std::vector<Disturbance>& all) {
   }
 }
 
+/// Of a bar: a field without any voltage, of charge that its last one has left there.
+void add_charge(const FitJob& job, std::vector<Disturbance>& all) {
+  bool bars = true;
+  for_each_scene(job.measurements, [&](const Scene& scene) {
+    const auto* bar = std::get_if<Crystal>(&scene.sample);
+    bars = bars && bar && !bar->built_in_bias_v;
+  });
+  if (!bars) return;
+  Disturbance d{"charge", "in the bar, as a share of its half-wave voltage", "%", {0.01, 0.03, 0.1}};
+  d.added = [](Exposure& e, Scene& scene, Theta& theta) {
+    auto& bar = std::get<Crystal>(scene.sample);
+    bar.built_in_bias_v = new_number(theta, e.sign * e.size * bar.half_wave_voltage_v.in(theta));
+  };
+  all.push_back(d);
+}
+
 void add_light(std::vector<Disturbance>& all) {
   const auto add = [&](const char* name, const char* what, const char* unit, std::array<double, 3> sizes, auto light) {
     Disturbance d{name, what, unit, sizes};
@@ -314,6 +330,7 @@ std::vector<Disturbance> disturbances(const FitJob& job) {
   }
   add_mixed(job, all);
   add_instrument(job, all);
+  add_charge(job, all);
   if (pictures) add_light(all);
   if (pictures && spheres) add_neighbour(all);
   add_camera(!pictures, all);
