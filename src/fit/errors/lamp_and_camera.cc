@@ -48,6 +48,15 @@ double usual_drift(const Task& task) {
   return task.job.parameters[gain].known_to.share;
 }
 
+/// May the camera's curve change what the pictures tell? Not where gains are exact.
+bool may_be_bent(const Task& task) {
+  for (int g = 0; g < task.frames(); ++g) {
+    const ParameterRef gain = task.picture(g).gain;
+    if (!gain || !(task.job.parameters[gain].known_to.share > 0)) return false;
+  }
+  return true;
+}
+
 bool are_pictures_of_what_is_flat(const Task& task) {
   for (int g = 0; g < task.frames(); ++g) {
     const Picture& picture = task.picture(g);
@@ -104,7 +113,7 @@ Columns columns_of(const Task& task, const LeastSquares& problem, bool frames_sc
     }
   const bool bent = std::any_of(task.picture(0).effects.begin(), task.picture(0).effects.end(),
                                 [](const PictureEffect& own) { return own.kind == PictureEffect::Kind::gamma; });
-  if (drift > 0 && !bent)
+  if (may_be_bent(task) && !bent)
     columns.add([&](int, int, int, double light) { return light > 0 ? kGamma * light * std::log(light) : 0; });
   return columns;
 }

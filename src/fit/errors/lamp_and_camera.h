@@ -12,8 +12,8 @@ namespace birefit::estimation {
 /// - Light is not even over a flat sample that is not the same all over: along x, y and outwards, 2 % at the edge of
 ///   the longer side (0.2 % where a calibration frame has divided it out), and so a background, by 1 % (0.1 %) of the
 ///   gain; unless the picture's own is stated.
-/// - A camera's values are not proportional to light, in several pictures of one gain of a flat sample: light to the
-///   power of 1 + gamma, 0.3 %; not where the gain is exact.
+/// - A camera's values are not proportional to light, in pictures of a flat sample: light to the power of 1 + gamma,
+///   0.3 %; not where gains are exact.
 struct LampAndCamera {
   Eigen::MatrixXd covariance;   ///< of all unknowns, the searched ones first; empty: nothing
   bool of_drift_alone = false;  ///< nothing but the lamp's drift is in it

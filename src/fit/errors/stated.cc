@@ -23,6 +23,27 @@ std::vector<int> uncertain(const Task& task) {
   return found;
 }
 
+/// Without those that are never fitted along: of a bar whose field varies the electrodes' places. Pictures that are
+/// nearly the model tell of both what neither is, and a field that has bent for it fits; by its derivative, such a
+/// place is an error like others.
+Stated fittable(const Task& task, Stated stated) {
+  std::set<int> followed;
+  for_each_scene(task.job.measurements, [&](const Scene& scene) {
+    const auto* bar = std::get_if<Crystal>(&scene.sample);
+    if (!bar || bar->field_legendre.empty()) return;
+    for (const ParameterRef edge : {bar->electrode_low_px, bar->electrode_high_px})
+      if (edge) followed.insert(edge.index);
+  });
+  if (followed.empty()) return stated;
+  std::vector<Eigen::Index> kept;
+  std::vector<int> index;
+  for (Eigen::Index i = 0; i < stated.sd.size(); ++i)
+    if (const int at = stated.index[static_cast<std::size_t>(i)]; !followed.contains(at))
+      kept.push_back(i), index.push_back(at);
+  return {std::move(index), Eigen::VectorXd(stated.sd(kept)), Eigen::MatrixXd(stated.shift(Eigen::all, kept)),
+          Eigen::MatrixXd(stated.information(kept, kept)), Eigen::VectorXd(stated.pull(kept))};
+}
+
 /// What the weights of the problem have been divided by for what noise does not explain.
 double beyond_noise(const Optimum& optimum) {
   double largest = 1;
@@ -123,7 +144,8 @@ Stated stated_numbers(const Task& task, const Optimum& optimum, const Eigen::Mat
 
 std::vector<int> told_numbers(const Task& task, const Optimum& optimum) {
   const Inverse inverse = invert_normal_equations(optimum.problem->factor());
-  const Stated stated = linear_stated_numbers(task, *optimum.problem, optimum.theta, inverse.covariance);
+  const Stated stated =
+      fittable(task, linear_stated_numbers(task, *optimum.problem, optimum.theta, inverse.covariance));
   return stated.information.allFinite() ? numbers_told(stated, beyond_noise(optimum)) : std::vector<int>{};
 }
 
@@ -134,7 +156,7 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   LeastSquares& problem = own ? *own : *optimum.problem;
   const Inverse inverse = invert_normal_equations(problem.factor());
   if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return {};
-  const Stated stated = linear_stated_numbers(task, problem, problem.theta(), inverse.covariance);
+  const Stated stated = fittable(task, linear_stated_numbers(task, problem, problem.theta(), inverse.covariance));
   const Eigen::Index k = stated.sd.size();
   if (k == 0 || !stated.shift.allFinite() || !stated.information.allFinite()) return {};
   // By the problem's weights, which a misfit has made smaller, and by those of the noise: the misfit may be theirs.

@@ -171,7 +171,7 @@ void Loading::read_shared() {
   shared_.offset = settings_.offset;
   shared_.uneven = settings_.uneven;
   shared_.noise = settings_.noise;
-  set_electrodes(reader_, settings_, shared_.scene);
+  if (settings_.roi) set_electrodes(reader_, *settings_.roi, shared_.scene);
   read_fit_options(reader_, root_, config_.job.options);
   channels_ = by_channel(settings_);
 }

@@ -201,6 +201,7 @@ void Loading::take_image(std::size_t i, const Beside& beside, Taken& taken) {
     compare_metadata(reader_, *loaded, micrograph.name, where, settings_.metadata_ignored, micrograph.scene);
   if (sound_) demand_pixel_size(micrograph.scene, loaded->uneven_pixel_um);
   if (!rings) {
+    if (!own.roi) set_electrodes(reader_, {0, 0, loaded->width, loaded->height}, micrograph.scene);
     take_part(own, micrograph.scene);
   } else if (settings_.roi || settings_.bin > 1) {
     reader_.problems.add(settings_.roi ? settings_.roi_where : settings_.bin_where,

@@ -15,6 +15,7 @@
 #include "io/config/material.h"
 #include "io/config/microscope.h"
 #include "io/config/rings.h"
+#include "io/config/starts.h"
 #include "io/config/volume.h"
 #include "io/files/table.h"
 #include "transport/method.h"
@@ -230,7 +231,7 @@ Crystal read_crystal(ConfigReader& reader, const Block& parent) {
                                                          : electrodes->describe()));
     } else {
       const std::size_t problems_before = reader.problems.all().size();
-      const NumberSpec pixel = described<Crystal>("electrodes_px.low");
+      const NumberSpec pixel = electrode_spec();
       crystal.electrode_low_px = reader.number_at(electrodes->items[0], block.path_of("electrodes_px.low"), pixel);
       crystal.electrode_high_px = reader.number_at(electrodes->items[1], block.path_of("electrodes_px.high"), pixel);
       const bool readable = reader.problems.all().size() == problems_before;

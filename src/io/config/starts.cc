@@ -250,16 +250,22 @@ void take_part(const MicrographSettings& settings, Scene& scene) {
       place(*electrode, crystal->field_along_y ? roi.y0 : roi.x0);
 }
 
-void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene) {
+NumberSpec electrode_spec() {
+  constexpr double kReadOff = 1;
+  return described<Crystal>("electrodes_px.low").known_within(kReadOff);
+}
+
+void set_electrodes(ConfigReader& reader, const PixelRect& part, Scene& scene) {
   auto* crystal = std::get_if<Crystal>(&scene.sample);
-  if (!crystal || crystal->electrode_low_px || !settings.roi) return;
-  NumberSpec spec;
-  spec.unit = "px";
+  if (!crystal || crystal->electrode_low_px) return;
   const bool y = crystal->field_along_y;
-  crystal->electrode_low_px =
-      reader.constant("sample.crystal.electrodes_px.low", spec, (y ? settings.roi->y0 : settings.roi->x0) - 0.5);
-  crystal->electrode_high_px =
-      reader.constant("sample.crystal.electrodes_px.high", spec, (y ? settings.roi->y1 : settings.roi->x1) - 0.5);
+  const auto edge = [&](const char* name, double at) {
+    // Of several pictures one pair.
+    const ParameterRef known = reader.table.find(name);
+    return known && reader.table[known].value == at ? known : reader.constant(name, electrode_spec(), at);
+  };
+  crystal->electrode_low_px = edge("sample.crystal.electrodes_px.low", (y ? part.y0 : part.x0) - 0.5);
+  crystal->electrode_high_px = edge("sample.crystal.electrodes_px.high", (y ? part.y1 : part.x1) - 0.5);
 }
 
 }  // namespace birefit

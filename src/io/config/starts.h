@@ -19,7 +19,9 @@ void check_overlap(ConfigReader& reader, const Scene& scene, const std::string& 
 void set_view(ConfigReader& reader, int width, int height, double file_pixel_um, const std::string& name, Scene& scene);
 /// What the settings take of the file's image, region and bins: the view is of that. Parameters stay those of the file.
 void take_part(const MicrographSettings& settings, Scene& scene);
-/// Electrodes that the config does not give are the region's edges.
-void set_electrodes(ConfigReader& reader, const MicrographSettings& settings, Scene& scene);
+/// Where an electrode's edge is, in pixels of the file: read off the picture.
+NumberSpec electrode_spec();
+/// Electrodes that the config does not give are the edges of this part of the file.
+void set_electrodes(ConfigReader& reader, const PixelRect& part, Scene& scene);
 
 }  // namespace birefit

@@ -228,6 +228,31 @@ bool SeriesResult::has_answer() const {
   return std::all_of(frames.begin(), frames.end(), [](const auto& fit) { return fit && fit->has_answer(); });
 }
 
+namespace {
+
+/// What all fits together move by where each by itself has moved by one: a prior that holds each back counts once.
+/// `posteriors` are those that were combined.
+Eigen::MatrixXd moved_together(const std::vector<Posterior>& posteriors, const SharedEstimate& shared) {
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(shared.posterior.mean.size(), shared.posterior.mean.size());
+  for (const Posterior& own : posteriors) information += own.covariance.inverse();
+  const double scaled = shared.consistent ? 1 : shared.chi_square / shared.chi_square_degrees;
+  return shared.posterior.covariance * information / scaled;
+}
+
+/// Of a covariance that all frames have in common what it is of this one's numbers, once the shared ones follow all
+/// frames: its own follow these.
+Eigen::MatrixXd in_common_after(const Posterior& own, const std::vector<Eigen::Index>& of_shared,
+                                const Eigen::MatrixXd& together, const Eigen::MatrixXd& in_common) {
+  const Eigen::Index all = own.covariance.rows(), q = std::ssize(of_shared);
+  const Eigen::MatrixXd follows =
+      own.covariance(Eigen::all, of_shared) * Eigen::MatrixXd(own.covariance(of_shared, of_shared)).inverse();
+  Eigen::MatrixXd moves = Eigen::MatrixXd::Identity(all, all);
+  moves(Eigen::all, of_shared) += follows * (together - Eigen::MatrixXd::Identity(q, q));
+  return moves * in_common * moves.transpose();
+}
+
+}  // namespace
+
 SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<FitResult>> fits) {
   SeriesResult result;
   result.frames = fits;
@@ -265,16 +290,18 @@ SeriesResult settle_series(const ImageSeries& series, std::vector<std::optional<
         "ratio; a parameter of each frame's own, or a model error that differs between frames, may be the cause.",
         shared.chi_square, shared.chi_square_degrees));
   Eigen::MatrixXd stated = Eigen::MatrixXd::Zero(std::ssize(names), std::ssize(names));
+  const Eigen::MatrixXd together = moved_together(posteriors, shared);
   for (std::size_t i = 0; i < heard.size(); ++i) {
     if (!heard[i]) continue;
     FitResult& fit = *result.frames[i];
     const Posterior own = own_posterior_of(fit);
     Posterior all = informed(own, shared);
-    const Eigen::MatrixXd in_common = posterior_of(fit).covariance - own.covariance;
-    all.covariance += in_common;
     std::vector<Eigen::Index> of_shared;
     for (const std::string& name : names)
       of_shared.push_back(std::find(all.names.begin(), all.names.end(), name) - all.names.begin());
+    const Eigen::MatrixXd in_common =
+        in_common_after(own, of_shared, together, posterior_of(fit).covariance - own.covariance);
+    all.covariance += in_common;
     stated += in_common(of_shared, of_shared) / static_cast<double>(posteriors.size());
     const double t = interval95_factor(all.degrees_of_freedom);
     move_derived(fit, all, t);

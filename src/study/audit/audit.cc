@@ -236,6 +236,7 @@ std::optional<AuditFit> one(const FitJob& job, const FitJob& whole, const Distur
     constexpr double kFar = 2.001;  // standard deviations
     found.apart = off > kFar * p.known_to.of(p.value) && found.grade == "answer" && !told(result, p.name);
   }
+  if (departure && departure->beyond_usual) found.apart = found.grade == "answer" && result.departures.empty();
   if (!found.answered) return found;
   for (const ParameterEstimate& p : result.parameters) {
     const ParameterRef ref = whole.parameters.find(p.name);

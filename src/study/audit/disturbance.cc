@@ -168,6 +168,7 @@ void add_charge(const FitJob& job, std::vector<Disturbance>& all) {
   });
   if (!bars) return;
   Disturbance d{"charge", "in the bar, as a share of its half-wave voltage", "%", {0.01, 0.03, 0.1}};
+  d.beyond_usual = true;
   d.added = [](Exposure& e, Scene& scene, Theta& theta) {
     auto& bar = std::get<Crystal>(scene.sample);
     bar.built_in_bias_v = new_number(theta, e.sign * e.size * bar.half_wave_voltage_v.in(theta));
@@ -321,12 +322,13 @@ std::vector<Disturbance> disturbances(const FitJob& job) {
     const Parameter& p = job.parameters[index];
     if (!p.free && !p.linear && p.known_to.of(p.value) > 0) all.push_back(of_stated(index, p));
   }
-  bool pictures = true, spheres = true;
+  bool pictures = true, spheres = true, flat = true;
   for (int g = 0; g < task.frames(); ++g) {
     const Scene& scene = task.picture(g).scene;
     const Traits traits = traits_of(scene);
     pictures = pictures && !traits.even && scene.view.width * scene.view.height > 1;
     spheres = spheres && traits.sphere_diameter_um && scene.view.pixel_size_um;
+    flat = flat && !traits.round;
   }
   add_mixed(job, all);
   add_instrument(job, all);
@@ -335,6 +337,8 @@ std::vector<Disturbance> disturbances(const FitJob& job) {
   if (pictures && spheres) add_neighbour(all);
   add_camera(!pictures, all);
   if (task.frames() > 1) add_lamp(all);
+  // A flat sample's retardance and a camera's curve can be taken for each other.
+  for (Disturbance& d : all) d.beyond_usual = d.beyond_usual || (flat && d.name == "gamma");
   return all;
 }
 

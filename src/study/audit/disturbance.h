@@ -30,6 +30,9 @@ struct Disturbance {
   /// Of what is stated: the table's index, and the departure is of its value.
   int parameter = -1;
   bool of_share = false;  ///< sizes are shares of the value
+  /// Pictures may have no trace of it, and every size is more than twice what is usual: counted apart where nothing is
+  /// left over.
+  bool beyond_usual = false;
   /// Each may be empty. Values of the table that the pictures are made with; light, of no unit; values, before or after
   /// the noise.
   std::function<void(Exposure&, Theta&)> scene;
