@@ -50,5 +50,8 @@ grep -q '^blur ' cell.txt && fail 'a cell is one number a picture'
 grep -q '^charge ' cell.txt && fail 'charge in a cell'
 "$birefit" audit "$source/fit_configs/pockels_field.yaml" --list > bar.txt 2>&1 || fail 'bar'
 says bar.txt '^charge '
+# Electrodes that are elsewhere, and what looks like a field that bends.
+"$birefit" audit "$source/fit_configs/pockels_field.yaml" --departure 'pixel aspect' --departure charge --departure gamma --problems 2 --out h -q > bar_run.txt 2>&1 || { fail 'audit of a bar'; cat bar_run.txt; }
+awk -F, 'NR > 1 { of += $8; held += $9 } END { print held " of " of " intervals of a bar hold"; exit !(of >= 40 && held >= 0.93 * of) }' h/audit.csv || fail 'intervals of a bar'
 [ "$failures" -eq 0 ] && echo ok
 exit "$failures"

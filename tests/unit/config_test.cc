@@ -472,6 +472,28 @@ microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90, ob
   EXPECT_EQ(with("0.65"), "");
 }
 
+// Electrodes are read off the picture: a pixel each, wherever they are from; what is stated to be exact is.
+TEST_F(Config, WhereElectrodesAreIsKnownToAPixel) {
+  save("a.tif", counts(100, 1));
+  const auto known_to = [&](const std::string& roi, const std::string& electrodes) {
+    const auto config = load("micrograph: {image: a.tif" + roi + R"(}
+sample: {crystal: {half_wave_voltage_v: 1500, bias_v: 700, field_along: y, field_legendre: [{value: 0, fit: [-1, 1]}])" +
+                                 electrodes + R"(}}
+microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
+)",
+                             ConfigUse::fit);
+    const auto& bar = std::get<Crystal>(std::get<Picture>(config.job.measurements.front()).scene.sample);
+    const ParameterTable& table = config.job.parameters;
+    return std::array{table[bar.electrode_low_px].value, table[bar.electrode_low_px].known_to.sd,
+                      table[bar.electrode_high_px].value, table[bar.electrode_high_px].known_to.sd};
+  };
+  EXPECT_EQ(known_to("", ", electrodes_px: [3, 20]"), (std::array{3.0, 1.0, 20.0, 1.0}));
+  EXPECT_EQ(known_to(", roi_px: [0, 2, 32, 30]", ""), (std::array{1.5, 1.0, 29.5, 1.0}));
+  EXPECT_EQ(known_to("", ""), (std::array{-0.5, 1.0, 31.5, 1.0}));
+  EXPECT_EQ(known_to("", ", electrodes_px: [{value: 3, exact: true}, {value: 20, prior_sd: 0.2}]"),
+            (std::array{3.0, 0.0, 20.0, 0.2}));
+}
+
 // Where a cone's figure lies is set by eye, and a crystal is not cut exactly; what is stated to be exact is.
 TEST_F(Config, FigureOfAConeAndCutOfAPlateAreNotExact) {
   save("a.tif", counts(100, 1));
