@@ -1,8 +1,11 @@
 // One fit, from a job to its result. Alternatives (branches, curved rays, waves) are in strategy.cc.
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <deque>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include <fmt/format.h>
@@ -185,6 +188,50 @@ Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimu
   return concluded(last->task, places, std::move(last->optimum), false);
 }
 
+/// With what is stated fitted along, is another minimum about as likely as the best, and elsewhere in what is asked
+/// for?
+bool has_close_rival(const Task& wider, const Optimum& optimum) {
+  // Of chi-square, 7 to 10: where what is stated is exact, minima that need it elsewhere pay more than that for it.
+  constexpr double kClose = 0.7;
+  constexpr double kApart = 5;  // standard errors, as of rivals
+  LeastSquares& problem = *optimum.problem;
+  problem.evaluate(optimum.searched, true);
+  const double best = deviance(wider, optimum.frames, problem);
+  const Eigen::MatrixXd root = projected_information(problem);
+  const Eigen::VectorXd sd = (root.transpose() * root)
+                                 .ldlt()
+                                 .solve(Eigen::MatrixXd::Identity(root.cols(), root.cols()))
+                                 .diagonal()
+                                 .cwiseSqrt();
+  SolveOptions few;
+  few.max_iterations = 10;
+  const bool close = std::any_of(optimum.rivals.begin(), optimum.rivals.end(), [&](Eigen::VectorXd rival) {
+    problem.solve(rival, few);
+    bool elsewhere = false;
+    for (Eigen::Index k = 0; k < rival.size(); ++k)
+      elsewhere = elsewhere || (!wider.searched(static_cast<std::size_t>(k)).nuisance &&
+                                std::abs(rival[k] - optimum.searched[k]) > kApart * sd[k]);
+    return elsewhere && deviance(wider, optimum.frames, problem) < best + kClose;
+  });
+  problem.evaluate(optimum.searched, true);
+  return close;
+}
+
+/// The best of all minima with these numbers free, where another is about as likely: the right one may be far above one
+/// that takes a stated number as it is. Of pictures for which looking costs next to nothing; nothing elsewhere, and
+/// where frames scatter, whose scatter is all that is known of a misfit.
+std::unique_ptr<Refit> beside_close_rivals(const Task& task, const Minima& minima, const Optimum& optimum,
+                                           const std::vector<int>& numbers) {
+  if (!costs_microseconds(task) || minima.scan.candidates.size() < 2 || optimum.misfit.frames_scatter ||
+      optimum.stopped || numbers.empty())
+    return nullptr;
+  auto wider = std::make_unique<Refit>(with_nuisances(task.job, numbers));
+  wider->optimum = best_with_nuisances(wider->task, task, optimum, minima, true);
+  if (wider->optimum.stopped || wider->optimum.rivals.empty()) return nullptr;
+  wider->optimum = settle(wider->task, std::move(wider->optimum));
+  return has_close_rival(wider->task, wider->optimum) ? std::move(wider) : nullptr;
+}
+
 /// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
 Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   if (minima.hopeless && !beaten)
@@ -192,6 +239,13 @@ Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   Optimum optimum = settle(task, best_minimum(task, minima, beaten));
   if (task.job.options.values_only) return concluded(task, minima, std::move(optimum), beaten);
   const WorthFitting told = worth_fitting(task, optimum);
+  if (!told.better) {
+    const std::vector<int> numbers = told.numbers.empty() ? told_numbers(task, optimum) : told.numbers;
+    if (const auto wider = beside_close_rivals(task, minima, optimum, numbers)) {
+      const Minima places = widened(wider->task, task, wider->optimum.theta, minima);
+      return with_what_is_left(wider->task, places, std::move(wider->optimum), beaten);
+    }
+  }
   if (told.numbers.empty()) return with_what_is_left(task, minima, std::move(optimum), beaten);
   task.say("what is stated and not known exactly is fitted as well");
   const FitJob job = with_nuisances(task.job, told.numbers);

@@ -53,5 +53,8 @@ says bar.txt '^charge '
 # Electrodes that are elsewhere, and what looks like a field that bends.
 "$birefit" audit "$source/fit_configs/pockels_field.yaml" --departure 'pixel aspect' --departure charge --departure gamma --problems 2 --out h -q > bar_run.txt 2>&1 || { fail 'audit of a bar'; cat bar_run.txt; }
 awk -F, 'NR > 1 { of += $8; held += $9 } END { print held " of " of " intervals of a bar hold"; exit !(of >= 40 && held >= 0.93 * of) }' h/audit.csv || fail 'intervals of a bar'
+# A dial that is off by what dials are off by: another twist that takes it as it stands is no plain answer.
+"$birefit" audit "$source/fit_configs/crossed_cell.yaml" --departure sample.cell.director.twisted.azimuth_deg --problems 2 --out t -q > dial.txt 2>&1 || { fail 'audit of a cell'; cat dial.txt; }
+awk -F, '$4 == "\"answer\"" && $11 > 2.5 { print; bad = 1 } END { exit bad }' t/intervals.csv || fail 'a dial makes another twist an answer'
 [ "$failures" -eq 0 ] && echo ok
 exit "$failures"

@@ -223,7 +223,8 @@ Minima widened(const Task& wider, const Task& narrow, const Theta& theta, Minima
   return minima;
 }
 
-Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima) {
+Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima,
+                            bool beyond_reach) {
   Minima places;
   places.frames = optimum.frames;
   for (int g = 0; g < wider.frames(); ++g)
@@ -248,14 +249,16 @@ Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum
       starts.back()[static_cast<Eigen::Index>(j)] += by * *wider.searched(j).prior_sd;
     }
   }
-  constexpr std::size_t kMost = 12;
+  const std::size_t most = beyond_reach ? 64 : 12;
   for (const Eigen::VectorXd& rival : optimum.rivals)
-    if (starts.size() < kMost) starts.push_back(widened(wider, narrow, optimum.theta, rival));
-  for (std::size_t i = 1; i < minima.scan.candidates.size() && starts.size() < kMost; ++i)
-    starts.push_back(widened(wider, narrow, optimum.theta, minima.scan.candidates[i].searched));
+    if (starts.size() < most) starts.push_back(widened(wider, narrow, optimum.theta, rival));
+  const std::vector<Candidate>& found = minima.scan.candidates;
+  for (std::size_t i = 1; i < found.size() && starts.size() < most; ++i)
+    if (beyond_reach || in_reach(found[i].objective, found.front().objective))
+      starts.push_back(widened(wider, narrow, optimum.theta, found[i].searched));
   const std::unique_ptr<LeastSquares> problem = problem_of(wider, few, misfit_expected(wider, few, optimum.theta));
   constexpr int kSteps = 8;
-  places.scan = polish(*problem, wider.job, std::move(starts), kSteps, {});
+  places.scan = polish(*problem, wider.job, std::move(starts), kSteps, {}, beyond_reach);
   places.evaluations += problem->evaluations();
   places.stopped = places.scan.interrupted;
   return best_minimum(wider, places, false);

@@ -51,7 +51,9 @@ Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optim
 /// From all the places that a search without them has found (`minima`, of the narrow task), whose best need not be the
 /// best with them; the focus from one and two standard deviations to either side as well. Pixels that the wider job
 /// masks are left out.
-Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima);
+/// `beyond_reach`: of all places, also those that without them could not be the best.
+Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima,
+                            bool beyond_reach = false);
 
 /// With what is stated without being written: the zeros of dials that frames are read off (fit/problem/shared_zeros.h);
 /// the focus, where an objective is stated that is not exact, and no focus: set by eye within the depth of field,

@@ -70,11 +70,6 @@ std::size_t product_of(const std::vector<Axis>& axes) {
   return product;
 }
 
-bool costs_microseconds(const Task& task) {
-  return std::all_of(task.sights.begin(), task.sights.end(),
-                     [](const Sight& sight) { return traits_of(sight.picture->scene).quick; });
-}
-
 /// What has several valleys, and what has one as long as the grid stays small: it moves the others' minima. `fineness`:
 /// steps are so much shorter.
 std::vector<Axis> axes_of(const Task& task, const std::vector<PicturePhase>& phases, double fineness = 1) {
@@ -116,7 +111,7 @@ std::vector<Axis> fine_axes_of(const Task& task, const std::vector<PicturePhase>
 double polish_into(ScanResult& result, LeastSquares& glance, LeastSquares& problem, const FitOptions& options,
                    std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists, int steps,
                    double hopeless_above, const SameMinimum& same, const SameMinimum& near_by,
-                   const SameMinimum& arrived) {
+                   const SameMinimum& arrived, bool beyond_reach = false) {
   const auto by_objective = [](const auto& a, const auto& b) { return a.first < b.first; };
   SolveOptions polish;
   polish.function_tolerance = 1e-5;  // a few hundredths of a chi-square unit: all pixels follow
@@ -130,9 +125,7 @@ double polish_into(ScanResult& result, LeastSquares& glance, LeastSquares& probl
     }
     std::stable_sort(starts.begin(), starts.end(), by_objective);
   };
-  // Two steps tell whether a valley leads down; a wrong order stays many times worse, or out of the evidence's reach
-  // where few numbers tell all.
-  constexpr double kHopeless = 4, kReach = 60;
+  // Two steps tell whether a valley leads down.
   if (starts.size() > finalists + 1) {
     walk(glance, kFirstSteps);
     // Where most lead into one valley they would leave no room for the others.
@@ -160,8 +153,8 @@ double polish_into(ScanResult& result, LeastSquares& glance, LeastSquares& probl
   const double best = starts.front().first;
   const bool beaten = best > hopeless_above;
   for (const auto& [objective, from] : starts) {
-    const double worth = beaten ? best : std::max(kHopeless * best, best + kReach);
-    if (!(objective <= worth) || !std::isfinite(objective)) continue;
+    if (!std::isfinite(objective)) continue;
+    if (beaten ? objective > best : !beyond_reach && !in_reach(objective, best)) continue;
     if (beaten) {
       problem.evaluate(from, true);
       result.candidates.push_back({from, problem.objective(), projected_information(problem)});
@@ -361,6 +354,16 @@ Effort effort_of(const LeastSquares& problem, int points, int candidates) {
 
 }  // namespace
 
+bool in_reach(double objective, double best) {
+  constexpr double kHopeless = 4, kReach = 60;
+  return objective <= std::max(kHopeless * best, best + kReach);
+}
+
+bool costs_microseconds(const Task& task) {
+  return std::all_of(task.sights.begin(), task.sights.end(),
+                     [](const Sight& sight) { return traits_of(sight.picture->scene).quick; });
+}
+
 double separation(const Candidate& minimum, const Eigen::VectorXd& other) {
   if (minimum.searched.size() == 0) return 0;
   return (minimum.information * (other - minimum.searched)).norm();
@@ -417,6 +420,7 @@ ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, c
   // believed: the next ones, then, as long as there are any.
   const double rows = static_cast<double>(problem.pixel_rows());
   double best = std::numeric_limits<double>::infinity();
+  // Cheap: the right minimum may be far above another that takes a stated number as it is.
   for (std::size_t batch = 0; batch < effort.batches && !result.interrupted; ++batch) {
     const std::size_t first = std::min(starts.size(), batch * effort.first_look),
                       last = std::min(starts.size(), first + effort.first_look);
@@ -425,7 +429,7 @@ ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, c
     if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
     best = std::min(best, polish_into(result, glance, problem, options, std::move(some), effort.finalists, kSteps,
-                                      hopeless_above, {}, near_by, arrived));
+                                      hopeless_above, {}, near_by, arrived, cheap));
     // Where pictures cost next to nothing, all of them: minima may be as good as each other.
     if ((best < rows + kDoubtful * std::sqrt(2 * rows) && !cheap) || best > hopeless_above) break;
   }
@@ -446,7 +450,7 @@ double lowest_of_few(LeastSquares& problem, const Task& task, const Eigen::Vecto
 }
 
 ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> from, int steps,
-                  const SameMinimum& same) {
+                  const SameMinimum& same, bool all) {
   ScanResult result;
   std::vector<std::pair<double, Eigen::VectorXd>> starts;
   for (Eigen::VectorXd& x : from) {
@@ -456,7 +460,8 @@ ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::V
   }
   std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   constexpr int kMostOfDear = 4;
-  const std::size_t most = static_cast<std::size_t>(std::clamp(job.options.scan_candidates, 1, kMostOfDear));
+  const std::size_t most =
+      all ? starts.size() : static_cast<std::size_t>(std::clamp(job.options.scan_candidates, 1, kMostOfDear));
   if (starts.size() > most) starts.resize(most);
   if (starts.empty())
     throw UserError(Where{}, "wave optics gives no finite picture at the start values, nor where rays would put them",

@@ -37,12 +37,18 @@ ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, c
 double lowest_of_few(LeastSquares& problem, const Task& task, const Eigen::VectorXd& start,
                      const std::vector<PicturePhase>& phases);
 
-/// The same as scan() from given starts instead of a grid, best first, of which four at most (options.scan_candidates)
-/// are polished; `steps` of the solver for each before the worst are dropped, and those that `same` finds on the way to
-/// a minimum that is already known.
+/// The same as scan() from given starts instead of a grid, best first, of which four at most (options.scan_candidates),
+/// or `all`, are polished; `steps` of the solver for each before the worst are dropped, and those that `same` finds on
+/// the way to a minimum that is already known.
 using SameMinimum = std::function<bool(const Eigen::VectorXd&, const Eigen::VectorXd&)>;
 ScanResult polish(LeastSquares& problem, const FitJob& job, std::vector<Eigen::VectorXd> starts, int steps,
-                  const SameMinimum& same);
+                  const SameMinimum& same, bool all = false);
+
+/// May a minimum at `objective` still be the best, when that is at `best`? A wrong order stays many times worse, or out
+/// of the evidence's reach where few numbers tell all.
+bool in_reach(double objective, double best);
+/// Pictures that cost next to nothing, of cells without a field: all minima may be looked at.
+bool costs_microseconds(const Task& task);
 
 /// |R delta|: how many joint standard errors apart.
 double separation(const Candidate& minimum, const Eigen::VectorXd& other);
