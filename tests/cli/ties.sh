@@ -90,14 +90,16 @@ done
 cat > series.yaml << 'YAML'
 micrographs: {files: "frames/*.tif", set_from: frames.csv, along: time_s, shared: ["sample.crystal.field_legendre[1]"]}
 micrograph:
-  gain: {fit: auto}
+  gain: {fit: auto, exact: true}       # light and camera as they are: what follows is to first order in what they move
   offset: {fit: auto}
+  illumination: {x: 0, y: 0, square: 0}
+  background: {x: 0, y: 0, square: 0}
 sample:
   crystal:
     half_wave_voltage_v: {value: 1400, fit: [1000, 2500]}
     bias_v: 700
     field_along: y
-    electrodes_px: [-0.5, 47.5]
+    electrodes_px: [{value: -0.5, exact: true}, {value: 47.5, exact: true}]
     field_legendre: [{value: 0.3, fit: [0.1, 0.7]}]
 microscope:
   light: {wavelength_nm: 1550}
