@@ -192,7 +192,8 @@ class Watched {
 
   static std::string reason_of(const UserError& error) {
     std::string words;
-    for (const Problem& problem : error.problems()) words += (words.empty() ? "" : "; ") + problem.what;
+    for (const Problem& problem : error.problems())
+      words += (words.empty() ? "" : "; ") + problem.what + (problem.hint.empty() ? "" : " (" + problem.hint + ")");
     return words;
   }
   fs::path place_of(const std::string& name) const { return out_ / "frames" / name; }

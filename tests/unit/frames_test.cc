@@ -106,6 +106,19 @@ TEST_F(FrameFiles, SayWhatBelongsToASeries) {
               HasSubstr("did you mean micrograph.gain?"));
 }
 
+// One picture is rendered: which, where there are several, is said.
+TEST_F(FrameFiles, TheOneOfSeveralThatIsRenderedIsNamed) {
+  const auto warnings = [&](const std::string& text) {
+    write("config.yaml", text);
+    return load_config(folder_ / "config.yaml", ConfigUse::render).job.warnings;
+  };
+  expose("a.tif", 1, 2);
+  expose("b.tif", 1, 2);
+  EXPECT_THAT(warnings("micrographs: [{image: a.tif}, {image: b.tif}]" + kCrystal),
+              Contains(HasSubstr("Of 2 micrographs the first is shown, a.tif")));
+  EXPECT_THAT(warnings("micrographs: [{image: a.tif}]" + kCrystal), testing::Not(Contains(HasSubstr("is shown"))));
+}
+
 // ---- calibration ----------------------------------------------------------------------------------------------------
 
 class CalibrationFrames : public FrameFiles {
