@@ -176,17 +176,22 @@ std::shared_ptr<const Job::Planned> Job::planned_at(const Theta& theta) const {
   return planned_ = made;
 }
 
-py::tuple Job::render(const std::vector<std::pair<std::string, double>>& changes,
-                      const std::vector<std::string>& active, int threads) const {
+py::tuple Job::render(const std::vector<std::pair<std::string, double>>& values,
+                      const std::vector<std::pair<std::string, double>>& more, const std::vector<std::string>& active,
+                      int threads) const {
   check_pictured();
   const ParameterTable& table = pictured_.job.parameters;
   Theta theta = table.values();
-  std::vector<std::string> changed;
-  for (const auto& change : changes) changed.push_back(change.first);
-  const std::vector<int> given = indices_of(changed, "render");
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    ranges_->check(table, given[i], changes[i].second, {"render"});
-    theta[static_cast<std::size_t>(given[i])] = changes[i].second;
+  std::vector<int> given;
+  for (const auto* changes : {&values, &more}) {
+    std::vector<std::string> changed;
+    for (const auto& change : *changes) changed.push_back(change.first);
+    const std::vector<int> at = indices_of(changed, "render");
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      ranges_->check(table, at[i], (*changes)[i].second, {"render"});
+      theta[static_cast<std::size_t>(at[i])] = (*changes)[i].second;
+    }
+    given.insert(given.end(), at.begin(), at.end());
   }
   follow(table, *ranges_, given, {"render"}, theta);
   std::vector<int> indices = indices_of(active, "derivatives");

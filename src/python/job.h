@@ -48,8 +48,9 @@ class Job {
   /// Rows, columns and colours of render(). Throws UserError where the config does not say.
   std::array<int, 3> shape() const;
 
-  /// The picture with these numbers changed, and (if any are `active`) its derivatives.
-  py::tuple render(const std::vector<std::pair<std::string, double>>& changes, const std::vector<std::string>& active,
+  /// The picture with these numbers changed, `more` above `values`, and (if any are `active`) its derivatives.
+  py::tuple render(const std::vector<std::pair<std::string, double>>& values,
+                   const std::vector<std::pair<std::string, double>>& more, const std::vector<std::string>& active,
                    int threads) const;
   /// A picture a row of `values`, whose columns are the numbers of these names.
   py::array render_many(const std::vector<std::string>& names, const Doubles& values, int threads) const;

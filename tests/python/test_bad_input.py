@@ -106,6 +106,12 @@ def test_what_is_no_tree(tree):
         birefit.Job(tree)
 
 
+def test_keywords_count_above_values(droplet):
+    job = birefit.Job(droplet)
+    whole = dict(job.values)
+    assert np.array_equal(job.render(whole, diameter_um=8.7), job.render(diameter_um=8.7))
+
+
 def test_one_name_is_a_name(droplet):
     job = birefit.Job(droplet)
     _, one = job.render(derivatives="birefringence")

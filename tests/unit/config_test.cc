@@ -477,7 +477,8 @@ TEST_F(Config, WhereElectrodesAreIsKnownToAPixel) {
   save("a.tif", counts(100, 1));
   const auto known_to = [&](const std::string& roi, const std::string& electrodes) {
     const auto config = load("micrograph: {image: a.tif" + roi + R"(}
-sample: {crystal: {half_wave_voltage_v: 1500, bias_v: 700, field_along: y, field_legendre: [{value: 0, fit: [-1, 1]}])" +
+sample:
+  crystal: {half_wave_voltage_v: 1500, bias_v: 700, field_along: y, field_legendre: [{value: 0, fit: [-1, 1]}])" +
                                  electrodes + R"(}}
 microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
 )",

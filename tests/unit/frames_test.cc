@@ -56,7 +56,8 @@ class FrameFiles : public ::testing::Test {
 const std::string kCrystal = R"(
 micrograph: {gain: {fit: auto}, offset: {fit: auto}, noise: {read_counts: 1}}
 sample:
-  crystal: {half_wave_voltage_v: {value: 1400, fit: [1000, 2500]}, bias_v: 700, field_along: y, electrodes_px: [-0.5, 5.5]}
+  crystal:
+    {half_wave_voltage_v: {value: 1400, fit: [1000, 2500]}, bias_v: 700, field_along: y, electrodes_px: [-0.5, 5.5]}
 microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
 )";
 

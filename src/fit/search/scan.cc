@@ -104,10 +104,10 @@ std::vector<Axis> fine_axes_of(const Task& task, const std::vector<PicturePhase>
 }
 
 /// Solves from every start, a few steps at a glance for all and the rest for those that may still be the best, and adds
-/// the minima found to the result. What is the `same` as a minimum that is known is left out; of starts that lead to
-/// places near by the best goes on before others do, and the rest after all others: minima may lie as close. Those that
-/// have `arrived` at one place, at a glance, go on as one. `same` and `near_by` may be empty. Returns the lowest
-/// objective.
+/// the minima found to the result, those `beyond_reach` of the best only where asked. What is the `same` as a minimum
+/// that is known is left out; of starts that lead to places near by the best goes on before others do, and the rest
+/// after all others: minima may lie as close. Those that have `arrived` at one place, at a glance, go on as one. `same`
+/// and `near_by` may be empty. Returns the lowest objective.
 double polish_into(ScanResult& result, LeastSquares& glance, LeastSquares& problem, const FitOptions& options,
                    std::vector<std::pair<double, Eigen::VectorXd>> starts, std::size_t finalists, int steps,
                    double hopeless_above, const SameMinimum& same, const SameMinimum& near_by,
@@ -420,7 +420,6 @@ ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, c
   // believed: the next ones, then, as long as there are any.
   const double rows = static_cast<double>(problem.pixel_rows());
   double best = std::numeric_limits<double>::infinity();
-  // Cheap: the right minimum may be far above another that takes a stated number as it is.
   for (std::size_t batch = 0; batch < effort.batches && !result.interrupted; ++batch) {
     const std::size_t first = std::min(starts.size(), batch * effort.first_look),
                       last = std::min(starts.size(), first + effort.first_look);
@@ -428,6 +427,8 @@ ScanResult scan(LeastSquares& glance, LeastSquares& problem, const Task& task, c
                 starts.begin() + static_cast<std::ptrdiff_t>(last));
     if (batch == 0) some.emplace_back(std::numeric_limits<double>::infinity(), start);
     if (some.empty()) break;
+    // Beyond reach, too, where that is cheap: the right minimum may be far above one that takes a stated number as it
+    // is.
     best = std::min(best, polish_into(result, glance, problem, options, std::move(some), effort.finalists, kSteps,
                                       hopeless_above, {}, near_by, arrived, cheap));
     // Where pictures cost next to nothing, all of them: minima may be as good as each other.

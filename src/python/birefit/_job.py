@@ -131,7 +131,7 @@ class Job:
         """The picture at the config's values, changed by ``values`` and by keywords: ``job.render(diameter_um=9.3)``.
 
         values
-            numbers by name, in their units; a fit's ``result.values`` will do.
+            numbers by name, in their units; a fit's ``result.values`` will do. Keywords count above them.
         derivatives
             names of numbers (fitted or not), or the name of one, by which to differentiate as well.
         threads
@@ -143,10 +143,9 @@ class Job:
         for the picture follows the values, as of ``birefit render``; equal values give equal bits, with derivatives equal
         numbers to rounding.
         """
-        given = {**(values or {}), **more}
-        changes = [(name, real("render", name, value)) for name, value in given.items()]
+        given, above = ([(name, real("render", name, value)) for name, value in of.items()] for of in (values or {}, more))
         active = [derivatives] if isinstance(derivatives, str) else list(derivatives or [])
-        picture, jacobian = self._job.render(changes, active, threads_of("render", threads))
+        picture, jacobian = self._job.render(given, above, active, threads_of("render", threads))
         if derivatives is None:
             return picture
         return picture, np.empty((*picture.shape, 0)) if jacobian is None else jacobian
