@@ -479,7 +479,7 @@ TEST_F(Config, WhereElectrodesAreIsKnownToAPixel) {
     const auto config = load("micrograph: {image: a.tif" + roi + R"(}
 sample:
   crystal: {half_wave_voltage_v: 1500, bias_v: 700, field_along: y, field_legendre: [{value: 0, fit: [-1, 1]}])" +
-                                 electrodes + R"(}}
+                                 electrodes + R"(}
 microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
 )",
                              ConfigUse::fit);

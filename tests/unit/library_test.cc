@@ -72,8 +72,8 @@ microscope:
 sample:
   cell:
     thickness_um: 2.416
-    director: {freedericksz: {reduced_voltage: 2.727, k33_over_k11: 1.654, k22_over_k11: 0.6, eps_ratio: 3.556, pretilt_deg: 1.326,
-                               twist_deg: 5.571, azimuth_deg: 26.014}}
+    director: {freedericksz: {reduced_voltage: 2.727, k33_over_k11: 1.654, k22_over_k11: 0.6, eps_ratio: 3.556,
+                               pretilt_deg: 1.326, twist_deg: 5.571, azimuth_deg: 26.014}}
   material: {ordinary: {sellmeier: [[1.239, 0.005]], range_nm: [300, 1000]},
              extraordinary: {sellmeier: [[1.425, 0.009], [0.1, 100]], range_nm: [300, 1000]},
              absorption: {ordinary: 0.006, extraordinary: 0.007}}
