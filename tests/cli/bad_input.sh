@@ -12,7 +12,8 @@ checks=0
 
 # ---- images, byte by byte --------------------------------------------------------------------------------------------
 
-le16() { local i; for i in "$@"; do printf "\\x$(printf %02x $((i & 255)))\\x$(printf %02x $((i >> 8 & 255)))"; done; }
+# Without a process a byte: there are thousands of them.
+le16() { local i hex; for i in "$@"; do printf -v hex '\\x%02x\\x%02x' $((i & 255)) $((i >> 8 & 255)); printf "$hex"; done; }
 le32() { local i; for i in "$@"; do le16 $((i & 65535)) $((i >> 16 & 65535)); done; }
 entry() { le16 "$1" "$2"; le32 "$3" "$4"; } # TIFF tag, type (3 short, 4 long), count, value
 
@@ -28,12 +29,14 @@ tiff() {
 bytes() { head -c "$1" /dev/zero | tr '\0' "$2"; } # COUNT OCTAL_CHAR
 
 speckle() { # 32 x 32 bytes of a plain image with contrast
-  local i out=""
-  for ((i = 0; i < 1024; ++i)); do out+="\\x$(printf %02x $((20 + (i * 37 + i / 32 * 11) % 180)))"; done
+  local i hex out=""
+  for ((i = 0; i < 1024; ++i)); do printf -v hex '\\x%02x' $((20 + (i * 37 + i / 32 * 11) % 180)); out+=$hex; done
   printf "$out"
 }
 speckle > speckle.raw
 tiff 32 32 8 1 1 1 1024 < speckle.raw > good.tif
+# The same as an array, which takes no library to read.
+{ printf '\x93NUMPY\1\0\x76\0'; printf '%-117s\n' "{'descr': '|u1', 'fortran_order': False, 'shape': (32, 32), }"; cat speckle.raw; } > good.npy
 head -c 600 good.tif > truncated.tif
 : > empty.tif
 tiff 0 0 8 1 1 1 0 < /dev/null > no_pixels.tif
@@ -64,11 +67,11 @@ printf "GIF89a\x01\x00\x01\x00\x80\x00\x00\x00\x00\x00\xff\xff\xff$gif_frame$gif
 
 # ---- configs ---------------------------------------------------------------------------------------------------------
 
-# config [SED_EXPRESSION...]: a sound config for good.tif, changed. Line numbers in the expectations count in it.
+# config [SED_EXPRESSION...]: a sound config for good.npy, changed. Line numbers in the expectations count in it.
 config() {
   cat > base.yaml <<'YAML'
 micrograph:
-  image: good.tif
+  image: good.npy
   pixel_size_um: 0.5
   gain: {fit: auto}
   offset: {fit: auto}
@@ -118,7 +121,7 @@ expect_one() {
 touch stdout.txt stderr.txt before.txt
 
 for image in missing truncated empty no_pixels one_bit huge saturated nan pages palette colour; do
-  config "s/good.tif/$image.tif/"
+  config "s/good.npy/$image.tif/"
   case $image in
     missing) words='does not exist' ;;
     truncated) words='truncated|ends|incomplete|cut|read' ;;
@@ -133,9 +136,9 @@ for image in missing truncated empty no_pixels one_bit huge saturated nan pages 
   esac
   expect_one "$image image" bad.yaml:2:10: "$words"
 done
-config 's/good.tif/animated.gif/'
+config 's/good.npy/animated.gif/'
 expect_one 'animated image' bad.yaml:2:10: 'animat|frames|images|pages'
-config 's/good.tif/bad.yaml/'
+config 's/good.npy/bad.yaml/'
 expect_one 'image that is a text' bad.yaml:2:10: 'image|format'
 
 # Director fields outside their range, or of two kinds at once.
@@ -252,7 +255,7 @@ expect_one 'missing prior' bad.yaml:18:15: 'does not exist'
 series() {
   local block=$1
   shift
-  config '/image: good.tif/d' "1i micrographs: $block" "$@"
+  config '/image: good.npy/d' "1i micrographs: $block" "$@"
 }
 expect_series() {
   checks=$((checks + 1))
@@ -266,56 +269,56 @@ expect_series() {
   return 0
 }
 mkdir -p frames other
-cp good.tif frames/f1.tif
-cp good.tif frames/f2.tif
-cp good.tif other/f1.tif
+cp good.npy frames/f1.npy
+cp good.npy frames/f2.npy
+cp good.npy other/f1.npy
 table() { printf '%s\n' "$@" > frames.csv; }
-both='{files: "frames/*.tif", set_from: frames.csv}'
+both='{files: "frames/*.npy", set_from: frames.csv}'
 
 config
 expect_series 'series of a single image' bad.yaml: 'is no series.*run birefit fit bad.yaml'
-series '{files: "frames/*.tif", shared: [sample.droplet.diameter_um]}'
+series '{files: "frames/*.npy", shared: [sample.droplet.diameter_um]}'
 expect_one 'fit of a series' bad.yaml:1:47: 'run birefit series bad.yaml'
-series '{files: "frames/*.tif", own: [sample.droplet.diameter_um]}'
+series '{files: "frames/*.npy", own: [sample.droplet.diameter_um]}'
 expect_series 'series of one fit' bad.yaml:1:44: 'micrographs.own is of one fit of all images'
 series '{files: "frames/*.png"}'
 expect_series 'no file matches' bad.yaml:1:22: 'no file matches frames/\*.png'
-series '{file: "frames/*.tif", set_from: frames.csv}'
-table 'file' 'frames/f1.tif'
+series '{file: "frames/*.npy", set_from: frames.csv}'
+table 'file' 'frames/f1.npy'
 expect_series 'unknown key of a series' bad.yaml:1:15: 'unknown key file in micrographs; did you mean files'
-series '{files: "*/f1.tif"}'
-expect_series 'two frames of a name' bad.yaml:1:22: 'frames/f1.tif and other/f1.tif are both called f1'
-series '{files: "frames/*.tif", set_from: none.csv}'
+series '{files: "*/f1.npy"}'
+expect_series 'two frames of a name' bad.yaml:1:22: 'frames/f1.npy and other/f1.npy are both called f1'
+series '{files: "frames/*.npy", set_from: none.csv}'
 expect_series 'missing table' bad.yaml:1:48: 'none.csv does not exist'
 series "$both"
-table 'name,surround.index' 'f1.tif,1.43' 'f2.tif,1.44'
+table 'name,surround.index' 'f1.npy,1.43' 'f2.npy,1.44'
 expect_series 'table without files' frames.csv:1:1: 'has no column file'
-table 'file,sample.surround.indx' 'f1.tif,1.43' 'f2.tif,1.44'
+table 'file,sample.surround.indx' 'f1.npy,1.43' 'f2.npy,1.44'
 expect_series 'unknown path in the header' frames.csv:1:6: 'sample.surround.indx is no parameter.*did you mean sample.surround.index'
-table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,wide'
+table 'file,sample.surround.index' 'f1.npy,1.43' 'f2.npy,wide'
 expect_series 'text in the table' frames.csv:3:8: 'index must be a number, found wide'
-table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,143'
+table 'file,sample.surround.index' 'f1.npy,1.43' 'f2.npy,143'
 expect_series 'number out of range in the table' frames.csv:3:8: 'index = 143 is outside'
-table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,'
+table 'file,sample.surround.index' 'f1.npy,1.43' 'f2.npy,'
 expect_series 'empty cell' frames.csv:3:8: 'index must be a number, found nothing'
-table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,1.44,1'
+table 'file,sample.surround.index' 'f1.npy,1.43' 'f2.npy,1.44,1'
 expect_series 'row too long' frames.csv:3: 'has 3 fields'
-table 'file,sample.surround.index' 'f1.tif,1.43'
-expect_series 'file without a row' bad.yaml:1:22: 'frames/f2.tif has no row in frames.csv'
-table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,1.43' ',1.43'
+table 'file,sample.surround.index' 'f1.npy,1.43'
+expect_series 'file without a row' bad.yaml:1:22: 'frames/f2.npy has no row in frames.csv'
+table 'file,sample.surround.index' 'f1.npy,1.43' 'f2.npy,1.43' ',1.43'
 expect_series 'row without a file' frames.csv:4:1: 'names no file'
-table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,1.43' 'good.tif,1.43'
-expect_series 'row of another file' frames.csv:4:1: 'good.tif is not among the files of the series'
-table 'file,sample.surround.index' 'f1.tif,1.43' 'f2.tif,1.43' 'f1.tif,1.43'
-expect_series 'file with two rows' frames.csv:4:1: 'f1.tif has a row already, in line 2'
-table 'file,time_s' 'f1.tif,1' 'f2.tif,soon'
-series '{files: "frames/*.tif", set_from: frames.csv, along: time_s}'
+table 'file,sample.surround.index' 'f1.npy,1.43' 'f2.npy,1.43' 'good.npy,1.43'
+expect_series 'row of another file' frames.csv:4:1: 'good.npy is not among the files of the series'
+table 'file,sample.surround.index' 'f1.npy,1.43' 'f2.npy,1.43' 'f1.npy,1.43'
+expect_series 'file with two rows' frames.csv:4:1: 'f1.npy has a row already, in line 2'
+table 'file,time_s' 'f1.npy,1' 'f2.npy,soon'
+series '{files: "frames/*.npy", set_from: frames.csv, along: time_s}'
 expect_series 'text along the axis' frames.csv:3:8: 'time_s must be a number, found soon'
-series '{files: "frames/*.tif", set_from: frames.csv, along: times}'
+series '{files: "frames/*.npy", set_from: frames.csv, along: times}'
 expect_series 'axis that is no column' bad.yaml:1:67: 'times, which is no column of frames.csv; did you mean time_s'
-series '{files: "frames/*.tif", shared: [sample.droplet.diamter_um]}'
+series '{files: "frames/*.npy", shared: [sample.droplet.diamter_um]}'
 expect_series 'unknown shared parameter' bad.yaml:1:47: 'no parameter of this config; did you mean sample.droplet.diameter_um'
-series '{files: "frames/*.tif", shared: [microscope.polarizer_deg]}'
+series '{files: "frames/*.npy", shared: [microscope.polarizer_deg]}'
 expect_series 'shared parameter that is known' bad.yaml:1:47: 'is not fitted here'
 cp truncated.tif other/f1.tif
 series '{files: "other/*.tif"}'
@@ -382,7 +385,7 @@ for kind in droplet cell plate crystal slab volume; do
 done
 
 checks=$((checks + 1))
-"$birefit" new series | sed 's/0.05 /0.5 /; s/frames\/\*.png/frames\/*.tif/' > bad.yaml
+"$birefit" new series | sed 's/0.05 /0.5 /; s/frames\/\*.png/frames\/*.npy/' > bad.yaml
 "$birefit" explain bad.yaml > stdout.txt 2> stderr.txt && grep -q '32 x 32 pixels' stdout.txt || fail 'new series has a mistake of its own'
 
 echo "$checks checks, $failures failures"

@@ -89,7 +89,8 @@ std::shared_ptr<const SpectralTable> tilted(const SpectralTable& table) {
   return other;
 }
 
-/// The same pixels fitted by straight and by curved rays from where the straight ones' optimum is.
+/// The same pixels fitted by straight and by curved rays from where the straight ones' optimum is. `roughly`: only as
+/// far as it takes to see that curved rays are no description.
 struct CurvedRays {
   Eigen::VectorXd change;  ///< of all unknowns, from straight rays to curved ones
   double ratio = 0;        ///< of the objective by curved rays to that by straight ones
@@ -97,7 +98,7 @@ struct CurvedRays {
   double part = 1;         ///< of the pixels that were fitted
 };
 CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& optimum, std::size_t most_pixels,
-                    int steps, double tolerance) {
+                    bool roughly) {
   std::vector<RenderPlan> plans, straight_plans;
   std::vector<PixelSet> sets;
   // Of large images a part tells it, fitted both ways: what its noise does to a fit, it does to both.
@@ -114,11 +115,14 @@ CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& op
     used += pixels.size();
     sets.push_back(pixel_set(task.picture(g), frame.sigma, pixels));
   }
-  SolveOptions few = few_steps(task, steps);
+  // Few steps come close to a minimum that is there: what is ten times worse after these is not on its way to one.
+  constexpr int kSteps = 12, kFirstSteps = 4;
+  constexpr double kHopeless = 10, kRoughly = 1e-3;
+  SolveOptions few = few_steps(task, kSteps);
   double straight_objective = optimum.problem->objective();
   // At best to a tenth of a chi-square unit, a third of a standard error: integrated rays leave kinks, which a search
   // for more would follow.
-  few.function_tolerance = std::max(0.1 / std::max(straight_objective, 1.0), tolerance);
+  few.function_tolerance = std::max(0.1 / std::max(straight_objective, 1.0), roughly ? kRoughly : 0);
   Theta straight = optimum.theta;
   if (part) {
     LeastSquares problem(task, std::move(straight_plans), sets);
@@ -131,7 +135,10 @@ CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& op
   LeastSquares problem(curved_task, std::move(plans), std::move(sets));
   problem.set_misfit(optimum.problem->misfit());
   Eigen::VectorXd searched = optimum.searched;
+  if (roughly) few.max_iterations = kFirstSteps;
   problem.solve(searched, few);
+  few.max_iterations = kSteps - kFirstSteps;
+  if (roughly && problem.objective() < kHopeless * straight_objective) problem.solve(searched, few);
   return {change_of_unknowns(task, straight, problem.theta()), problem.objective() / straight_objective,
           (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used),
           static_cast<double>(used) / static_cast<double>(all)};
@@ -210,24 +217,23 @@ void foretell_curved_rays(const Task& task, const Optimum& optimum, const Eigen:
   const double reduced = std::max(1.0, optimum.reduced_chi_square(task));
   // Few pixels, fitted roughly, tell that curved rays do not describe the image; some, of most images, what they
   // change; where that is near a limit it takes all of them.
-  constexpr double kWorse = 9, kTimesWorse = 1.1, kRoughly = 1e-3;
+  constexpr double kWorse = 9, kTimesWorse = 1.1;
   constexpr std::size_t kFewPixels = 1 << 12, kSomePixels = 1 << 14, kPixels = 1 << 17;
-  constexpr int kSteps = 12;
   std::size_t all = 0;
   for (const Frame& frame : optimum.frames) all += frame.pixels.size();
-  const auto fitted_to = [&](std::size_t pixels, double tolerance) {
-    return compared(task, curved_task, optimum, pixels, kSteps, tolerance);
+  const auto fitted_to = [&](std::size_t pixels, bool roughly) {
+    return compared(task, curved_task, optimum, pixels, roughly);
   };
   if (all > 2 * kFewPixels) {
-    const CurvedRays few = fitted_to(kFewPixels, kRoughly);
+    const CurvedRays few = fitted_to(kFewPixels, true);
     if (few.ratio > kTimesWorse && few.worse - kClear * uncertainty_of_worse(few, 0, reduced) > kWorse * reduced)
       return;
   }
   const bool many = all > 2 * kSomePixels;
-  CurvedRays rays = fitted_to(many ? kSomePixels : kPixels, 0);
+  CurvedRays rays = fitted_to(many ? kSomePixels : kPixels, false);
   Shift shift = largest_shift(task, rays.change, sd);
   if (many && !is_plain(rays, shift.standard_errors, kWorse * reduced, reduced)) {
-    rays = fitted_to(kPixels, 0);
+    rays = fitted_to(kPixels, false);
     shift = largest_shift(task, rays.change, sd);
   }
   left_out.change_by_curved_rays = rays.worse < kWorse * reduced ? shift.standard_errors : 0;

@@ -156,6 +156,8 @@ SolveSummary LeastSquares::solve(Eigen::VectorXd& searched, const SolveOptions& 
   solver.linear_solver_type = ceres::DENSE_QR;
   // With bounds Ceres adds a line search; the cubic one would ask for derivative images at every trial step.
   solver.line_search_interpolation_type = ceres::QUADRATIC;
+  // Where a few trial steps along one direction find nothing better, a shorter step of another direction does.
+  solver.max_num_line_search_step_size_iterations = 5;
   solver.num_threads = 1;
   solver.max_num_iterations = options.max_iterations;
   solver.function_tolerance = options.function_tolerance;

@@ -186,7 +186,8 @@ bool fill_pixels(ConfigReader& reader, const MicrographSettings& settings, const
       usable(x, y) = left(x, y) == Left::used;
     }
   }
-  exclude_outliers(image.values, area, step, Smoothness::image, usable);
+  // What opens the libraries that find specks, longer than all else takes, only where a fit may follow.
+  if (reader.problems.empty()) exclude_outliers(image.values, area, step, Smoothness::image, usable);
   for (std::size_t i = 0; i < left.size(); ++i)
     if (left.values()[i] == Left::used && !usable.values()[i]) left.values()[i] = Left::dead;
 

@@ -2,124 +2,52 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <map>
-#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include "io/fields/blocks.h"
+#include "io/files/byte_order.h"
+#include "io/images/npy_array.h"
 
 namespace birefit::fields {
 namespace {
 
-/// The text behind 'key': in the header's dictionary, up to where its value ends.
-std::string npy_entry(const std::string& header, const std::string& key) {
-  std::size_t at = header.find("'" + key + "'");
-  if (at == std::string::npos) return {};
-  at = header.find(':', at);
-  if (at == std::string::npos) return {};
-  at = header.find_first_not_of(' ', at + 1);
-  if (at == std::string::npos) return {};
-  const char first = header[at];
-  const std::size_t end = first == '('    ? header.find(')', at)
-                          : first == '['  ? header.find(']', at)
-                          : first == '\'' ? header.find('\'', at + 1)
-                                          : header.find_first_of(",}", at);
-  return end == std::string::npos
-             ? std::string()
-             : header.substr(at, end - at + (first == '(' || first == '\'' || first == '[' ? 1 : 0));
-}
-
 /// An array as it stands in the file.
 struct NpyArray {
-  std::vector<std::size_t> shape;
-  std::string shape_text;
-  std::size_t bytes = 8;  ///< of a number
-  char kind = 'f';        ///< NumPy's: floats, signed and unsigned integers, b = truth values
-  bool fortran = false, swapped = false;
+  NpyHeader header;
   std::string_view data;
 
-  double number(std::size_t at) const {
-    const char* from = data.data() + bytes * at;
-    if (kind == 'f')
-      return bytes == 4 ? static_cast<double>(read_as<float>(from, swapped)) : read_as<double>(from, swapped);
-    const auto whole = [&]<class Signed, class Unsigned>(Signed, Unsigned) {
-      return kind == 'i' ? static_cast<double>(read_as<Signed>(from, swapped))
-                         : static_cast<double>(read_as<Unsigned>(from, swapped));
-    };
-    if (bytes == 1) return whole(std::int8_t{}, std::uint8_t{});
-    if (bytes == 2) return whole(std::int16_t{}, std::uint16_t{});
-    return bytes == 4 ? whole(std::int32_t{}, std::uint32_t{}) : whole(std::int64_t{}, std::uint64_t{});
-  }
+  double number(std::size_t at) const { return header.number(data.data() + header.bytes * at); }
 };
 
+NpyRefusal refusal_of(const std::string& file) {
+  return [&file](const std::string& found, const std::string& hint) { refuse(file, found, hint); };
+}
+
 NpyArray parse_npy(std::string_view content, const std::string& file) {
-  NpyArray array;
-  const auto cut_short = [&] { refuse(file, "is cut short", "save it again"); };
-  if (content.size() < 10 || content.compare(0, 6, "\x93NUMPY") != 0)
-    refuse(file, "is no NumPy array", "numpy.save writes one");
-  const int version = static_cast<unsigned char>(content[6]);
-  if (version < 1 || version > 3)
-    refuse(file, fmt::format("is a NumPy array of version {}", version), "versions 1 to 3 are read");
-  const std::size_t start = version == 1 ? 10 : 12;
-  if (content.size() < start) cut_short();
-  const std::size_t length =
-      version == 1 ? read_as<std::uint16_t>(content.data() + 8) : read_as<std::uint32_t>(content.data() + 8);
-  if (content.size() < start + length) cut_short();
-  const std::string header(content.substr(start, length));
-  const std::string type = npy_entry(header, "descr"), order = npy_entry(header, "fortran_order");
-  array.shape_text = npy_entry(header, "shape");
-  static const std::set<std::string> kRead = {"f4'", "f8'", "b1'", "u1'", "u2'", "u4'",
-                                              "u8'", "i1'", "i2'", "i4'", "i8'"};
-  if (type.size() != 5 || !kRead.contains(type.substr(2)) || (type[1] != '<' && type[1] != '>' && type[3] != '1'))
-    refuse(file,
-           "holds " + (type.empty() ? std::string("an unknown type") : type) +
-               ", neither floats of 4 or 8 bytes nor integers",
-           "save array.astype('<f4') or '<f8'");
-  array.kind = type[2];
-  array.bytes = static_cast<std::size_t>(type[3] - '0');
-  array.swapped = type[1] == '>';
-  array.fortran = order == "True";
-  if (!array.fortran && order != "False") refuse(file, "does not say its fortran_order", "numpy.save writes it");
-  for (std::size_t i = 0; i < array.shape_text.size();) {
-    if (array.shape_text[i] < '0' || array.shape_text[i] > '9') {
-      ++i;
-      continue;
-    }
-    std::size_t n = 0;
-    const auto [end, error] =
-        std::from_chars(array.shape_text.data() + i, array.shape_text.data() + array.shape_text.size(), n);
-    i = static_cast<std::size_t>(end - array.shape_text.data());
-    if (error != std::errc()) n = kMostNodes * 10;
-    array.shape.push_back(n);
-  }
-  array.data = content.substr(start + length);
+  NpyArray array{npy_header(content, refusal_of(file)), {}};
+  array.data = content.substr(array.header.start);
   return array;
 }
 
 /// Once the shape is known to be one that can be held.
 void check_data(const NpyArray& array, const std::string& file) {
-  double all = 1;
-  for (const std::size_t n : array.shape) all *= static_cast<double>(n);
-  if (static_cast<double>(array.data.size()) != all * static_cast<double>(array.bytes))
-    refuse(file,
-           fmt::format("has {} bytes of data, its shape needs {:.0f}", array.data.size(),
-                       all * static_cast<double>(array.bytes)),
-           "it was cut short or mixed up: save it again");
+  check_npy_size(array.header, array.header.start + array.data.size(), refusal_of(file));
 }
 
 /// Numbers with x running fastest, then y, then z, and the components of a node together. Of one step along z, y, x and
 /// the component; the last two axes of (.., 3, 3) in rows or in columns, which a symmetric tensor does not mind.
 NodeArray by_node(const NpyArray& array, std::size_t components, bool x_first) {
-  const std::array<std::size_t, 4> n{array.shape[0], array.shape[1], array.shape[2], components};
+  const std::vector<std::size_t>& shape = array.header.shape;
+  const std::array<std::size_t, 4> n{shape[0], shape[1], shape[2], components};
   std::array<std::size_t, 4> stride;
   for (std::size_t i = 0; i < 4; ++i) {
     stride[i] = 1;
     for (std::size_t k = 0; k < 4; ++k)
-      if (array.fortran ? k < i : k > i) stride[i] *= n[k];
+      if (array.header.fortran ? k < i : k > i) stride[i] *= n[k];
   }
   const std::size_t x = x_first ? 0 : 2, z = x_first ? 2 : 0;
   NodeArray field;
@@ -137,13 +65,13 @@ RawVolume volume_of(const NpyArray& array, const VolumeRequest& request) {
   RawVolume raw;
   raw.file = request.path.string();
   raw.name = "the director";
-  const std::vector<std::size_t>& shape = array.shape;
+  const std::vector<std::size_t>& shape = array.header.shape;
   const bool director = shape.size() == 4 && shape[3] == 3, six = shape.size() == 4 && shape[3] == 6,
              nine = shape.size() == 5 && shape[3] == 3 && shape[4] == 3;
   if (!director && !six && !nine) {
     const bool leading = shape.size() == 4 && (shape[0] == 3 || shape[0] == 6);
     refuse(raw.file,
-           "has the shape " + (array.shape_text.empty() ? "()" : array.shape_text) + ", expected " +
+           "has the shape " + (array.header.shape_text.empty() ? "()" : array.header.shape_text) + ", expected " +
                (request.x_first ? "(nx, ny, nz, 3)" : "(nz, ny, nx, 3)") +
                " for a director, .. 6) or .. 3, 3) for a tensor Q",
            leading ? "the components come last: numpy.moveaxis(array, 0, -1)" : "");
@@ -226,9 +154,10 @@ NodeArray beside(const NpyArray& array, const RawVolume& raw, const std::string&
   const std::array<std::size_t, 3> nodes{static_cast<std::size_t>(x_first ? raw.nx : raw.nz),
                                          static_cast<std::size_t>(raw.ny),
                                          static_cast<std::size_t>(x_first ? raw.nz : raw.nx)};
-  const std::size_t expected = array.shape.size() == 4 && array.shape[3] == 1 ? 4 : 3;
-  if (array.shape.size() != expected || !std::equal(nodes.begin(), nodes.end(), array.shape.begin()))
-    refuse(raw.file, name + " has the shape " + array.shape_text + ", that of " + raw.name + " is another",
+  const std::vector<std::size_t>& shape = array.header.shape;
+  const std::size_t expected = shape.size() == 4 && shape[3] == 1 ? 4 : 3;
+  if (shape.size() != expected || !std::equal(nodes.begin(), nodes.end(), shape.begin()))
+    refuse(raw.file, name + " has the shape " + array.header.shape_text + ", that of " + raw.name + " is another",
            "one number for each node");
   check_data(array, raw.file);
   return by_node(array, 1, x_first);

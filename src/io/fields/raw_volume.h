@@ -44,14 +44,4 @@ std::array<double, 3> demand_spacing(const VolumeRequest& request, const std::st
 /// The config gives no spacing for a file that states its own.
 void refuse_spacing(const VolumeRequest& request, const std::string& format);
 
-/// A number of either byte order.
-template <class T>
-T read_as(const char* from, bool swapped = false) {
-  std::array<char, sizeof(T)> bytes;
-  for (std::size_t i = 0; i < sizeof(T); ++i) bytes[i] = from[swapped ? sizeof(T) - 1 - i : i];
-  T value;
-  std::memcpy(&value, bytes.data(), sizeof value);
-  return value;
-}
-
 }  // namespace birefit::fields

@@ -9,6 +9,7 @@
 
 #include "io/fields/blocks.h"
 #include "io/fields/vtk.h"
+#include "io/files/byte_order.h"
 
 namespace birefit::fields {
 namespace {

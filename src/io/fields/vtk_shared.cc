@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "io/fields/vtk.h"
+#include "io/files/byte_order.h"
 
 namespace birefit::fields {
 

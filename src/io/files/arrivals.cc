@@ -31,8 +31,8 @@ double seconds_now() {
 }
 
 bool is_image_name(const std::string& name) {
-  static const std::set<std::string> endings = {".tif", ".tiff", ".png", ".exr", ".jpg", ".jpeg",
-                                                ".bmp", ".webp", ".gif", ".dng", ".cr2", ".nef"};
+  static const std::set<std::string> endings = {".tif",  ".tiff", ".png", ".exr", ".jpg", ".jpeg", ".bmp",
+                                                ".webp", ".gif",  ".dng", ".cr2", ".nef", ".npy"};
   std::string ending = fs::path(name).extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
   return name.front() != '.' && endings.contains(ending);

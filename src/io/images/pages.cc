@@ -7,6 +7,7 @@
 
 #include <pugixml.hpp>
 
+#include "io/images/npy_image.h"
 #include "io/images/stated_size.h"
 #include "io/images/tiff_tags.h"
 
@@ -98,8 +99,12 @@ std::string StackPage::label() const {
 }
 
 std::vector<StackPage> stack_pages(const std::filesystem::path& file) {
-  const TiffTags tags = read_tiff_tags(file, kMostPages);
   std::vector<StackPage> pages;
+  if (const std::size_t pictures = std::min(npy_pictures(file), kMostPages); pictures > 1) {
+    for (std::size_t i = 0; i < pictures; ++i) pages.push_back({static_cast<int>(i), {}, {}, {}});
+    return pages;
+  }
+  const TiffTags tags = read_tiff_tags(file, kMostPages);
   for (std::size_t i = 0; i < tags.pages.size(); ++i)
     if (!tags.pages[i].reduced()) pages.push_back({static_cast<int>(i), {}, {}, {}});
   if (pages.empty() || tags.canon_raw || tags.pages[0].dng) return {StackPage{}};

@@ -18,8 +18,8 @@ struct StackPage {
   std::string label() const;
 };
 
-/// The pages of a TIFF file but for reduced copies of others, as far as its chain can be read; of any other file one
-/// without a number.
+/// The pages of a TIFF file but for reduced copies of others, as far as its chain can be read; the pictures of an array
+/// (.npy); of any other file one without a number.
 std::vector<StackPage> stack_pages(const std::filesystem::path& file);
 
 }  // namespace birefit

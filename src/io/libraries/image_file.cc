@@ -27,6 +27,7 @@
 #include "io/images/stated_size.h"
 #include "io/images/tiff_tags.h"
 #include "io/libraries/raw_photograph.h"
+#include "io/libraries/table.h"
 
 namespace birefit {
 namespace {
@@ -530,23 +531,11 @@ std::string encode_channels(std::span<const Image> channels, const fs::path& pat
   return encode(extension == ".exr" ? "openexr" : "tiff", spec, samples);
 }
 
-LoadedImage load_image(const ImageRequest& request) {
-  std::error_code code;
-  const fs::file_status status = fs::status(request.path, code);
-  if (status.type() == fs::file_type::not_found)
-    refuse_image(request, "does not exist", "check the name; relative paths start at the config's folder");
-  if (code) refuse_image(request, "cannot be opened: " + code.message(), "check the permissions of its folder");
-  if (fs::is_directory(status)) refuse_image(request, "is a folder", "name one image in it");
-  if (!fs::is_regular_file(status)) refuse_image(request, "is not a file", "name an image file");
-  const std::uintmax_t size = fs::file_size(request.path, code);
-  if (code) refuse_image(request, "cannot be opened: " + code.message(), "check its permissions");
-  if (size == 0) refuse_image(request, "is empty (zero bytes)", "copy it again from its source");
-  if (::access(request.path.c_str(), R_OK) != 0)
-    refuse_image(request, std::string("cannot be opened: ") + std::strerror(errno), "check its permissions");
-
-  const Signature signature = read_signature(request.path, size);
+LoadedImage load_by_libraries(const ImageRequest& request) {
+  const Signature signature = read_signature(request.path, fs::file_size(request.path));
   if (signature.format.empty())
-    refuse_image(request, "is no image of a kind birefit reads", "use PNG, TIFF, OpenEXR, JPEG, BMP, GIF or WebP");
+    refuse_image(request, "is no image of a kind birefit reads",
+                 "use PNG, TIFF, OpenEXR, JPEG, BMP, GIF, WebP or .npy");
   try {
     const TiffTags tags = signature.format == "tiff" ? read_tiff_tags(request.path, 1) : TiffTags{};
     if (signature.format == "raw" || is_raw_photograph(tags)) return load_raw(request, tags);

@@ -15,9 +15,12 @@ namespace birefit {
 /// Median of the 5 x 5 neighbours of every pixel; beyond an edge its pixels go on.
 Grid<float> median_of_neighbours(const Grid<float>& values);
 
+/// What load_image() promises, of a file that is there and has bytes in one of the formats of OpenImageIO.
+LoadedImage load_by_libraries(const ImageRequest& request);
+
 struct ImageLibraries {
   const char* version = BIREFIT_VERSION;  ///< of birefit; the rest is known only where it is the program's
-  decltype(&birefit::load_image) load_image = &birefit::load_image;
+  decltype(&birefit::load_by_libraries) load_by_libraries = &birefit::load_by_libraries;
   decltype(&birefit::encode_channels) encode_channels = &birefit::encode_channels;
   decltype(&birefit::encode_png) encode_png = &birefit::encode_png;
   decltype(&birefit::find_disc) find_disc = &birefit::find_disc;

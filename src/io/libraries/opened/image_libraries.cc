@@ -33,7 +33,7 @@ const ImageLibraries& libraries() {
 
 }  // namespace
 
-LoadedImage load_image(const ImageRequest& request) { return libraries().load_image(request); }
+LoadedImage load_by_libraries(const ImageRequest& request) { return libraries().load_by_libraries(request); }
 
 std::string encode_channels(std::span<const Image> channels, const std::filesystem::path& path, double pixel_size_um) {
   return libraries().encode_channels(channels, path, pixel_size_um);
