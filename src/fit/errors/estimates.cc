@@ -235,7 +235,9 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
       estimate.interval95_low = question(j).parameter().lower;
       estimate.interval95_high = limit->value;
     }
-    if (!estimate.linear && !estimate.at_bound && estimate.limit.empty()) settle_interval(question(j), estimate);
+    // (Of what is fitted along for its error alone no interval is reported.)
+    if (!estimate.linear && !estimate.at_bound && estimate.limit.empty() && !question(j).parameter().nuisance)
+      settle_interval(question(j), estimate);
     result.names.push_back(question(j).parameter().name);
     result.parameters.push_back(std::move(estimate));
   }
