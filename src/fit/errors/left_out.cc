@@ -116,7 +116,7 @@ CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& op
     sets.push_back(pixel_set(task.picture(g), frame.sigma, pixels));
   }
   // Few steps come close to a minimum that is there: what is ten times worse after these is not on its way to one.
-  constexpr int kSteps = 12, kFirstSteps = 4;
+  constexpr int kSteps = 12, kFirstSteps = 2;
   constexpr double kHopeless = 10, kRoughly = 1e-3;
   SolveOptions few = few_steps(task, kSteps);
   double straight_objective = optimum.problem->objective();
