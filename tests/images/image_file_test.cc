@@ -1,193 +1,27 @@
-// Every test writes its own files: with OpenImageIO, or by hand where OpenImageIO would not write such a file.
+// What is read of image files. Every test writes its own (image_files.h).
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <limits>
-#include <optional>
 #include <string>
 #include <vector>
-
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "birefit/io.h"
-#include "io/files/file.h"
+#include "image_files.h"
 
 namespace birefit {
 namespace {
 
-namespace fs = std::filesystem;
-using OIIO::ImageSpec;
-using OIIO::TypeDesc;
-using testing::AllOf;
+using namespace image_files;
 using testing::Contains;
-using testing::HasSubstr;
 using testing::IsEmpty;
-
-class ImageFile : public testing::Test {
- protected:
-  void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / ("birefit_" + std::to_string(getpid()) + "_" +
-                                              testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  fs::path path(const std::string& name) const { return folder_ / name; }
-
-  fs::path write_bytes(const std::string& name, const std::string& bytes) const {
-    std::ofstream(path(name), std::ios::binary) << bytes;
-    return path(name);
-  }
-
-  template <class T>
-  fs::path write(const std::string& name, ImageSpec spec, const std::vector<T>& samples) const {
-    auto output = OIIO::ImageOutput::create(name);
-    EXPECT_TRUE(output) << name;
-    EXPECT_TRUE(output->open(path(name).string(), spec)) << output->geterror();
-    EXPECT_TRUE(output->write_image(spec.format, samples.data())) << output->geterror();
-    EXPECT_TRUE(output->close());
-    return path(name);
-  }
-
-  fs::path write_pages(const std::string& name, const std::vector<ImageSpec>& specs) const {
-    auto output = OIIO::ImageOutput::create(name);
-    EXPECT_TRUE(output->open(path(name).string(), static_cast<int>(specs.size()), specs.data()));
-    for (std::size_t i = 0; i < specs.size(); ++i) {
-      if (i > 0) {
-        EXPECT_TRUE(output->open(path(name).string(), specs[i], OIIO::ImageOutput::AppendSubimage));
-      }
-      const std::vector<float> samples(specs[i].image_pixels() * specs[i].nchannels, 0.1f * (i + 1));
-      EXPECT_TRUE(output->write_image(TypeDesc::FLOAT, samples.data()));
-    }
-    EXPECT_TRUE(output->close());
-    return path(name);
-  }
-
-  fs::path truncated(const fs::path& whole, double fraction) const {
-    const std::string bytes = content(whole);
-    return write_bytes("truncated" + whole.extension().string(),
-                       bytes.substr(0, static_cast<std::size_t>(bytes.size() * fraction)));
-  }
-
-  static std::string content(const fs::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
-
-  fs::path folder_;
-};
-
-LoadedImage load(const fs::path& path, const std::string& channel = {}, std::optional<int> page = {}) {
-  return load_image({path, page, channel, {"job.yaml", 3, 5}});
-}
-
-/// The message of the UserError that `action` throws; "" when it throws none.
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const UserError& error) {
-    EXPECT_EQ(error.problems().size(), 1u);
-    EXPECT_FALSE(error.problems()[0].hint.empty()) << error.what();
-    return error.what();
-  }
-  return {};
-}
-
-std::string refusal(const fs::path& path, const std::string& channel = {}, std::optional<int> page = {}) {
-  const std::string message = message_of([&] { (void)load(path, channel, page); });
-  EXPECT_THAT(message, AllOf(HasSubstr("job.yaml:3:5: "), HasSubstr(path.filename().string())));
-  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-  return message;
-}
-
-std::vector<std::uint16_t> noise(std::size_t count) {
-  std::vector<std::uint16_t> samples(count);
-  std::uint32_t state = 12345;
-  for (auto& sample : samples) {
-    state = state * 1664525u + 1013904223u;
-    sample = static_cast<std::uint16_t>(state >> 16);
-  }
-  return samples;
-}
-
-/// A little-endian TIFF of one strip with the given tags (tag, type 3 or 4, values).
-struct Tag {
-  std::uint16_t id, type;
-  std::vector<std::uint32_t> values;
-};
-std::string tiff_bytes(std::vector<Tag> tags, const std::string& data) {
-  std::string bytes = std::string("II*\0", 4), tail;
-  const auto put16 = [](std::string& to, std::uint32_t v) { to += char(v & 255), to += char(v >> 8 & 255); };
-  const auto put32 = [&](std::string& to, std::uint32_t v) { put16(to, v & 65535), put16(to, v >> 16); };
-  tags.push_back({279, 4, {static_cast<std::uint32_t>(data.size())}});
-  tags.push_back({273, 4, {8}});
-  std::sort(tags.begin(), tags.end(), [](const Tag& a, const Tag& b) { return a.id < b.id; });
-  const std::uint32_t directory = 8 + static_cast<std::uint32_t>(data.size() + data.size() % 2);
-  put32(bytes, directory);
-  bytes += data;
-  bytes.resize(directory);
-  const std::uint32_t tail_at = directory + 2 + 12 * static_cast<std::uint32_t>(tags.size()) + 4;
-  put16(bytes, static_cast<std::uint32_t>(tags.size()));
-  for (const Tag& tag : tags) {
-    put16(bytes, tag.id), put16(bytes, tag.type), put32(bytes, static_cast<std::uint32_t>(tag.values.size()));
-    std::string values;
-    for (const std::uint32_t v : tag.values) tag.type == 3 ? put16(values, v) : put32(values, v);
-    if (values.size() <= 4) {
-      values.resize(4);
-      bytes += values;
-    } else {
-      put32(bytes, tail_at + static_cast<std::uint32_t>(tail.size()));
-      tail += values;
-    }
-  }
-  put32(bytes, 0);
-  return bytes + tail;
-}
-std::vector<Tag> tiff_tags(std::uint32_t width, std::uint32_t height, std::uint32_t bits, std::uint32_t photometric) {
-  return {{256, 4, {width}},       {257, 4, {height}}, {258, 3, {bits}},  {259, 3, {1}},
-          {262, 3, {photometric}}, {277, 3, {1}},      {278, 4, {height}}};
-}
-
-std::uint32_t crc32(const std::string& bytes) {
-  std::uint32_t crc = 0xffffffffu;
-  for (const unsigned char c : bytes) {
-    crc ^= c;
-    for (int i = 0; i < 8; ++i) crc = crc >> 1 ^ (crc & 1 ? 0xedb88320u : 0);
-  }
-  return ~crc;
-}
-std::string png_chunk(const std::string& type, const std::string& data) {
-  const auto put32 = [](std::uint32_t v) {
-    return std::string{char(v >> 24 & 255), char(v >> 16 & 255), char(v >> 8 & 255), char(v & 255)};
-  };
-  return put32(static_cast<std::uint32_t>(data.size())) + type + data + put32(crc32(type + data));
-}
-/// A PNG whose rows (filter bytes included) are stored uncompressed.
-std::string png_bytes(std::uint32_t width, std::uint32_t height, int bits, int colour_type, const std::string& rows,
-                      const std::string& palette = {}, const std::string& before_data = {}) {
-  const auto put32 = [](std::uint32_t v) {
-    return std::string{char(v >> 24 & 255), char(v >> 16 & 255), char(v >> 8 & 255), char(v & 255)};
-  };
-  std::uint32_t a = 1, b = 0;
-  for (const unsigned char c : rows) a = (a + c) % 65521, b = (b + a) % 65521;
-  const std::size_t n = rows.size();
-  std::string zlib = "\x78\x01\x01";
-  zlib +=
-      std::string{char(n & 255), char(n >> 8 & 255), char(~n & 255), char(~n >> 8 & 255)} + rows + put32(b << 16 | a);
-  std::string header = put32(width) + put32(height) + char(bits) + char(colour_type) + std::string(3, '\0');
-  return "\x89PNG\r\n\x1a\n" + png_chunk("IHDR", header) + (palette.empty() ? "" : png_chunk("PLTE", palette)) +
-         before_data + png_chunk("IDAT", zlib) + png_chunk("IEND", "");
-}
 
 // ---- values ---------------------------------------------------------------------------------------------------------
 
@@ -578,114 +412,6 @@ TEST_F(ImageFile, AStillWebPIsRead) {
   EXPECT_NEAR(load(write("a.webp", ImageSpec(16, 12, 3, TypeDesc::UINT8), samples), "g").values(5, 5), 77, 1);
 }
 
-// ---- writing --------------------------------------------------------------------------------------------------------
-
-Image ramp() {
-  Image image(31, 17);
-  for (std::size_t i = 0; i < image.size(); ++i) image.values()[i] = static_cast<double>(i) / (image.size() - 1);
-  return image;
-}
-
-TEST_F(ImageFile, SavedPicturesStateTheirPixels) {
-  for (const char* name : {"a.tif", "a.exr"}) {
-    const std::vector<Image> channels{ramp()};
-    EXPECT_NEAR(load(write_bytes(name, encode_channels(channels, path(name), 0.3))).pixel_size_um, 0.3, 1e-6) << name;
-  }
-}
-
-TEST_F(ImageFile, SavedFloatsAreReadBackExactlyAndAreNotHalf) {
-  Image image = ramp();
-  image(3, 3) = -12345.678f;
-  image(4, 3) = std::numeric_limits<double>::quiet_NaN();
-  for (const char* name : {"a.tif", "a.exr", "b.TIFF"}) {
-    save_image(image, path(name));
-    const LoadedImage loaded = load(path(name));
-    EXPECT_THAT(loaded.notes, IsEmpty()) << name;
-    for (int y = 0; y < image.height(); ++y)
-      for (int x = 0; x < image.width(); ++x) {
-        if (x == 4 && y == 3) continue;
-        ASSERT_EQ(loaded.values(x, y), double{static_cast<float>(image(x, y))}) << name;
-      }
-    EXPECT_TRUE(std::isnan(loaded.values(4, 3))) << name;
-  }
-}
-
-TEST_F(ImageFile, SavedPngIsClampedTo16Bit) {
-  Image image(4, 1);
-  image.values() = {-0.5, 0.5, 1.5, std::numeric_limits<double>::quiet_NaN()};
-  save_image(image, path("a.png"));
-  const LoadedImage loaded = load(path("a.png"));
-  EXPECT_EQ(loaded.values.values(), (std::vector<double>{0, 32768, 65535, 0}));
-  EXPECT_EQ(loaded.bits, 16);
-}
-
-TEST_F(ImageFile, UnknownExtensionListsTheKnownOnes) {
-  EXPECT_THAT(message_of([&] { save_image(ramp(), path("a.bmp")); }),
-              AllOf(HasSubstr("'.bmp'"), HasSubstr(".tif"), HasSubstr(".exr"), HasSubstr(".png")));
-  EXPECT_TRUE(fs::is_empty(folder_));
-}
-
-TEST_F(ImageFile, EncodedPngIsAPng) {
-  const std::vector<unsigned char> samples = {255, 0, 0, 0, 255, 0};
-  const std::vector<unsigned char> png = encode_png(samples, 2, 1, 3);
-  const fs::path file = write_bytes("a.png", std::string(png.begin(), png.end()));
-  EXPECT_EQ(load(file, "r").values.values(), (std::vector<double>{255, 0}));
-  EXPECT_EQ(load(file, "g").values.values(), (std::vector<double>{0, 255}));
-}
-
-TEST_F(ImageFile, UnwritableFolderIsTold) {
-  EXPECT_THAT(message_of([&] { write_file(path("none/a.txt"), "x"); }), HasSubstr("cannot be written: No such file"));
-  EXPECT_THROW(write_file(folder_, "x"), UserError);
-}
-
-TEST_F(ImageFile, FullDeviceIsTold) {
-  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  EXPECT_THAT(message_of([&] { write_file("/dev/full", "x"); }), HasSubstr("No space left on device"));
-  EXPECT_TRUE(fs::exists("/dev/full"));
-}
-
-/// Lets no file grow beyond some bytes: what a full disk looks like to one process.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit limit = before_;
-    limit.rlim_cur = bytes;
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
-
-TEST_F(ImageFile, FailedWriteKeepsTheOldFileAndLeavesNoTemporary) {
-  write_file(path("a.txt"), "old");
-  save_image(ramp(), path("a.tif"));
-  const std::string old_image = content(path("a.tif"));
-  {
-    FileSizeLimit limit(100);
-    EXPECT_THAT(message_of([&] { write_file(path("a.txt"), std::string(1000, 'x')); }), HasSubstr("cannot be written"));
-    EXPECT_THAT(message_of([&] { save_image(Image(64, 64, 0.5), path("a.tif")); }), HasSubstr("cannot be written"));
-  }
-  EXPECT_EQ(content(path("a.txt")), "old");
-  EXPECT_EQ(content(path("a.tif")), old_image);
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 2);
-}
-
-TEST_F(ImageFile, WritingThroughALinkKeepsTheLink) {
-  write_file(path("target.txt"), "old");
-  fs::create_symlink("target.txt", path("link.txt"));
-  write_file(path("link.txt"), "new");
-  EXPECT_TRUE(fs::is_symlink(path("link.txt")));
-  EXPECT_EQ(content(path("target.txt")), "new");
-}
-
-// Found by tools/fuzz: a damaged header whose size OpenImageIO believes.
 TEST_F(ImageFile, AHeaderThatNoMemoryHoldsIsRefused) {
   const std::vector<unsigned char> bytes = {
       71,  73,  70,  56,  72,  78,  73,  147, 68,  82,  85,  77,  80,  89,  1,   0,   118, 0,   123, 39,  100, 101, 115,

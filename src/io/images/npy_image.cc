@@ -37,12 +37,18 @@ std::optional<Axes> axes_of(const std::vector<std::size_t>& shape) {
   return coloured ? std::optional(Axes{shape[0], shape[1], shape[2], shape[3]}) : std::nullopt;
 }
 
-/// Up to a megabyte: headers have a few hundred bytes.
+/// Up to a megabyte of an array, whose header has a few hundred bytes; of any other file no more than tells.
 std::string beginning_of(const fs::path& path) {
-  std::string bytes(1 << 20, '\0');
+  constexpr std::size_t kMost = 1 << 20;
   std::ifstream file(path, std::ios::binary);
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  std::string bytes;
+  for (const std::size_t size : {kNpyMagic.size(), kMost}) {
+    const std::size_t there = bytes.size();
+    bytes.resize(size);
+    file.read(bytes.data() + there, static_cast<std::streamsize>(size - there));
+    bytes.resize(there + static_cast<std::size_t>(file.gcount()));
+    if (bytes != kNpyMagic) break;
+  }
   return bytes;
 }
 
