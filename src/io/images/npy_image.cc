@@ -37,9 +37,9 @@ std::optional<Axes> axes_of(const std::vector<std::size_t>& shape) {
   return coloured ? std::optional(Axes{shape[0], shape[1], shape[2], shape[3]}) : std::nullopt;
 }
 
-/// Up to a megabyte of an array, whose header has a few hundred bytes; of any other file no more than tells.
+/// Enough of an array for its header, which has a few hundred bytes; of any other file no more than tells.
 std::string beginning_of(const fs::path& path) {
-  constexpr std::size_t kMost = 1 << 20;
+  constexpr std::size_t kMost = 1 << 17;
   std::ifstream file(path, std::ios::binary);
   std::string bytes;
   for (const std::size_t size : {kNpyMagic.size(), kMost}) {
