@@ -189,7 +189,7 @@ Command add_fit_command(CLI::App& app) {
       ->add_option("--samples", arguments->samples,
                    "draw N times from the posterior: samples.csv, and a corner plot in the report")
       ->check(CLI::Range(10, 1000000));
-  command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
+  command->add_flag("-q,--quiet", arguments->quiet, "no summary and no progress");
   command->add_flag("--npy", arguments->npy,
                     "also write fitted and residual images for NumPy: fitted.npy, residual.npy");
   CLI::Option* json = command->add_flag("--json", arguments->json, "print fit.json in place of the summary");

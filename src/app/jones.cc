@@ -77,7 +77,7 @@ Command add_jones_command(CLI::App& app) {
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out, "table to write (.csv)")->required();
-  command->add_flag("--quiet", arguments->quiet, "print nothing");
+  command->add_flag("-q,--quiet", arguments->quiet, "print nothing");
   return {command, [arguments] { return run_jones(*arguments); }};
 }
 

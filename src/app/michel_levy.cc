@@ -191,7 +191,7 @@ Command add_michel_levy_command(CLI::App& app) {
   command->add_option("--noise", arguments->noise, "standard deviation of a pixel's channels, of white (default 0.01)")
       ->check(CLI::Range(1e-6, 1.0));
   add_threads_option(*command, arguments->threads);
-  command->add_flag("--quiet", arguments->quiet, "print nothing");
+  command->add_flag("-q,--quiet", arguments->quiet, "print nothing");
   return {command, [arguments] { return run_michel_levy(*arguments); }};
 }
 

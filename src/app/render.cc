@@ -82,7 +82,7 @@ Command add_render_command(CLI::App& app) {
   command->add_option("--out", arguments->out, "image to write: .exr, .tif (float), .npy (double) or .png (16 bit)")
       ->required();
   add_threads_option(*command, arguments->threads);
-  command->add_flag("--quiet", arguments->quiet, "print nothing");
+  command->add_flag("-q,--quiet", arguments->quiet, "print nothing");
   return {command, [arguments] { return run_render(*arguments); }};
 }
 

@@ -369,7 +369,7 @@ Command add_series_command(CLI::App& app) {
   command->add_flag("--resume", arguments->resume,
                     "go on with the series in that folder: frames that are up to date stay");
   add_threads_option(*command, arguments->threads);
-  command->add_flag("--quiet", arguments->quiet, "no summary and no progress");
+  command->add_flag("-q,--quiet", arguments->quiet, "no summary and no progress");
   return {command, [arguments] { return run_series(*arguments); }};
 }
 

@@ -358,7 +358,7 @@ Command add_watch_command(CLI::App& app) {
                    "seconds before a file that cannot be read is given up; default 5")
       ->check(CLI::Range(0.0, 3600.0));
   add_threads_option(*command, arguments->threads);
-  command->add_flag("--quiet", arguments->quiet, "print nothing but the page's address");
+  command->add_flag("-q,--quiet", arguments->quiet, "print nothing but the page's address");
   return {command, [arguments] { return run_watch(*arguments); }};
 }
 
