@@ -115,6 +115,16 @@ TEST_F(NpyImage, FloatsKeepAllTheirDigits) {
   EXPECT_EQ(image.values(1, 1), 1e-300);
   EXPECT_EQ(image.bits, 32);
   EXPECT_EQ(load(file("<f4", "(1, 1)", bytes_of<float>({0.1f}))).values(0, 0), 0.1f);
+  // IEEE 754, binary16: 1, -2, the largest, the smallest, the next to 1/3, nothing.
+  const LoadedImage half =
+      load(file(">f2", "(2, 3)", bytes_of<std::uint16_t>({0x3c00, 0xc000, 0x7bff, 0x0001, 0x3555, 0x7e00}, true)));
+  EXPECT_EQ(half.values(0, 0), 1);
+  EXPECT_EQ(half.values(1, 0), -2);
+  EXPECT_EQ(half.values(2, 0), 65504);
+  EXPECT_EQ(half.values(0, 1), std::exp2(-24));
+  EXPECT_EQ(half.values(1, 1), 1365.0 / 4096);
+  EXPECT_TRUE(std::isnan(half.values(2, 1)));
+  EXPECT_THAT(half.notes, Contains(HasSubstr("three decimal digits")));
 }
 
 // a[y, x] = 10 y + x and its transpose in memory are one picture.
@@ -181,7 +191,7 @@ TEST_F(NpyImage, WhatIsNoPictureIsRefusedAtItsPlace) {
   EXPECT_THAT(refused(file("|u1", "(20000, 20000)", four)), HasSubstr("20000 x 20000"));
   EXPECT_THAT(refused(file("|u1", "(99999999999999999999999, 2)", four)), HasSubstr("at most"));
   EXPECT_THAT(refused(file("<c16", "(1, 1)", std::string(16, 'x'))), HasSubstr("<c16"));
-  EXPECT_THAT(refused(file("|O", "(1, 1)", four)), HasSubstr("neither floats of 4 or 8 bytes nor integers"));
+  EXPECT_THAT(refused(file("|O", "(1, 1)", four)), HasSubstr("neither floats of up to 8 bytes nor integers"));
   const fs::path cut = file("|u1", "(2, 2)", four);
   fs::resize_file(cut, 60);
   EXPECT_THAT(refused(cut), HasSubstr("is cut short"));

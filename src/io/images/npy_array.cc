@@ -1,7 +1,9 @@
 #include "io/images/npy_array.h"
 
 #include <charconv>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <set>
 #include <stdexcept>
 
@@ -30,6 +32,16 @@ std::string entry_of(const std::string& header, const std::string& key) {
              : header.substr(at, end - at + (first == '(' || first == '\'' || first == '[' ? 1 : 0));
 }
 
+/// A number of IEEE 754's binary16: 5 bits of exponent, 10 of fraction.
+double half_number(std::uint16_t bits) {
+  const int exponent = bits >> 10 & 31, fraction = bits & 1023;
+  const double size =
+      exponent == 31  ? (fraction ? std::numeric_limits<double>::quiet_NaN() : std::numeric_limits<double>::infinity())
+      : exponent == 0 ? std::ldexp(fraction, -24)
+                      : std::ldexp(1024 + fraction, exponent - 25);
+  return bits >> 15 ? -size : size;
+}
+
 std::vector<std::size_t> numbers_in(const std::string& shape) {
   constexpr std::size_t kTooMany = 1'000'000'000;
   std::vector<std::size_t> numbers;
@@ -55,6 +67,7 @@ double NpyHeader::count() const {
 }
 
 double NpyHeader::number(const char* from) const {
+  if (kind == 'f' && bytes == 2) return half_number(read_as<std::uint16_t>(from, swapped));
   if (kind == 'f')
     return bytes == 4 ? static_cast<double>(read_as<float>(from, swapped)) : read_as<double>(from, swapped);
   const auto whole = [&]<class Signed, class Unsigned>(Signed, Unsigned) {
@@ -86,11 +99,11 @@ NpyHeader npy_header(std::string_view beginning, const NpyRefusal& refuse) {
   whole(beginning.size() >= before + length);
   const std::string text(beginning.substr(before, length));
   const std::string type = entry_of(text, "descr"), order = entry_of(text, "fortran_order");
-  static const std::set<std::string> kRead = {"f4'", "f8'", "b1'", "u1'", "u2'", "u4'",
-                                              "u8'", "i1'", "i2'", "i4'", "i8'"};
+  static const std::set<std::string> kRead = {"f2'", "f4'", "f8'", "b1'", "u1'", "u2'",
+                                              "u4'", "u8'", "i1'", "i2'", "i4'", "i8'"};
   demand(type.size() == 5 && kRead.contains(type.substr(2)) && (type[1] == '<' || type[1] == '>' || type[3] == '1'),
          "holds " + (type.empty() ? std::string("an unknown type") : type) +
-             ", neither floats of 4 or 8 bytes nor integers",
+             ", neither floats of up to 8 bytes nor integers",
          "save array.astype('<f4') or '<f8'");
   NpyHeader header;
   header.kind = type[2];

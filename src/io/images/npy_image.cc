@@ -76,6 +76,8 @@ void settle_codes(const ImageRequest& request, const NpyHeader& header, LoadedIm
   if (!counts && !of_bits && header.kind != 'f')
     loaded.notes.push_back(fmt::format("{}-bit {}integer: read as float, the saturation code is not known",
                                        8 * header.bytes, header.kind == 'i' ? "signed " : ""));
+  if (header.kind == 'f' && header.bytes == 2)
+    loaded.notes.push_back("16-bit float samples hold three decimal digits only");
 }
 
 /// The plain average of channels.
