@@ -50,6 +50,25 @@ def test_an_array_is_fitted_as_its_file_is(program, droplet, photograph):
     assert made_by == {"file": "photograph.tif", "sha256": hashlib.sha256(photograph.tobytes()).hexdigest()}
 
 
+def test_a_file_of_numpy_is_fitted_as_its_array(droplet, photograph, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    in_place = birefit.Job(droplet).fit(photograph).to_dict()["parameters"]
+    np.save("plain.npy", photograph)
+    np.save("swapped.npy", photograph.astype(">u2"))
+    np.save("by_columns.npy", np.asfortranarray(photograph))
+    np.save("stack.npy", np.stack([photograph // 2, photograph, photograph // 3]))
+    np.save("stack_by_columns.npy", np.asfortranarray(np.load("stack.npy")))
+    del droplet["image_size_px"]
+    for name in ("plain", "swapped", "by_columns", "stack", "stack_by_columns"):
+        droplet["micrograph"]["image"] = f"{name}.npy"
+        droplet["micrograph"].pop("page", None)
+        if "stack" in name:
+            with pytest.raises(birefit.Error, match="has 3 pictures"):
+                birefit.Job(droplet).fit()
+            droplet["micrograph"]["page"] = 1
+        assert birefit.Job(droplet).fit().to_dict()["parameters"] == in_place, name
+
+
 def test_a_result_has_values_errors_and_words(result, photograph):
     assert result.has_answer and result.grade == "answer"
     assert abs(result.values["birefringence"] - 0.152) < 5 * result.stderr["birefringence"]

@@ -137,8 +137,10 @@ CurvedRays compared(const Task& task, const Task& curved_task, const Optimum& op
   Eigen::VectorXd searched = optimum.searched;
   if (roughly) few.max_iterations = kFirstSteps;
   problem.solve(searched, few);
-  few.max_iterations = kSteps - kFirstSteps;
-  if (roughly && problem.objective() < kHopeless * straight_objective) problem.solve(searched, few);
+  if (roughly && problem.objective() < kHopeless * straight_objective) {
+    few.max_iterations = kSteps - kFirstSteps;
+    problem.solve(searched, few);
+  }
   return {change_of_unknowns(task, straight, problem.theta()), problem.objective() / straight_objective,
           (problem.objective() - straight_objective) * static_cast<double>(all) / static_cast<double>(used),
           static_cast<double>(used) / static_cast<double>(all)};

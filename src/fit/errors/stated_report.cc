@@ -138,7 +138,6 @@ void leave_nuisances(const Task& task, FitResult& result) {
     }
   for (FisherDirection& direction : result.directions)
     std::erase_if(direction.weights, [&](const auto& weight) { return !is_kept(weight.first); });
-  std::erase_if(result.profiles, [&](const ProfileTrace& trace) { return !is_kept(trace.name); });
 }
 
 void judge_misfit(const Task& task, const Optimum& optimum, const Covariances& covariances, FitResult& result) {

@@ -52,9 +52,8 @@ LoadedImage load_array(const ImageRequest& request, const ArrayImage& array) {
   if (request.page.value_or(0) > 0)
     refuse_image(request, "is an array, which has no pages", "pass the page that is meant, and leave `page` out");
   LoadedImage loaded;
-  std::vector<StoredChannel> stored(static_cast<std::size_t>(array.channels));
-  if (array.channels == 4) stored[3].no_light = true;
-  const std::vector<int> channels = channels_asked(request, stored, false, loaded.notes);
+  const std::vector<int> channels =
+      channels_asked(request, channels_of_array(static_cast<std::size_t>(array.channels)), false, loaded.notes);
   const PixelRect part = part_asked(request, array.width, array.height);
   loaded.width = array.width, loaded.height = array.height;
   loaded.x0 = part.x0, loaded.y0 = part.y0;

@@ -35,6 +35,12 @@ PixelRect part_asked(const ImageRequest& request, int width, int height) {
   return part.width() > 0 && part.height() > 0 ? part : PixelRect{};
 }
 
+std::vector<StoredChannel> channels_of_array(std::size_t count) {
+  std::vector<StoredChannel> stored(count);
+  if (count == 4) stored[3].no_light = true;
+  return stored;
+}
+
 std::vector<int> channels_asked(const ImageRequest& request, const std::vector<StoredChannel>& stored, bool palette,
                                 std::vector<std::string>& notes) {
   static const std::array<std::string, 4> kChoices = {"r", "g", "b", "mean"};

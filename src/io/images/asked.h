@@ -22,6 +22,8 @@ struct StoredChannel {
   std::string name;       ///< "R", "red", "layer.R", ..; "" = the picture does not say
   bool no_light = false;  ///< alpha, depth
 };
+/// Those of an array, which names none: of four the last says what is covered.
+std::vector<StoredChannel> channels_of_array(std::size_t count);
 /// Channels whose plain average is the image. Throws UserError where the request does not say which, or there is none
 /// such. `palette`: they were expanded from one.
 std::vector<int> channels_asked(const ImageRequest& request, const std::vector<StoredChannel>& stored, bool palette,

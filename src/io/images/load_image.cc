@@ -1,6 +1,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <new>
 #include <string>
 
 #include <unistd.h>
@@ -38,7 +39,11 @@ LoadedImage load_image(const ImageRequest& request) {
   if (::access(request.path.c_str(), R_OK) != 0)
     refuse_image(request, std::string("cannot be opened: ") + std::strerror(errno), "check its permissions");
 
-  return begins_with(request.path, kNpyMagic) ? load_npy(request) : load_by_libraries(request);
+  try {
+    return begins_with(request.path, kNpyMagic) ? load_npy(request) : load_by_libraries(request);
+  } catch (const std::bad_alloc&) {
+    refuse_image(request, "does not fit into memory", "crop it to the object, or bin it");
+  }
 }
 
 }  // namespace birefit

@@ -127,7 +127,7 @@ std::string encode_npy(std::span<const Image> channels) {
   constexpr std::size_t kBefore = 10, kMultiple = 64;
   header.append(kMultiple - 1 - (kBefore + header.size()) % kMultiple, ' ');
   header += '\n';
-  std::string file = "\x93NUMPY";
+  std::string file(kNpyMagic);
   file += {'\1', '\0', static_cast<char>(header.size() & 255), static_cast<char>(header.size() >> 8)};
   file += header;
   const auto append = [&](const double* values, std::size_t count) {
@@ -173,9 +173,7 @@ LoadedImage load_npy(const ImageRequest& request) {
   const std::size_t picture = picture_asked(request, axes->pictures);
   LoadedImage loaded;
   settle_codes(request, header, loaded);
-  std::vector<StoredChannel> stored(axes->channels);
-  if (axes->channels == kMostChannels) stored[kMostChannels - 1].no_light = true;
-  const std::vector<int> channels = channels_asked(request, stored, false, loaded.notes);
+  const std::vector<int> channels = channels_asked(request, channels_of_array(axes->channels), false, loaded.notes);
   loaded.width = static_cast<int>(axes->columns), loaded.height = static_cast<int>(axes->rows);
   loaded.colour = axes->channels >= 3;
   const PixelRect part = part_asked(request, loaded.width, loaded.height);

@@ -4,14 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <memory>
-#include <new>
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <unistd.h>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -540,8 +536,6 @@ LoadedImage load_by_libraries(const ImageRequest& request) {
     const TiffTags tags = signature.format == "tiff" ? read_tiff_tags(request.path, 1) : TiffTags{};
     if (signature.format == "raw" || is_raw_photograph(tags)) return load_raw(request, tags);
     return load_checked(request, signature);
-  } catch (const std::bad_alloc&) {
-    refuse_image(request, "does not fit into memory", "crop it to the object, or bin it");
   } catch (const std::length_error&) {  // of a library that believes a header
     refuse_damaged(request, signature, " (it states a size that no memory holds)");
   }
