@@ -14,7 +14,6 @@
 
 namespace birefit {
 namespace {
-constexpr double kPi = std::numbers::pi;
 
 // The table is rounded to 1e-10.
 TEST(StressedDisc, StressesOfTheReferenceTable) {
@@ -26,14 +25,15 @@ TEST(StressedDisc, StressesOfTheReferenceTable) {
     EXPECT_NEAR(s.shear, 2 * table.number(i, "sxy_tR_over_P"), 4e-10);
     EXPECT_NEAR(std::hypot(s.normal, s.shear), table.number(i, "s1_minus_s2"), 4e-10);
     if (std::hypot(s.normal, s.shear) < 1e-6) continue;  // no direction
-    const double turn = 0.5 * std::atan2(s.shear, s.normal) - table.number(i, "alpha_s1_deg_from_x") * kPi / 180;
+    const double turn =
+        0.5 * std::atan2(s.shear, s.normal) - table.number(i, "alpha_s1_deg_from_x") * std::numbers::pi / 180;
     EXPECT_NEAR(std::sin(turn), 0, 1e-6) << x << " " << y;
   }
 }
 
 TEST(StressedDisc, CentreInClosedForm) {
   const StressPair<double> s = diametral_stress(0.0, 0.0);  // sxx = P/(pi R t), syy = -3 P/(pi R t)
-  EXPECT_NEAR(s.normal, 4 / kPi, 1e-11);
+  EXPECT_NEAR(s.normal, 4 / std::numbers::pi, 1e-11);
   EXPECT_NEAR(s.shear, 0, 1e-15);
 }
 
@@ -61,8 +61,8 @@ TEST(StressedDisc, EquilibriumAndCompatibility) {
 TEST(StressedDisc, RimIsFreeOfTraction) {
   const double h = 1e-5;
   for (double angle_deg : {0.0, 20.0, 45.0, 70.0, 160.0, 230.0}) {
-    const double c = std::cos(angle_deg * kPi / 180), s = std::sin(angle_deg * kPi / 180);
-    double mean = -1 / kPi;
+    const double c = std::cos(angle_deg * std::numbers::pi / 180), s = std::sin(angle_deg * std::numbers::pi / 180);
+    double mean = -1 / std::numbers::pi;
     const int steps = 4000;
     for (int i = 0; i < steps; ++i) {  // midpoints
       const double r = (i + 0.5) / steps, x = r * c, y = r * s;
@@ -120,7 +120,7 @@ TEST(StressedDisc, ImagesOfBothPolariscopesAreTheTextbooks) {
       const DiscScene s = scene_of(d, 64, 110);
       const Theta theta = s.t.table.values();
       const Image image = render(s.scene, plan(s.scene, theta), theta).intensity;
-      const double load = azimuth * kPi / 180, radius = d.radius_um / d.um_per_px;
+      const double load = azimuth * std::numbers::pi / 180, radius = d.radius_um / d.um_per_px;
       double worst = 0;
       int compared = 0;
       for (int row = 0; row < 64; row += 2)
@@ -177,12 +177,13 @@ TEST(StressedDisc, AnyAnalyserBehindTheQuarterWavePlates) {
       DiscScene s = scene_of(d, 3, analyzer_deg);
       const Theta theta = s.t.table.values();
       const double got = render(s.scene, plan(s.scene, theta), theta).intensity(1, 1);
-      const double delta = 2 * kPi / (d.wavelength_nm * 1e-3) * d.stress_optic_brewster * load * 4 / kPi / d.radius_um;
-      const double p = 13 * kPi / 180, a = analyzer_deg * kPi / 180;
+      const double delta = 2 * std::numbers::pi / (d.wavelength_nm * 1e-3) * d.stress_optic_brewster * load * 4 /
+                           std::numbers::pi / d.radius_um;
+      const double p = 13 * std::numbers::pi / 180, a = analyzer_deg * std::numbers::pi / 180;
       std::array<C, 2> e{std::cos(p), std::sin(p)};
-      e = times(plate(p + kPi / 4, kPi / 2), e);
-      e = times(plate((50 - 90) * kPi / 180, delta), e);
-      e = times(plate(p - kPi / 4, kPi / 2), e);
+      e = times(plate(p + std::numbers::pi / 4, std::numbers::pi / 2), e);
+      e = times(plate((50 - 90) * std::numbers::pi / 180, delta), e);
+      e = times(plate(p - std::numbers::pi / 4, std::numbers::pi / 2), e);
       EXPECT_NEAR(got, std::norm(std::cos(a) * e[0] + std::sin(a) * e[1]), 1e-6)
           << analyzer_deg << " " << load;  // over one um of 6 mm
     }

@@ -20,8 +20,8 @@ namespace birefit {
 namespace {
 
 using namespace image_files;
-using testing::Contains;
-using testing::IsEmpty;
+using ::testing::Contains;
+using ::testing::IsEmpty;
 
 // ---- values ---------------------------------------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ namespace birefit {
 namespace {
 
 using namespace image_files;
-using testing::IsEmpty;
+using ::testing::IsEmpty;
 
 class ImageWriting : public ImageFile {};
 

@@ -26,10 +26,10 @@ namespace fs = std::filesystem;
 /// Codes without a pattern that a shift would keep.
 double code(int x, int y) { return (x * 7919 + y * 104729 + x * y) % 60013; }
 
-class Region : public testing::Test {
+class Region : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / ("birefit_region_" + std::to_string(getpid()));
+    folder_ = fs::path(::testing::TempDir()) / ("birefit_region_" + std::to_string(getpid()));
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
@@ -213,7 +213,7 @@ TEST_F(Region, OfItsOwnIsEachPicturesPart) {
     for (int x = 0; x < part.values.width(); ++x) ASSERT_EQ(part.values(x, y), whole.values(x + 3, y + 5));
   EXPECT_NE(part.name, whole.name);
   EXPECT_THAT(mistake("calibration: {dark: a.tif, parallel: a.tif}\n" + config),
-              testing::HasSubstr("a region of its own is given beside calibration frames"));
+              ::testing::HasSubstr("a region of its own is given beside calibration frames"));
 }
 
 // An even picture that the camera has cut off is a single code, which tells nothing of the light, and shows no noise
@@ -226,7 +226,7 @@ TEST_F(Region, OfOneCodeAsBrightAsAnyIsSaturated) {
       "sample: {crystal: {half_wave_voltage_v: {value: 700, fit: [400, 900]}, field_along: y}}\n"
       "microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}\n";
   write_even("a.tif", 3000, 20), write_even("b.tif", 14000, 40), write_even("c.tif", 25105, 0);
-  EXPECT_THAT(mistake(config), testing::HasSubstr("c.tif: all of its pixels are 25105 counts"));
+  EXPECT_THAT(mistake(config), ::testing::HasSubstr("c.tif: all of its pixels are 25105 counts"));
   write_even("c.tif", 25105, 50);
   EXPECT_EQ(mistake(config), "");
   write_even("a.tif", 3000, 0);
@@ -238,12 +238,12 @@ TEST_F(Region, WhatCannotBeBinnedIsSaid) {
   const auto with = [](const std::string& keys) {
     return "micrograph: {image: a.tif, pixel_size_um: 0.25, " + keys + "}\n" + kDroplet;
   };
-  EXPECT_THAT(mistake(with("bin: 2, bayer: rggb, channel: g")), testing::HasSubstr("bin is given beside bayer"));
-  EXPECT_THAT(mistake(with("bin: 0")), testing::HasSubstr("bin"));
-  EXPECT_THAT(mistake(with("bin: 1.5")), testing::HasSubstr("bin"));
-  EXPECT_THAT(mistake(with("bin: 40")), testing::HasSubstr("bin = 40 is more than the 32 x 32 pixels of a.tif"));
-  EXPECT_THAT(mistake(with("roi_px: [4, 4, 40, 9]")), testing::HasSubstr("reaches outside a.tif, which is 32 x 32"));
-  EXPECT_THAT(mistake(with("roi_px: [40, 40, 50, 50]")), testing::HasSubstr("reaches outside a.tif"));
+  EXPECT_THAT(mistake(with("bin: 2, bayer: rggb, channel: g")), ::testing::HasSubstr("bin is given beside bayer"));
+  EXPECT_THAT(mistake(with("bin: 0")), ::testing::HasSubstr("bin"));
+  EXPECT_THAT(mistake(with("bin: 1.5")), ::testing::HasSubstr("bin"));
+  EXPECT_THAT(mistake(with("bin: 40")), ::testing::HasSubstr("bin = 40 is more than the 32 x 32 pixels of a.tif"));
+  EXPECT_THAT(mistake(with("roi_px: [4, 4, 40, 9]")), ::testing::HasSubstr("reaches outside a.tif, which is 32 x 32"));
+  EXPECT_THAT(mistake(with("roi_px: [40, 40, 50, 50]")), ::testing::HasSubstr("reaches outside a.tif"));
 }
 
 }  // namespace

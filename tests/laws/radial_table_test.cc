@@ -14,7 +14,7 @@ namespace birefit {
 namespace {
 using namespace testing;
 
-struct Case {
+struct RadialCase {
   const char* name;
   double wall_um;    ///< 0: no core
   double twist_deg;  ///< 0: none
@@ -24,7 +24,7 @@ struct Case {
   double field = 0, ring = 0;  ///< along the view; 0: none
 };
 
-const Case kCases[] = {
+const RadialCase kRadialCases[] = {
     {"droplet", 0, 0, 1.43, 0, true},
     {"twisted droplet", 0, 60, 1.43, 0, true},
     {"thick wall", 2.5, 0, 1.43, 0, true},
@@ -36,7 +36,7 @@ const Case kCases[] = {
 };
 
 TEST(RadialTable, IsThePictureOfOneRayAPoint) {
-  for (const Case& c : kCases) {
+  for (const RadialCase& c : kRadialCases) {
     TableBuilder b;
     Scene s;
     Droplet droplet;

@@ -11,7 +11,7 @@
 namespace birefit {
 namespace {
 
-constexpr int kSize = 160;
+constexpr int kSide = 160;
 constexpr std::array<std::array<double, 2>, 2> kCell = {{{90, 45}, {135, 0}}};
 
 /// Codes of a smooth scene whose light is polarized by `purity` in a direction that turns across it; `gain` of the
@@ -19,10 +19,10 @@ constexpr std::array<std::array<double, 2>, 2> kCell = {{{90, 45}, {135, 0}}};
 Image codes(double gamma, double purity, double turns, double gain, double black) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise(0, 0.5);
-  Image image(kSize, kSize);
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
-      const double azimuth = std::numbers::pi * turns * x / kSize, light = 0.3 + 0.4 * std::pow(std::sin(0.03 * y), 2);
+  Image image(kSide, kSide);
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const double azimuth = std::numbers::pi * turns * x / kSide, light = 0.3 + 0.4 * std::pow(std::sin(0.03 * y), 2);
       const double analyser = kCell[static_cast<std::size_t>(y % 2)][static_cast<std::size_t>(x % 2)];
       double value = light * (1 + purity * std::cos(2 * (azimuth - analyser * std::numbers::pi / 180))) / 2;
       if (analyser == 45) value *= gain;
@@ -31,7 +31,7 @@ Image codes(double gamma, double purity, double turns, double gain, double black
   return image;
 }
 std::optional<AnalyserSums> sums(const Image& image) {
-  return analyser_sums(image, Mask(kSize, kSize, 1), {0, 0, kSize, kSize}, kCell);
+  return analyser_sums(image, Mask(kSide, kSide, 1), {0, 0, kSide, kSide}, kCell);
 }
 
 TEST(AnalyserSums, TellTheGammaOfTheCodes) {
@@ -60,7 +60,7 @@ TEST(AnalyserSums, SayNothingOfOneDirectionUnpolarizedLightAndOtherAngles) {
   const auto found = sums(codes(2.2, 0, 1, 1, 0));
   EXPECT_TRUE(!found || found->error > 0.3) << found->gamma << ' ' << found->error;
   EXPECT_FALSE(
-      analyser_sums(codes(2.2, 0.8, 1, 1, 0), Mask(kSize, kSize, 1), {0, 0, kSize, kSize}, {{{0, 30}, {60, 90}}}));
+      analyser_sums(codes(2.2, 0.8, 1, 1, 0), Mask(kSide, kSide, 1), {0, 0, kSide, kSide}, {{{0, 30}, {60, 90}}}));
 }
 
 }  // namespace

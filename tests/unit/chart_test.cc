@@ -17,8 +17,8 @@
 namespace birefit {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -115,7 +115,7 @@ TEST(Charts, MarksAreCirclesAndTriangles) {
   series.width = 8;
   series.mark = Series::Mark::circle;
   EXPECT_THAT(draw_series(series, x, y),
-              testing::AllOf(HasSubstr("M146.0 200.0a4.00 4.00"), HasSubstr("fill=\"none\"")));
+              ::testing::AllOf(HasSubstr("M146.0 200.0a4.00 4.00"), HasSubstr("fill=\"none\"")));
   series.mark = Series::Mark::up;
   EXPECT_THAT(draw_series(series, x, y), HasSubstr("M150.0 195.4l4.00 6.92h-8.00z"));
   series.mark = Series::Mark::down;
@@ -161,7 +161,7 @@ TEST(Charts, WhatIsNoNumberIsNotDrawn) {
       chart.log_x = chart.panels[0].log_y = log;
       const std::string file = svg_file({"", {chart}, 2, all});
       expect_well_formed(file);
-      EXPECT_THAT(file, Not(testing::ContainsRegex("[ \"ML]-?(nan|inf)")));
+      EXPECT_THAT(file, Not(::testing::ContainsRegex("[ \"ML]-?(nan|inf)")));
     }
   }
   expect_well_formed(svg_file(Sheet{}));

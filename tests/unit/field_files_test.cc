@@ -18,7 +18,7 @@
 namespace birefit {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 VolumeRequest request(const std::string& name) {
   VolumeRequest r;
@@ -56,20 +56,20 @@ void expect_field(const LoadedVolume& volume) {
       }
 }
 
-class FieldFile : public testing::TestWithParam<const char*> {};
+class FieldFile : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(FieldFile, HoldsTheField) { expect_field(load_volume(request(GetParam()))); }
 
 INSTANTIATE_TEST_SUITE_P(Programs, FieldFile,
-                         testing::Values("field_ascii.vti", "field_zlib_inline.vti", "field_zlib_appended.vti",
-                                         "field_zlib_raw.vti", "field_lz4_inline.vti", "field_lz4_appended.vti",
-                                         "field_lz4_raw.vti", "field_lzma_inline.vti", "field_lzma_appended.vti",
-                                         "field_lzma_raw.vti", "field_one_block.vti", "field_whole_blocks.vti",
-                                         "field_big_endian.vti", "field_big_endian_zlib.vti", "points_ascii.vtk",
-                                         "points_binary.vtk", "grid_ascii.vtk", "grid_binary.vtk", "tensors_ascii.vtk",
-                                         "field_stored.npz", "field_deflated.npz", "field_big_endian.npy", "q.npy",
-                                         "q_three_halves_small.npy", "open_qmin_small.txt", "field_masked.npz",
-                                         "field_integers.npy"),
+                         ::testing::Values("field_ascii.vti", "field_zlib_inline.vti", "field_zlib_appended.vti",
+                                           "field_zlib_raw.vti", "field_lz4_inline.vti", "field_lz4_appended.vti",
+                                           "field_lz4_raw.vti", "field_lzma_inline.vti", "field_lzma_appended.vti",
+                                           "field_lzma_raw.vti", "field_one_block.vti", "field_whole_blocks.vti",
+                                           "field_big_endian.vti", "field_big_endian_zlib.vti", "points_ascii.vtk",
+                                           "points_binary.vtk", "grid_ascii.vtk", "grid_binary.vtk",
+                                           "tensors_ascii.vtk", "field_stored.npz", "field_deflated.npz",
+                                           "field_big_endian.npy", "q.npy", "q_three_halves_small.npy",
+                                           "open_qmin_small.txt", "field_masked.npz", "field_integers.npy"),
                          [](const auto& info) {
                            std::string name = info.param;
                            for (char& c : name)
@@ -89,8 +89,8 @@ TEST(FieldFiles, ArraysAreChosenByName) {
 TEST(FieldFiles, TheNormOfQIsAskedForWhereTheOrderTellsTheOther) {
   VolumeRequest r = request("q_three_halves_small.npy");
   r.bulk_order = 0.5;
-  EXPECT_THAT(error_of(r), testing::AllOf(HasSubstr("Q = S (n n - 1/3)"), HasSubstr("Q = 3/2 S (n n - 1/3)"),
-                                          HasSubstr("q_norm: 1.5")));
+  EXPECT_THAT(error_of(r), ::testing::AllOf(HasSubstr("Q = S (n n - 1/3)"), HasSubstr("Q = 3/2 S (n n - 1/3)"),
+                                            HasSubstr("q_norm: 1.5")));
   r.q_norm = 1.5;
   expect_field(load_volume(r));
   r.q_norm = 1;  // as it is, then: with a warning
@@ -107,7 +107,7 @@ TEST(FieldFiles, TheNormOfQIsAskedForWhereTheOrderTellsTheOther) {
 
 TEST(FieldFiles, DamagedOnesAreRefused) {
   const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / ("fields_" + std::to_string(getpid()));
+      std::filesystem::path(::testing::TempDir()) / ("fields_" + std::to_string(getpid()));
   std::filesystem::create_directories(folder);
   for (const char* name : {"field_zlib_appended.vti", "field_lz4_raw.vti", "field_lzma_inline.vti", "points_binary.vtk",
                            "grid_ascii.vtk", "field_deflated.npz", "field_stored.npz", "open_qmin_small.txt"}) {

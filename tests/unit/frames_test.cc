@@ -16,9 +16,9 @@ namespace birefit {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::Contains;
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 class FrameFiles : public ::testing::Test {
  protected:
@@ -117,7 +117,7 @@ TEST_F(FrameFiles, TheOneOfSeveralThatIsRenderedIsNamed) {
   expose("b.tif", 1, 2);
   EXPECT_THAT(warnings("micrographs: [{image: a.tif}, {image: b.tif}]" + kCrystal),
               Contains(HasSubstr("Of 2 micrographs the first is shown, a.tif")));
-  EXPECT_THAT(warnings("micrographs: [{image: a.tif}]" + kCrystal), testing::Not(Contains(HasSubstr("is shown"))));
+  EXPECT_THAT(warnings("micrographs: [{image: a.tif}]" + kCrystal), ::testing::Not(Contains(HasSubstr("is shown"))));
 }
 
 // ---- calibration ----------------------------------------------------------------------------------------------------
@@ -227,7 +227,7 @@ TEST_F(CalibrationFrames, AClippedLightIsLeftOutOrRefused) {
 
 // ---- signal: {frames, roi_px} ---------------------------------------------------------------------------------------
 
-const std::string kCell = R"(
+const std::string kFieldCell = R"(
 microscope: {light: {wavelength_nm: 633}, polarizer_deg: 0, analyzer_deg: 90}
 sample:
   cell:
@@ -243,7 +243,7 @@ TEST_F(FrameFiles, HaveMeansThatAreATable) {
   write("f9.tif", "");  // is left out
   write("sweep.csv", "file,volts\nf3.tif,0.5\nf0.tif,1\nf1.tif,1.5\nf2.tif,2\nf9.tif,2.5\n");
   const Config config = load("signal: {frames: \"f*.tif\", set_from: sweep.csv, roi_px: [2, 0, 5, 6], columns: {" +
-                             voltage + ": volts}, noise: 1}" + kCell);
+                             voltage + ": volts}, noise: 1}" + kFieldCell);
   const Readings& rows = readings(config.job, 0);
   ASSERT_EQ(rows.values.size(), 4);
   EXPECT_DOUBLE_EQ(rows.values[0], (2 * 13 + 90) / 3.0);
@@ -257,18 +257,18 @@ TEST_F(FrameFiles, OfAStackAreASweepByTheirNumber) {
   const Config config = load(
       "signal: {frames: stack_imagej.tif, columns: {sample.cell.director.freedericksz.voltage_v: {column: frame, "
       "scale: 0.5}}, noise: 1}\nmicrograph: {page: {c: 0}}" +
-      kCell);
+      kFieldCell);
   EXPECT_THAT(config.signals[0].x, ElementsAre(0, 0.5, 1));
   EXPECT_EQ(readings(config.job, 0).values, Eigen::Vector3d(100, 102, 104));
 }
 
 TEST_F(FrameFiles, OfATableAreNotBesideAFile) {
   const std::string columns = "columns: {sample.cell.director.freedericksz.voltage_v: frame}";
-  EXPECT_THAT(problems("signal: {frames: f.tif, file: a.csv, " + columns + "}" + kCell),
+  EXPECT_THAT(problems("signal: {frames: f.tif, file: a.csv, " + columns + "}" + kFieldCell),
               HasSubstr("frames is given beside file"));
-  EXPECT_THAT(problems("signal: {file: a.csv, roi_px: [0, 0, 1, 1], " + columns + "}" + kCell),
+  EXPECT_THAT(problems("signal: {file: a.csv, roi_px: [0, 0, 1, 1], " + columns + "}" + kFieldCell),
               HasSubstr("roi_px is of frames"));
-  EXPECT_THAT(problems("signal: {frames: stack_imagej.tif, roi_px: [0, 0, 90, 1], " + columns + "}" + kCell),
+  EXPECT_THAT(problems("signal: {frames: stack_imagej.tif, roi_px: [0, 0, 90, 1], " + columns + "}" + kFieldCell),
               HasSubstr("reaches outside"));
 }
 

@@ -24,11 +24,11 @@ namespace birefit {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::Contains;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
-class NpyImage : public testing::Test {
+class NpyImage : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::temp_directory_path() / ("birefit_npy_" + std::to_string(::getpid()));

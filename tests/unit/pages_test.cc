@@ -15,16 +15,16 @@
 namespace birefit {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
-std::filesystem::path file(const std::string& name) {
+std::filesystem::path stack(const std::string& name) {
   return std::filesystem::path(BIREFIT_SOURCE_DIR) / "tests/data/files" / name;
 }
 
 std::vector<std::string> labels(const std::string& name) {
   std::vector<std::string> all;
-  for (const StackPage& page : stack_pages(file(name))) all.push_back(page.label());
+  for (const StackPage& page : stack_pages(stack(name))) all.push_back(page.label());
   return all;
 }
 
@@ -37,26 +37,26 @@ TEST(StackPages, HaveTheirPlacesOrTheirNumbers) {
 
 TEST(StackPages, OfOtherFilesAreOneWithoutANumber) {
   for (const char* name : {"droplet.tif", "mask_pillow_1bit.png", "droplet_thumbnail_first.dng", "no_such_file.tif"}) {
-    ASSERT_EQ(stack_pages(file(name)).size(), 1u) << name;
-    EXPECT_FALSE(stack_pages(file(name))[0].number) << name;
+    ASSERT_EQ(stack_pages(stack(name)).size(), 1u) << name;
+    EXPECT_FALSE(stack_pages(stack(name))[0].number) << name;
   }
 }
 
 // The page that a cut loses is one to ask for in vain, not one that never was.
 TEST(StackPages, OfAFileThatWasCutOffEndWithAPageThatIsNotThere) {
   EXPECT_THAT(labels("stack_imagej_cut.tif"), ElementsAre("t0_c0", "t0_c1", "t1_c0"));
-  EXPECT_NO_THROW(load_image({file("stack_imagej_cut.tif"), 1, "", {}}));
-  EXPECT_THROW(load_image({file("stack_imagej_cut.tif"), 2, "", {}}), UserError);
+  EXPECT_NO_THROW(load_image({stack("stack_imagej_cut.tif"), 1, "", {}}));
+  EXPECT_THROW(load_image({stack("stack_imagej_cut.tif"), 2, "", {}}), UserError);
 }
 
-class PageByPlace : public testing::Test {
+class PageByPlace : public ::testing::Test {
  protected:
   /// The number of the page that `page: {..}` names; -1 and `said` where it is not one.
   int page(const std::string& name, const std::string& places) {
     ConfigReader reader("c.yaml", {}, ConfigUse::fit);
     const YamlNode tree = parse_yaml("page: " + places + "\n", "c.yaml", reader.problems);
     PageChoice choice = read_page(reader, {&tree, "", {}});
-    const bool settled = settle_page(reader, file(name), choice);
+    const bool settled = settle_page(reader, stack(name), choice);
     said = reader.problems.empty() ? "" : to_string(reader.problems.all()[0]);
     EXPECT_EQ(settled, said.empty());
     return settled ? choice.number.value_or(-1) : -1;

@@ -14,8 +14,8 @@
 namespace birefit {
 namespace {
 
-using testing::Contains;
-using testing::HasSubstr;
+using ::testing::Contains;
+using ::testing::HasSubstr;
 
 std::filesystem::path file(const std::string& name) {
   return std::filesystem::path(BIREFIT_SOURCE_DIR) / "tests/data/files" / name;
@@ -26,7 +26,7 @@ LoadedImage image(const std::string& name) { return load_image({file(name), {}, 
 
 bool in_disc(int x, int y) { return (x - 8) * (x - 8) + (y - 6) * (y - 6) <= 31; }
 
-class MaskFile : public testing::TestWithParam<const char*> {};
+class MaskFile : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(MaskFile, SelectsTheDiscAndSaysSo) {
   const LoadedMask loaded = mask(GetParam());
@@ -38,11 +38,11 @@ TEST_P(MaskFile, SelectsTheDiscAndSaysSo) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, MaskFile,
-                         testing::Values("mask_pillow_1bit.tif", "mask_pillow_1bit.png", "mask_pillow_1bit.bmp",
-                                         "mask_pillow_group4.tif", "mask_pillow_8bit.tif", "mask_pillow_palette.png",
-                                         "mask_pillow_palette.tif", "mask_big_endian_1bit.tif",
-                                         "mask_white_is_zero_1bit.tif", "mask_imagej_inverting.tif",
-                                         "mask_imagej_inverting_16bit.tif"));
+                         ::testing::Values("mask_pillow_1bit.tif", "mask_pillow_1bit.png", "mask_pillow_1bit.bmp",
+                                           "mask_pillow_group4.tif", "mask_pillow_8bit.tif", "mask_pillow_palette.png",
+                                           "mask_pillow_palette.tif", "mask_big_endian_1bit.tif",
+                                           "mask_white_is_zero_1bit.tif", "mask_imagej_inverting.tif",
+                                           "mask_imagej_inverting_16bit.tif"));
 
 TEST(MaskFiles, SayWhichSideOfAnInvertingTableIsTaken) {
   EXPECT_THAT(mask("mask_imagej_inverting.tif").notes, Contains(HasSubstr("not stored as 0 (white is zero")));
@@ -64,7 +64,7 @@ struct Depth {
   const char* name;
   double top;  // of the ramp of 32 steps
 };
-class WhiteIsZero : public testing::TestWithParam<Depth> {};
+class WhiteIsZero : public ::testing::TestWithParam<Depth> {};
 
 TEST_P(WhiteIsZero, IsTurnedRoundAtEveryDepth) {
   const LoadedImage loaded = image(GetParam().name);
@@ -77,13 +77,13 @@ TEST_P(WhiteIsZero, IsTurnedRoundAtEveryDepth) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Depths, WhiteIsZero,
-                         testing::Values(Depth{"white_is_zero_2.tif", 3}, Depth{"white_is_zero_4.tif", 15},
-                                         Depth{"white_is_zero_8.tif", 255}, Depth{"white_is_zero_10.tif", 1023},
-                                         Depth{"white_is_zero_12.tif", 4095}, Depth{"white_is_zero_14.tif", 16383},
-                                         Depth{"white_is_zero_16.tif", 65535},
-                                         Depth{"white_is_zero_big_endian_16.tif", 62000},
-                                         Depth{"white_is_zero_32.tif", 4294967295.0},
-                                         Depth{"white_is_zero_float.tif", 1}, Depth{"white_is_zero_signed.tif", 31}),
+                         ::testing::Values(Depth{"white_is_zero_2.tif", 3}, Depth{"white_is_zero_4.tif", 15},
+                                           Depth{"white_is_zero_8.tif", 255}, Depth{"white_is_zero_10.tif", 1023},
+                                           Depth{"white_is_zero_12.tif", 4095}, Depth{"white_is_zero_14.tif", 16383},
+                                           Depth{"white_is_zero_16.tif", 65535},
+                                           Depth{"white_is_zero_big_endian_16.tif", 62000},
+                                           Depth{"white_is_zero_32.tif", 4294967295.0},
+                                           Depth{"white_is_zero_float.tif", 1}, Depth{"white_is_zero_signed.tif", 31}),
                          [](const auto& info) {
                            std::string name = info.param.name;
                            return name.substr(0, name.find('.'));

@@ -26,9 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -343,9 +343,9 @@ TEST(Report, ShowsEverySection) {
 TEST(Report, SaysWhereItComesFrom) {
   const Case c = make_case();
   const std::string html = report_html(c.config, c.result);
-  EXPECT_THAT(html, testing::ContainsRegex("<dt>program</dt><dd>birefit [0-9.]+, Fourier transforms by "));
-  EXPECT_THAT(html, testing::ContainsRegex("<dt>run</dt><dd>[0-9-]+T[0-9:]+Z on "));
-  EXPECT_THAT(html, testing::ContainsRegex("<code>[0-9a-f]{64}</code>"));
+  EXPECT_THAT(html, ::testing::ContainsRegex("<dt>program</dt><dd>birefit [0-9.]+, Fourier transforms by "));
+  EXPECT_THAT(html, ::testing::ContainsRegex("<dt>run</dt><dd>[0-9-]+T[0-9:]+Z on "));
+  EXPECT_THAT(html, ::testing::ContainsRegex("<code>[0-9a-f]{64}</code>"));
 }
 
 // A closed <details> is not on paper.
@@ -366,7 +366,8 @@ TEST(Report, SaysInWordsWhatItsPicturesShow) {
   int images = 0, charts = 0;
   for (std::sregex_iterator at(html.begin(), html.end(), picture), end; at != end; ++at) {
     ++((*at)[1] == "image" ? images : charts);
-    EXPECT_THAT((*at)[2].str(), testing::ContainsRegex((*at)[1] == "image" ? "pixels, .* from " : "Against .* from "));
+    EXPECT_THAT((*at)[2].str(),
+                ::testing::ContainsRegex((*at)[1] == "image" ? "pixels, .* from " : "Against .* from "));
   }
   EXPECT_EQ(images, 3);
   EXPECT_GE(charts, 2);
@@ -447,10 +448,10 @@ TEST(NiceTicks, AreMultiplesOfOneTwoOrFive) {
 
 // ---- the folder -----------------------------------------------------------------------------------------------------
 
-class WriteResults : public testing::Test {
+class WriteResults : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / ("birefit_results_" + std::to_string(getpid()));
+    folder_ = fs::path(::testing::TempDir()) / ("birefit_results_" + std::to_string(getpid()));
     fs::remove_all(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
@@ -462,8 +463,8 @@ TEST_F(WriteResults, WritesEveryFileAndNothingElse) {
   write_results(folder_ / "a" / "b", c.config, c.result);
   std::vector<std::string> names;
   for (const auto& entry : fs::directory_iterator(folder_ / "a" / "b")) names.push_back(entry.path().filename());
-  EXPECT_THAT(names, testing::UnorderedElementsAre("fit.json", "report.html", "fitted.tif", "residual.tif",
-                                                   "config.yaml", "log.txt"));
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("fit.json", "report.html", "fitted.tif", "residual.tif",
+                                                     "config.yaml", "log.txt"));
   std::ifstream echo(folder_ / "a" / "b" / "config.yaml");
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(echo), {}), c.config.text);
   const LoadedImage residual = load_image({folder_ / "a" / "b" / "residual.tif", {}, "", {}});
@@ -487,8 +488,8 @@ TEST_F(WriteResults, PicturesOfAnEarlierFitGoAway) {
   write_results(folder_, c.config, c.result);
   std::vector<std::string> names;
   for (const auto& entry : fs::directory_iterator(folder_)) names.push_back(entry.path().filename());
-  EXPECT_THAT(names, testing::UnorderedElementsAre("fit.json", "report.html", "fitted.tif", "residual.tif",
-                                                   "config.yaml", "log.txt", "fitted_by_me.tif"));
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("fit.json", "report.html", "fitted.tif", "residual.tif",
+                                                     "config.yaml", "log.txt", "fitted_by_me.tif"));
   EXPECT_EQ(load_image({folder_ / "fitted.tif", {}, "", {}}).pixel_size_um, 0.2);
 }
 

@@ -14,7 +14,7 @@ constexpr double kLeastSide = 0.1;
 constexpr double kLeast = 0.25, kMost = 4;  // gammas
 
 /// The pixels of a cell, a crossed pair behind the other, and the tile it lies in.
-struct Cell {
+struct MosaicCell {
   std::array<double, 4> value;
   std::size_t tile;
 };
@@ -43,7 +43,7 @@ std::optional<std::array<std::array<int, 2>, 4>> crossed_pairs(const std::array<
 struct Share {
   double sums, polarized;
 };
-Share share_of(const Cell& cell, double gamma) {
+Share share_of(const MosaicCell& cell, double gamma) {
   std::array<double, 4> light;
   for (std::size_t i = 0; i < 4; ++i) light[i] = std::pow(cell.value[i], gamma);
   const double a = light[0] + light[1], b = light[2] + light[3], mean = 0.5 * (a + b);
@@ -57,10 +57,10 @@ struct Balance {
   double covariance = 0, mismatch = 0, lesser_side = 0;
   std::vector<double> of_tile;
 };
-Balance balance(const std::vector<Cell>& cells, double gamma) {
+Balance balance(const std::vector<MosaicCell>& cells, double gamma) {
   double mean = 0, weights = 0, first = 0;
   std::vector<Share> shares;
-  for (const Cell& cell : cells) {
+  for (const MosaicCell& cell : cells) {
     shares.push_back(share_of(cell, gamma));
     mean += shares.back().polarized / static_cast<double>(cells.size());
   }
@@ -81,17 +81,17 @@ Balance balance(const std::vector<Cell>& cells, double gamma) {
   return all;
 }
 
-std::vector<Cell> cells_of(const Image& values, const Mask& usable, const PixelRect& area,
-                           const std::array<std::array<int, 2>, 4>& pairs) {
+std::vector<MosaicCell> cells_of(const Image& values, const Mask& usable, const PixelRect& area,
+                                 const std::array<std::array<int, 2>, 4>& pairs) {
   const int x0 = std::max(area.x0, 0) / 2, y0 = std::max(area.y0, 0) / 2, x1 = std::min(area.x1, values.width()) / 2,
             y1 = std::min(area.y1, values.height()) / 2, width = x1 - x0, height = y1 - y0;
-  std::vector<Cell> cells;
+  std::vector<MosaicCell> cells;
   if (width < kTiles || height < kTiles) return cells;
   int step = 1;
   while (static_cast<std::size_t>(width / step) * static_cast<std::size_t>(height / step) > kCells) ++step;
   for (int y = y0; y < y1; y += step)
     for (int x = x0; x < x1; x += step) {
-      Cell cell{};
+      MosaicCell cell{};
       bool good = true;
       for (std::size_t i = 0; i < 4; ++i) {
         const int column = 2 * x + pairs[i][0], row = 2 * y + pairs[i][1];
@@ -110,9 +110,9 @@ std::optional<AnalyserSums> analyser_sums(const Image& values, const Mask& usabl
                                           const std::array<std::array<double, 2>, 2>& analyser_deg) {
   const auto pairs = crossed_pairs(analyser_deg);
   if (!pairs) return std::nullopt;
-  const std::vector<Cell> cells = cells_of(values, usable, area, *pairs);
+  const std::vector<MosaicCell> cells = cells_of(values, usable, area, *pairs);
   std::vector<std::size_t> tiles;
-  for (const Cell& cell : cells) tiles.push_back(cell.tile);
+  for (const MosaicCell& cell : cells) tiles.push_back(cell.tile);
   std::sort(tiles.begin(), tiles.end());
   tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
   if (tiles.size() < kFewest) return std::nullopt;

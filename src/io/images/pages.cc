@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMostPages = 65536;
 
 /// The sizes of a stack along three axes, the fastest first, named by 'T', 'Z' and 'C'.
-struct Axes {
+struct StackAxes {
   std::array<char, 3> name{};
   std::array<int, 3> size{1, 1, 1};
 
@@ -39,7 +39,7 @@ int count_of(double value) { return value >= 1 && value <= double(kMostPages) ? 
 /// `images`: how many there should be; of a file that was cut off there are fewer.
 void place_by_imagej(const std::string& description, std::size_t images, std::vector<StackPage>& pages) {
   const auto count = [&](const char* key) { return count_of(number_or_zero(imagej_value(description, key))); };
-  const Axes axes{{'C', 'Z', 'T'}, {count("channels"), count("slices"), count("frames")}};
+  const StackAxes axes{{'C', 'Z', 'T'}, {count("channels"), count("slices"), count("frames")}};
   if (axes.planes() != images) return;
   for (std::size_t i = 0; i < pages.size(); ++i) axes.place(i, pages[i]);
 }
@@ -57,7 +57,7 @@ void place_by_ome(const std::string& description, const std::string& file_name, 
   const pugi::xml_node pixels = only_pixels(document);
   const std::string order = pixels.attribute("DimensionOrder").value();
   if (order.size() != 5) return;
-  Axes axes{{order[2], order[3], order[4]}, {}};
+  StackAxes axes{{order[2], order[3], order[4]}, {}};
   const pugi::xml_node channel = pixels.select_node("*[local-name()='Channel']").node();
   const int samples = std::max(channel.attribute("SamplesPerPixel").as_int(1), 1);  // colours of one page
   for (std::size_t k = 0; k < 3; ++k) {

@@ -7,6 +7,9 @@
 
 namespace birefit {
 
+/// Colours of text and curves, and of the lines around them.
+constexpr const char *kInk = "#2b2f36", *kFrame = "#8a919b";
+
 /// From values to places on the page; by their logarithm where `log`.
 struct AxisScale {
   double low = 0, high = 1, from = 0, to = 1;

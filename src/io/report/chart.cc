@@ -14,9 +14,7 @@ namespace {
 
 constexpr double kLeft = 62, kRight = 14, kTop = 8, kBottom = 44, kGap = 14, kLegend = 20, kHeading = 20;
 constexpr double kEntry = 17;  ///< a line of a sheet's legend
-constexpr const char* kInk = "#2b2f36";
 constexpr const char* kFaint = "#e3e6ea";
-constexpr const char* kFrame = "#8a919b";
 
 /// Of a chart on a page or in a file: there labels are of any length, and logarithmic axes have small ticks.
 struct Look {

@@ -14,8 +14,6 @@ namespace {
 
 constexpr double kRow = 15, kColumn = 40, kCell = 13, kBar = 16, kBarHeight = 300, kMargin = 14;
 constexpr double kSlope = 35;  ///< degrees, of the names of columns
-constexpr const char* kInk = "#2b2f36";
-constexpr const char* kFrame = "#8a919b";
 constexpr const char* kGrey = "#cccccc";
 
 std::array<int, 3> channels(const std::string& colour) {

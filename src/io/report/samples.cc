@@ -45,13 +45,13 @@ std::vector<Axis> axes_of(const FitResult& result) {
   return axes;
 }
 
-struct Cell {
+struct Square {
   double left, top, side;
   double x(const Axis& a, double v) const { return left + side * std::clamp(a.share(v), 0.0, 1.0); }
   double y(const Axis& a, double v) const { return top + side * (1 - std::clamp(a.share(v), 0.0, 1.0)); }
 };
 
-std::string histogram(const Cell& cell, const Axis& axis) {
+std::string histogram(const Square& cell, const Axis& axis) {
   constexpr int kBins = 30;
   std::vector<double> bins(kBins);
   for (const double v : axis.values)
@@ -67,7 +67,7 @@ std::string histogram(const Cell& cell, const Axis& axis) {
                            cell.x(axis, axis.estimate), cell.top, cell.side, kFitted);
 }
 
-std::string cloud(const Cell& cell, const Axis& across, const Axis& up) {
+std::string cloud(const Square& cell, const Axis& across, const Axis& up) {
   constexpr std::size_t kMostPoints = 700;
   const std::size_t count = across.values.size(), every = std::max<std::size_t>(1, count / kMostPoints);
   std::string dots;
@@ -104,8 +104,8 @@ std::string corner(const std::vector<Axis>& axes, double width) {
       width, height, escape_html("Draws from the posterior of " + names + ", each against each."));
   for (std::size_t row = 0; row < axes.size(); ++row)
     for (std::size_t column = 0; column <= row; ++column) {
-      const Cell cell{kLeft + static_cast<double>(column) * (side + kGap),
-                      kTop + static_cast<double>(row) * (side + kGap), side};
+      const Square cell{kLeft + static_cast<double>(column) * (side + kGap),
+                        kTop + static_cast<double>(row) * (side + kGap), side};
       const Axis &across = axes[column], &up = axes[row];
       out += row == column ? histogram(cell, across) : cloud(cell, across, up);
       out += fmt::format(
