@@ -23,7 +23,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct AuditArguments {
   std::string config;
   std::vector<std::string> set, departures, without;
   std::string out;
@@ -127,7 +127,7 @@ std::string picture(const std::vector<AuditRow>& rows) {
   return out + "</svg>\n";
 }
 
-int run_audit(const Arguments& arguments) {
+int run_audit(const AuditArguments& arguments) {
   Config config = load_config(arguments.config, ConfigUse::plan, std::nullopt, arguments.set);
   FitJob& job = config.job;
   if (arguments.threads >= 0) job.options.threads = arguments.threads;
@@ -178,7 +178,7 @@ int run_audit(const Arguments& arguments) {
 }  // namespace
 
 Command add_audit_command(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<AuditArguments>();
   CLI::App* command = app.add_subcommand(
       "audit", "where a fit fails, and whether it knows: pictures that are nearly the model's, drawn at random");
   command

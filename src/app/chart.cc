@@ -32,7 +32,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// Errors below are drawn there: rounding is no method's merit.
 constexpr double kLeastError = 1e-14;
 
-struct Arguments {
+struct ChartArguments {
   std::string out = "out/chart";
   bool quick = false, quiet = false;
 };
@@ -136,8 +136,8 @@ std::string summary_md(const MethodChart& chart) {
   return text;
 }
 
-Series line_with_dots(const std::string& label, const std::string& colour) {
-  Series series;
+DataSeries line_with_dots(const std::string& label, const std::string& colour) {
+  DataSeries series;
   series.label = label;
   series.colour = colour;
   series.dots = 4.5;
@@ -164,7 +164,7 @@ Sheet rays_sheet(const MethodChart& measured) {
         if (p.scene == scene.name && p.method == kChartedMethods[m] && std::isfinite(p.intensity_error) &&
             p.intensity_error < 2)
           lines[line_of(p)].emplace_back(std::max(p.intensity_error, kLeastError), 1e6 * fastest_seconds(p));
-      Series series = line_with_dots("", kColours[m]);
+      DataSeries series = line_with_dots("", kColours[m]);
       for (const auto& [length, line] : lines) {
         for (const auto& [error, time] : line) series.x.push_back(error), series.y.push_back(time);
         series.x.push_back(kNaN), series.y.push_back(kNaN);
@@ -193,7 +193,7 @@ Sheet frames_sheet(const MethodChart& measured) {
   for (const ChartFrame& first : measured.frames) {
     const std::size_t k = names.size();
     if (!names.insert(first.scene).second) continue;
-    Series series = line_with_dots(first.scene, kColours[6 + k % 4]);
+    DataSeries series = line_with_dots(first.scene, kColours[6 + k % 4]);
     for (const ChartFrame& f : measured.frames)
       if (f.scene == first.scene)
         series.x.push_back(std::max(f.worst_error, kLeastError)), series.y.push_back(1e3 * f.seconds);
@@ -227,7 +227,7 @@ Panel error_panel(const std::vector<WavePoint>& points, const std::string& sampl
   panel.log_y = true;
   panel.y_range = {0.001, 6};
   for (std::size_t m = 0; m < std::size(kModels); ++m) {
-    Series series = line_with_dots("", kModelColours[m]);
+    DataSeries series = line_with_dots("", kModelColours[m]);
     for (const WavePoint& p : points)
       if (p.sample == sample && p.model == kModels[m] && p.effort.empty() && p.objective_na == 0.4 && p.error > 0)
         series.x.push_back(p.radius_um), series.y.push_back(p.error);
@@ -244,7 +244,7 @@ Panel time_panel(const std::vector<WavePoint>& points) {
   panel.log_y = true;
   panel.y_range = {0.05, 20000};
   for (std::size_t m = 0; m < std::size(kModels); ++m) {
-    Series series{Series::Kind::points, "", {}, {}, kModelColours[m], 6.5};
+    DataSeries series{DataSeries::Kind::points, "", {}, {}, kModelColours[m], 6.5};
     for (const WavePoint& p : points)
       if (p.objective_na == 0.8 && p.model == kModels[m] && p.error > 0)
         series.x.push_back(p.error), series.y.push_back(1e3 * p.seconds);
@@ -317,7 +317,7 @@ Sheet spectra_sheet(const std::vector<SpectrumPoint>& points) {
     panel.height = 260;
     panel.log_y = true;
     for (std::size_t r = 0; r < std::size(kRules); ++r) {
-      Series series = line_with_dots("", kRuleColours[r]);
+      DataSeries series = line_with_dots("", kRuleColours[r]);
       for (const SpectrumPoint& p : points)
         if (p.scene == scene && p.rule == kRules[r])
           series.x.push_back(std::max(p.error, kLeast)), series.y.push_back(1e6 * p.seconds);
@@ -338,7 +338,7 @@ Sheet spectra_sheet(const std::vector<SpectrumPoint>& points) {
   panel.log_y = true;
   panel.y_range = {1e-13, 1};
   for (std::size_t k = 0; k < echoes.size(); ++k) {
-    Series series = line_with_dots(short_name(echoes[k]), kColours[4 + k % 6]);
+    DataSeries series = line_with_dots(short_name(echoes[k]), kColours[4 + k % 6]);
     for (const SpectrumPoint& p : points)
       if (p.scene == echoes[k])
         series.x.push_back(static_cast<double>(series.x.size())), series.y.push_back(std::max(p.error, 1e-13));
@@ -353,7 +353,7 @@ Sheet spectra_sheet(const std::vector<SpectrumPoint>& points) {
   return sheet;
 }
 
-int run_chart(const Arguments& arguments) {
+int run_chart(const ChartArguments& arguments) {
   const std::filesystem::path out = arguments.out;
   make_folder(arguments.out);
   const MethodChart chart = measure_chart(arguments.quick, [&](const std::string& what) {
@@ -382,7 +382,7 @@ int run_chart(const Arguments& arguments) {
 }  // namespace
 
 Command add_chart_command(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ChartArguments>();
   CLI::App* command = app.add_subcommand(
       "chart", "speed against accuracy of every transport method, measured here: tables and pictures");
   command

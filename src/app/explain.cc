@@ -16,7 +16,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct ExplainArguments {
   std::string config;
   std::vector<std::string> set;
   std::string next;
@@ -42,14 +42,14 @@ void print_check(const Config& config, const RenderPlan& chosen) {
           : "");
 }
 
-int print_explanation(const Arguments& arguments, const Config& config) {
+int print_explanation(const ExplainArguments& arguments, const Config& config) {
   const Explanation explanation = explain(config, arguments.next);
   std::cout << (arguments.json ? explanation_json(config, explanation) : explanation_text(config, explanation));
   if (arguments.check) print_check(config, explanation.plan);
   return kExitDone;
 }
 
-int run_explain(const Arguments& arguments) {
+int run_explain(const ExplainArguments& arguments) {
   const Config config = load_config(arguments.config, ConfigUse::plan, std::nullopt, arguments.set);
   return do_work(config, memory_to_render(config.scene), [&] { return print_explanation(arguments, config); });
 }
@@ -59,7 +59,7 @@ int run_explain(const Arguments& arguments) {
 Command add_explain_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("explain", "which model and method would run, why, and what it costs and errs");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ExplainArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--next", arguments->next,

@@ -24,7 +24,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct FitArguments {
   std::string config;
   std::vector<std::string> set;
   std::string image;
@@ -61,23 +61,23 @@ auto watched(bool quiet, FitJob& job, const Work& work) {
   return result;
 }
 
-Config read(const Arguments& arguments, std::vector<std::string> more = {}) {
+Config read(const FitArguments& arguments, std::vector<std::string> more = {}) {
   more.insert(more.begin(), arguments.set.begin(), arguments.set.end());
   return load_config(arguments.config, ConfigUse::fit,
                      arguments.image.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.image),
                      more);
 }
 
-std::vector<std::string> picture_formats(const Arguments& arguments) {
+std::vector<std::string> picture_formats(const FitArguments& arguments) {
   return arguments.npy ? std::vector<std::string>{".tif", ".npy"} : std::vector<std::string>{".tif"};
 }
 
-std::filesystem::path folder_of(const Arguments& arguments) {
+std::filesystem::path folder_of(const FitArguments& arguments) {
   return arguments.out.empty() ? std::filesystem::path(arguments.config).stem().string() + "-fit" : arguments.out;
 }
 
 /// Every droplet in view by a fit of its own: a folder of results each, and a table.
-int run_each(const Arguments& arguments) {
+int run_each(const FitArguments& arguments) {
   const std::vector<EachDroplet> droplets = droplets_in_view(read(arguments));
   const std::filesystem::path out = folder_of(arguments);
   OutputFolder folder(out);
@@ -120,7 +120,7 @@ int run_each(const Arguments& arguments) {
   return all ? kExitDone : kExitNoAnswer;
 }
 
-int run_fit(const Arguments& arguments) {
+int run_fit(const FitArguments& arguments) {
   if (arguments.each) return run_each(arguments);
   Problems problems;
   Config config;
@@ -173,7 +173,7 @@ int run_fit(const Arguments& arguments) {
 
 Command add_fit_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("fit", "estimate the parameters marked `fit`");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<FitArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--image", arguments->image, "use this image in place of micrograph.image");

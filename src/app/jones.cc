@@ -15,14 +15,14 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct JonesArguments {
   std::string config;
   std::vector<std::string> set;
   std::string out;
   bool quiet = false;
 };
 
-int run_jones(const Arguments& arguments) {
+int run_jones(const JonesArguments& arguments) {
   Problems problems;
   Config config;
   try {
@@ -73,7 +73,7 @@ int run_jones(const Arguments& arguments) {
 Command add_jones_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("jones", "complex transmission matrices (slab scenes: per direction; others: per pixel)");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<JonesArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out, "table to write (.csv)")->required();

@@ -22,7 +22,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct MichelLevyArguments {
   std::string config;
   std::vector<std::string> set;
   std::string out = "out/michel_levy";
@@ -121,7 +121,7 @@ Image times(Image image, double factor) {
   return image;
 }
 
-int run_michel_levy(const Arguments& arguments) {
+int run_michel_levy(const MichelLevyArguments& arguments) {
   const bool maps = !arguments.image.empty();
   const std::optional<std::filesystem::path> image =
       maps ? std::optional<std::filesystem::path>(arguments.image) : std::nullopt;
@@ -181,7 +181,7 @@ int run_michel_levy(const Arguments& arguments) {
 Command add_michel_levy_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("michel-levy", "interference colours of the config's lamp, polarizers and camera");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MichelLevyArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML), with light.lamp")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out, "folder for chart and maps (default out/michel_levy)");

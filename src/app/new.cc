@@ -17,7 +17,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct NewArguments {
   std::string kind;
   std::string demo;
   std::string image;
@@ -48,7 +48,7 @@ const Kind& kind_of(const std::string& word) {
       meant.empty() ? "known: " + names + "; `birefit new` says what they are for" : "did you mean " + meant + "?");
 }
 
-int run_new(const Arguments& arguments) {
+int run_new(const NewArguments& arguments) {
   if (arguments.kind.empty()) {
     std::cout
         << "Kinds of samples, and what people call them:\n"
@@ -80,7 +80,7 @@ int run_new(const Arguments& arguments) {
 
 Command add_new_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("new", "a commented config to start from; without KIND: the kinds");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<NewArguments>();
   command->add_option("KIND", arguments->kind, "droplet, shell, cell, ..: `birefit new` lists them");
   CLI::Option* demo =
       command->add_option("--demo", arguments->demo, "make this folder, with the config and pictures that it runs on");

@@ -21,7 +21,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   std::string config;
   std::vector<std::string> set;
   std::string out;
@@ -29,7 +29,7 @@ struct Arguments {
   bool quiet = false;
 };
 
-int run_render(const Arguments& arguments) {
+int run_render(const RenderArguments& arguments) {
   Problems problems;
   Config config;
   try {
@@ -76,7 +76,7 @@ int run_render(const Arguments& arguments) {
 
 Command add_render_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "the forward image at the config's values");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RenderArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML)")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out, "image to write: .exr, .tif (float), .npy (double) or .png (16 bit)")

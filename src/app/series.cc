@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kFramesTogether = 4;
 
-struct Arguments {
+struct SeriesArguments {
   std::string config;
   std::vector<std::string> set;
   std::string out;
@@ -142,16 +142,16 @@ double x_of(const ImageSeries& series, const std::optional<std::size_t>& column,
 
 /// How the picture draws what is known of a parameter.
 struct Looks {
-  Series shared{Series::Kind::line, "shared by all frames (95 %)", {}, {}, "#0072B2"};
-  Series doubtful{Series::Kind::points, "no answer", {}, {}, "#999999", 6.5, Series::Mark::circle};
-  Series known{Series::Kind::points, "estimate (95 %)", {}, {}, "#000000", 4.5};
-  Series below{Series::Kind::points, "upper limit", {}, {}, "#D55E00", 9, Series::Mark::down};
-  Series above{Series::Kind::points, "lower limit", {}, {}, "#D55E00", 9, Series::Mark::up};
-  std::vector<Series*> all() { return {&shared, &doubtful, &known, &below, &above}; }
+  DataSeries shared{DataSeries::Kind::line, "shared by all frames (95 %)", {}, {}, "#0072B2"};
+  DataSeries doubtful{DataSeries::Kind::points, "no answer", {}, {}, "#999999", 6.5, DataSeries::Mark::circle};
+  DataSeries known{DataSeries::Kind::points, "estimate (95 %)", {}, {}, "#000000", 4.5};
+  DataSeries below{DataSeries::Kind::points, "upper limit", {}, {}, "#D55E00", 9, DataSeries::Mark::down};
+  DataSeries above{DataSeries::Kind::points, "lower limit", {}, {}, "#D55E00", 9, DataSeries::Mark::up};
+  std::vector<DataSeries*> all() { return {&shared, &doubtful, &known, &below, &above}; }
 };
 
-void add(Series& series, double x, double y) { series.x.push_back(x), series.y.push_back(y); }
-void add(Series& series, double x, double y, double low, double high) {
+void add(DataSeries& series, double x, double y) { series.x.push_back(x), series.y.push_back(y); }
+void add(DataSeries& series, double x, double y, double low, double high) {
   add(series, x, y);
   series.low.push_back(low), series.high.push_back(high);
 }
@@ -226,7 +226,7 @@ std::optional<Sheet> sheet_of(const ImageSeries& series, const SeriesResult& res
     Panel panel;
     panel.y_label = axis_label(drawn[k]) + (looks.shared.x.empty() ? "" : ", shared");
     for (std::size_t i = 0; i < looks.all().size(); ++i) {
-      Series& one = *looks.all()[i];
+      DataSeries& one = *looks.all()[i];
       if (one.x.empty()) continue;
       *listed.all()[i] = one;
       one.label.clear();
@@ -234,7 +234,7 @@ std::optional<Sheet> sheet_of(const ImageSeries& series, const SeriesResult& res
     }
     sheet.charts[k % sheet.charts.size()].panels.push_back(std::move(panel));
   }
-  for (Series* one : listed.all())
+  for (DataSeries* one : listed.all())
     if (!one->x.empty()) sheet.legend.push_back(*one);
   return sheet;
 }
@@ -283,7 +283,7 @@ std::string summary_of(const ImageSeries& series, const SeriesResult& result) {
   return text;
 }
 
-int run_series(const Arguments& arguments) {
+int run_series(const SeriesArguments& arguments) {
   ImageSeries series = load_series(arguments.config, arguments.set);
   const fs::path out = arguments.out.empty() ? fs::path(arguments.config).stem().string() + "-series" : arguments.out;
   std::error_code code;
@@ -361,7 +361,7 @@ int run_series(const Arguments& arguments) {
 Command add_series_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("series", "fit every image of a series, with parameters of its own and shared ones");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SeriesArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML), with micrographs: {files: ..}")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--out", arguments->out,

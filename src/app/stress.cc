@@ -19,7 +19,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct StressArguments {
   std::string out = "out/stress";
   bool quick = false, quiet = false;
 };
@@ -63,9 +63,9 @@ Sheet waves_sheet(const std::vector<StressPoint>& points) {
   panel.height = 440;
   panel.log_y = true;
   panel.y_range = {1e-13, 20};
-  panel.series.push_back({Series::Kind::line, "the law: not above", {1e-13, 20}, {1e-13, 20}, "#000000", 1});
+  panel.series.push_back({DataSeries::Kind::line, "the law: not above", {1e-13, 20}, {1e-13, 20}, "#000000", 1});
   for (const auto& [name, colour] : {std::pair{"series", "#0072B2"}, {"split_step", "#D55E00"}, {"march", "#009E73"}}) {
-    Series series{Series::Kind::points, name, {}, {}, colour, 5};
+    DataSeries series{DataSeries::Kind::points, name, {}, {}, colour, 5};
     for (const StressPoint& p : points)
       if (p.sweep.starts_with("wave_") && p.method == fmt::format("{} of a ball", name) && p.flag.empty() &&
           p.error > 1e-12)
@@ -82,7 +82,7 @@ Sheet waves_sheet(const std::vector<StressPoint>& points) {
   return {chart.title, {chart}, 1, {}};
 }
 
-int run_stress(const Arguments& arguments) {
+int run_stress(const StressArguments& arguments) {
   const std::filesystem::path out = arguments.out;
   make_folder(arguments.out);
   const std::vector<StressPoint> points = measure_stress(arguments.quick, [&](const std::string& what) {
@@ -110,7 +110,7 @@ int run_stress(const Arguments& arguments) {
 }  // namespace
 
 Command add_stress_command(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<StressArguments>();
   CLI::App* command =
       app.add_subcommand("stress", "sweeps into the places where transport methods fail: error, own estimate, flag");
   command->add_option("--out", arguments->out, "folder for stress.csv, stress.svg and stress_waves.svg")

@@ -18,7 +18,7 @@
 namespace birefit {
 namespace {
 
-struct Arguments {
+struct ViewArguments {
   std::string config;
   std::vector<std::string> set;
   int threads = -1, port = 0;
@@ -31,7 +31,7 @@ bool is_config(const std::filesystem::path& path) {
   return ending == ".yaml" || ending == ".yml" || ending.empty();
 }
 
-int run_view(const Arguments& arguments) {
+int run_view(const ViewArguments& arguments) {
   view::Session session(arguments.threads);
   std::optional<view::Beginning> beginning;
   if (is_config(arguments.config))
@@ -45,7 +45,7 @@ int run_view(const Arguments& arguments) {
   for (;;) ::pause();
 }
 #else
-int run_view(const Arguments&) {
+int run_view(const ViewArguments&) {
   throw UserError({}, "this birefit was built without `view`",
                   "build it where cpp-httplib is installed (Debian: libcpp-httplib-dev)");
 }
@@ -55,7 +55,7 @@ int run_view(const Arguments&) {
 
 Command add_view_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("view", "a page in the browser to look at a config and try its parameters");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ViewArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML), or an image to make one for")->required();
   add_set_option(*command, arguments->set);
   command->add_option("--port", arguments->port, "port on 127.0.0.1; default: one that is free")

@@ -35,7 +35,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+struct WatchArguments {
   std::string config, folder, out;
   std::vector<std::string> set;
   int threads = -1, port = 0;
@@ -47,7 +47,7 @@ struct Arguments {
 /// What the page shows: the image that came last, and the table.
 class Screen {
  public:
-  explicit Screen(const Arguments& arguments) {
+  explicit Screen(const WatchArguments& arguments) {
     if (!arguments.view) return;
     session_.emplace(arguments.threads);
     server_.emplace(*session_, arguments.port);
@@ -70,7 +70,7 @@ class Screen {
 #else
 class Screen {
  public:
-  explicit Screen(const Arguments& arguments) {
+  explicit Screen(const WatchArguments& arguments) {
     if (arguments.view)
       throw UserError({}, "this birefit was built without `view`",
                       "watch without --view, or build it where cpp-httplib is installed (Debian: libcpp-httplib-dev)");
@@ -94,7 +94,7 @@ std::string estimates(const FitResult& result) {
 /// The images so far, in the order in which they came, what is known of each, and the files that hold it.
 class Watched {
  public:
-  Watched(const Arguments& arguments, fs::path out)
+  Watched(const WatchArguments& arguments, fs::path out)
       : arguments_(arguments), folder_(arguments.folder), out_(std::move(out)), screen_(arguments) {
     series_.path = arguments.config;
     std::ifstream file(arguments.config, std::ios::binary);
@@ -290,7 +290,7 @@ class Watched {
     screen_.row(i, columns, std::move(cells));
   }
 
-  const Arguments& arguments_;
+  const WatchArguments& arguments_;
   const fs::path folder_, out_;
   Screen screen_;
   ImageSeries series_;
@@ -299,14 +299,14 @@ class Watched {
 };
 
 /// Every mistake of the config that shows without an image, before anybody waits for one.
-void check_config(const Arguments& arguments) {
+void check_config(const WatchArguments& arguments) {
   std::vector<std::string> set = arguments.set;
   set.push_back("micrograph.image=");
   set.push_back("image_size_px=[64, 64]");
   load_config(arguments.config, ConfigUse::plan, std::nullopt, set);
 }
 
-int run_watch(const Arguments& arguments) {
+int run_watch(const WatchArguments& arguments) {
   check_config(arguments);
   const fs::path out = arguments.out.empty() ? fs::path(arguments.config).stem().string() + "-watch" : arguments.out;
   std::error_code code;
@@ -344,7 +344,7 @@ int run_watch(const Arguments& arguments) {
 
 Command add_watch_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("watch", "fit every image as it arrives in a folder");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<WatchArguments>();
   command->add_option("CONFIG", arguments->config, "the config (YAML) of one image")->required();
   command->add_option("--folder", arguments->folder, "the folder that images are written to")->required();
   add_set_option(*command, arguments->set);

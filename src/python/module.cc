@@ -16,7 +16,7 @@ namespace birefit::python {
 namespace {
 
 /// Of a file, as Python has names that are no UTF-8.
-py::str name_of(const std::string& file) {
+py::str given_name(const std::string& file) {
   return py::reinterpret_steal<py::str>(
       PyUnicode_DecodeFSDefaultAndSize(file.data(), static_cast<py::ssize_t>(file.size())));
 }
@@ -28,8 +28,8 @@ void raise(const UserError& error) {
     Problem place{problem.where, "", ""};
     std::string text = to_string(place);  // "FILE:LINE:COLUMN: "
     text = text.size() < 2 ? "" : text.substr(0, text.size() - 2);
-    problems.append(py::make_tuple(text, printable(problem.what), printable(problem.hint), name_of(problem.where.file),
-                                   problem.where.line, problem.where.column));
+    problems.append(py::make_tuple(text, printable(problem.what), printable(problem.hint),
+                                   given_name(problem.where.file), problem.where.line, problem.where.column));
   }
   const py::object type = py::module_::import("birefit._errors").attr("Error");
   PyErr_SetObject(type.ptr(), type(problems).ptr());

@@ -83,7 +83,7 @@ void let_python_act(const std::deque<std::string>& lines, const py::object& prog
   for (const std::string& line : lines) progress(line);
 }
 
-py::list pictures_of(const std::shared_ptr<Fitted>& fitted, Image MicrographResult::*which) {
+py::list fitted_pictures(const std::shared_ptr<Fitted>& fitted, Image MicrographResult::*which) {
   py::list list;
   for (const MicrographResult& m : fitted->result.micrographs) list.append(view_of(m.*which, fitted));
   return list;
@@ -181,12 +181,12 @@ void define_result(py::module_& module) {
       .def_property_readonly("json", [](const Fitted& f) { return fit_json(f.config, f.result); })
       .def_property_readonly("summary", [](const Fitted& f) { return summary(f.result); })
       .def_property_readonly("has_answer", [](const Fitted& f) { return f.result.has_answer(); })
-      .def_property_readonly("fitted",
-                             [](const std::shared_ptr<Fitted>& f) { return pictures_of(f, &MicrographResult::fitted); })
       .def_property_readonly(
-          "residual", [](const std::shared_ptr<Fitted>& f) { return pictures_of(f, &MicrographResult::residual); })
-      .def_property_readonly("sigma",
-                             [](const std::shared_ptr<Fitted>& f) { return pictures_of(f, &MicrographResult::sigma); })
+          "fitted", [](const std::shared_ptr<Fitted>& f) { return fitted_pictures(f, &MicrographResult::fitted); })
+      .def_property_readonly(
+          "residual", [](const std::shared_ptr<Fitted>& f) { return fitted_pictures(f, &MicrographResult::residual); })
+      .def_property_readonly(
+          "sigma", [](const std::shared_ptr<Fitted>& f) { return fitted_pictures(f, &MicrographResult::sigma); })
       .def_property_readonly("samples",
                              [](const Fitted& f) -> py::object {
                                if (!f.result.samples) return py::none();

@@ -15,12 +15,12 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kThumbnail = 96;  // px
 
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string text_in(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 /// Kinds of which one image can be fitted.
 bool takes_image(const Kind& kind) { return kind.command == "fit" && !kind.pictures.empty(); }
 
-const Kind& kind_of(const std::string& name) {
+const Kind& kind_in(const std::string& name) {
   for (const Kind& kind : kinds())
     if (kind.name == name && takes_image(kind)) return kind;
   throw UserError({}, name + " is no kind of sample that an image is fitted to");
@@ -64,7 +64,7 @@ std::string Beginning::description() const {
       {"pixel_um", loaded_.pixel_size_um},  {"thumbnail", kThumbnail},         {"kinds", Json::array()}};
   for (const Kind& kind : kinds())
     if (takes_image(kind)) json["kinds"].push_back({{"name", kind.name}, {"words", kind.words}});
-  return text_of(json);
+  return text_in(json);
 }
 
 std::string Beginning::picture() const {
@@ -78,7 +78,7 @@ std::string Beginning::thumbnail(const std::string& name) const {
     if (known == name) return bytes;
   std::string bytes;
   try {
-    const Kind& kind = kind_of(name);
+    const Kind& kind = kind_in(name);
     double most = -1;
     for (const DemoPicture& picture : kind.pictures) {
       if (picture.dark) continue;
@@ -101,13 +101,13 @@ std::string Beginning::thumbnail(const std::string& name) const {
 std::string Beginning::grow(const Answers& answers) const {
   Stated stated = answers.stated;
   stated.file_name = image_.filename().string();  // the config will lie beside it
-  FilledConfig filled = config_from_image(kind_of(answers.kind), image_.string(), stated);
+  FilledConfig filled = config_from_image(kind_in(answers.kind), image_.string(), stated);
   filled.text = with_numbers(filled.text, answers.numbers);
   Json json = {{"text", filled.text}, {"found", filled.found}, {"missing", filled.missing}, {"numbers", Json::array()}};
   for (const auto& [path, value] : known_numbers(filled.text))
     if (path.starts_with("sample.") || path.starts_with("microscope."))
       json["numbers"].push_back({{"path", path}, {"value", value}});
-  return text_of(json);
+  return text_in(json);
 }
 
 Config Beginning::open(const std::string& text) const {

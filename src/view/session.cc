@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 static_assert(std::endian::native == std::endian::little, "the page reads what is little endian");
 
 /// Bytes that are no UTF-8 are replaced, whoever wrote them.
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string text_in(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 void append(std::string& bytes, const std::vector<double>& values) {
   const std::size_t begin = bytes.size();
@@ -47,7 +47,7 @@ struct Item {
   std::size_t measurement = 0, frame = 0, frames = 1;
 };
 
-std::vector<Item> items_of(const FitJob& job) {
+std::vector<Item> items_in(const FitJob& job) {
   std::vector<Item> items;
   std::size_t frame = 0;
   for (std::size_t m = 0; m < job.measurements.size(); ++m) {
@@ -161,7 +161,7 @@ std::shared_ptr<Session::Shown> Session::shown_of(Config config, std::optional<F
   next->config = std::move(config);
   next->trials = std::make_unique<Trials>(next->config.job);
   next->origin = next->begin = next->values = next->trials->start();
-  next->items = items_of(next->config.job);
+  next->items = items_in(next->config.job);
   if (result && !result->theta.empty()) {
     next->trials = std::make_unique<Trials>(next->config.job, *result);
     next->values = next->trials->start();
@@ -194,7 +194,7 @@ std::string Session::description() const {
     json["rows_set"] = rows_set_;
   }
   json["ready"] = now != nullptr;
-  if (!now) return text_of(json);
+  if (!now) return text_in(json);
   const FitJob& job = now->config.job;
   json["file"] = now->config.path.filename().string();
   std::error_code code;  // of an image that had no config the name is free
@@ -242,7 +242,7 @@ std::string Session::description() const {
   }
   json["notes"] = job.warnings;
   json["result"] = now->result ? summary_of(*now->result) : Json(nullptr);
-  return text_of(json);
+  return text_in(json);
 }
 
 std::string Session::measured(std::size_t at) const {
@@ -299,7 +299,7 @@ std::optional<std::string> Session::draw(std::size_t at, const std::vector<doubl
     if (table[i].free && table[i].linear)
       header["linear"].push_back(
           {{"label", short_name(table[i].name)}, {"value", trial.theta[static_cast<std::size_t>(i)]}});
-  std::string words = text_of(header);
+  std::string words = text_in(header);
   words.resize((words.size() + 3) / 4 * 4, ' ');
   std::string bytes(4, '\0');
   const auto length = static_cast<std::uint32_t>(words.size());
@@ -429,7 +429,7 @@ std::string Session::news(long seen, std::size_t line, double seconds) {
   for (std::size_t i = std::min(line, log_.size()); i < log_.size(); ++i) json["lines"].push_back(log_[i]);
   json["line"] = log_.size();
   json["rows_set"] = rows_set_;
-  return text_of(json);
+  return text_in(json);
 }
 
 }  // namespace birefit::view

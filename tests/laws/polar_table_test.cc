@@ -23,11 +23,11 @@ struct Job {
   Scene scene;
   std::vector<int> by;  ///< diameter, birefringence, ordinary, host, centre x, y, what the director knows
 };
-struct Case {
+struct PolarCase {
   const char* name;
   std::function<void(TableBuilder&, Droplet&, std::vector<int>&)> director;
 };
-const Case kCases[] = {
+const PolarCase kPolarCases[] = {
     {"bipolar",
      [](TableBuilder& b, Droplet& d, std::vector<int>& by) {
        BipolarDirector bipolar{b.fixed("azimuth_deg", 33), b.fixed("tilt_deg", 20), b.fixed("pole_distance", 1.1)};
@@ -51,7 +51,7 @@ const Case kCases[] = {
        d.director = shell;
      }},
 };
-Job job_of(const Case& c) {
+Job job_of(const PolarCase& c) {
   Job j;
   Droplet droplet;
   droplet.diameter_um = j.b.fixed("diameter_um", 9);
@@ -114,7 +114,7 @@ TEST(PolarTable, CoordinatesOfTheDiscAreAnAngle) {
 }
 
 TEST(PolarTable, PicturesAreThoseOfRays) {
-  for (const Case& c : kCases) {
+  for (const PolarCase& c : kPolarCases) {
     const Job j = job_of(c);
     const Theta theta = j.b.table.values();
     const RenderPlan p = plan(j.scene, theta);
@@ -140,7 +140,7 @@ TEST(PolarTable, PicturesAreThoseOfRays) {
 // A pixel's middle may be the droplet's own, which has no azimuth: the picture there is the one a hair beside it, and
 // so is how it moves.
 TEST(PolarTable, TheMiddleIsAPlaceLikeAnyOther) {
-  for (const Case& c : kCases) {
+  for (const PolarCase& c : kPolarCases) {
     Job j = job_of(c);
     const std::size_t x = static_cast<std::size_t>(j.scene.view.center_x_px.index),
                       y = static_cast<std::size_t>(j.scene.view.center_y_px.index);
@@ -206,7 +206,7 @@ TEST(PolarTable, ACoreThatIsSeenTwiceHasNoDisc) {
 // A fit moves the droplet, lets it grow and turns it with the plan it has; what is no longer smooth (a core's edge has
 // come in) must be found out.
 TEST(PolarTable, PartsFollowTheDroplet) {
-  for (const Case& c : kCases) {
+  for (const PolarCase& c : kPolarCases) {
     const Job j = job_of(c);
     Theta theta = j.b.table.values();
     const RenderPlan p = plan(j.scene, theta);
@@ -224,7 +224,7 @@ TEST(PolarTable, PartsFollowTheDroplet) {
 }
 
 TEST(PolarTable, DerivativesAreThoseOfWhatIsRead) {
-  for (const Case& c : kCases) {
+  for (const PolarCase& c : kPolarCases) {
     const Job j = job_of(c);
     const Theta theta = j.b.table.values();
     const RenderPlan p = plan(j.scene, theta);

@@ -45,6 +45,16 @@ printf 'namespace birefit {\nclass Band final : public Other {\n};\n}\n' >"$tree
 says 'birefit::Band is defined in src/medium/a.h, too'
 rm "$tree"/src/medium/*
 
+# Names of headers that an unnamed namespace further in hides.
+printf 'namespace birefit {\ninline double width(double a, double b) {\n}\nconstexpr double kWide = 2;\n}\n' >"$tree/src/medium/a.h"
+printf 'namespace birefit::x {\nnamespace {\nint other() {\n}\n}  // namespace\nint width(int a) {\n}\n}\n' >"$tree/src/medium/a.cc"
+"$check" "$tree" >/dev/null
+printf 'namespace birefit::x {\nnamespace {\nint width(int a) {\n}\n}  // namespace\n}\n' >"$tree/src/medium/a.cc"
+says 'src/medium/a.cc:3: width hides that of src/medium/a.h'
+printf 'namespace birefit::x {\nnamespace {\nconstexpr int kWide = 1;\n}  // namespace\n}\n' >"$tree/src/medium/a.cc"
+says 'src/medium/a.cc:3: kWide hides that of src/medium/a.h'
+rm "$tree"/src/medium/*
+
 # Circles of files, each named once; a file may include its own header.
 echo '#include "medium/b.h"' >"$tree/src/medium/a.h"
 echo '#include "medium/a.h"' >"$tree/src/medium/a.cc"

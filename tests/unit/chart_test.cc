@@ -34,7 +34,7 @@ void expect_well_formed(const std::string& svg) {
   EXPECT_GT(document.document_element().attribute("height").as_double(), 0);
 }
 
-Chart chart_of(std::vector<Series> series) {
+Chart chart_of(std::vector<DataSeries> series) {
   Panel panel;
   panel.y_label = "y";
   panel.series = std::move(series);
@@ -45,8 +45,8 @@ Chart chart_of(std::vector<Series> series) {
   return chart;
 }
 
-Series points(std::vector<double> x, std::vector<double> y) {
-  return {Series::Kind::points, "points", std::move(x), std::move(y), "#123456", 4};
+DataSeries points(std::vector<double> x, std::vector<double> y) {
+  return {DataSeries::Kind::points, "points", std::move(x), std::move(y), "#123456", 4};
 }
 
 /// All numbers that `pattern` finds.
@@ -90,7 +90,7 @@ TEST(Charts, SmallTicksStandBetweenPowersOfTenWhereThereIsRoom) {
 
 TEST(Charts, AnIntervalEndsWhereTheScaleSays) {
   const AxisScale x{0, 10, 100, 200}, y{0, 4, 300, 100};
-  Series series = points({5, 7, 8}, {2, 2, 2});
+  DataSeries series = points({5, 7, 8}, {2, 2, 2});
   series.low = {1, kNaN, -kInfinity};
   series.high = {3.5, 3, kInfinity};
   const std::string drawn = draw_series(series, x, y);
@@ -99,7 +99,7 @@ TEST(Charts, AnIntervalEndsWhereTheScaleSays) {
   EXPECT_THAT(drawn, HasSubstr("M180.0 302.0V98.0"));  // without an end: out of the frame
   EXPECT_THAT(drawn, HasSubstr("M150.0 200.0h0"));
 
-  Series line{Series::Kind::line, "", {0, 10}, {2, 2}, "#123456"};
+  DataSeries line{DataSeries::Kind::line, "", {0, 10}, {2, 2}, "#123456"};
   line.low = {1, 1}, line.high = {3, 3};
   EXPECT_THAT(draw_series(line, x, y), HasSubstr("M100.0 150.0L200.0 150.0L200.0 250.0L100.0 250.0z"));
 
@@ -111,19 +111,19 @@ TEST(Charts, AnIntervalEndsWhereTheScaleSays) {
 
 TEST(Charts, MarksAreCirclesAndTriangles) {
   const AxisScale x{0, 10, 100, 200}, y{0, 4, 300, 100};
-  Series series = points({5}, {2});
+  DataSeries series = points({5}, {2});
   series.width = 8;
-  series.mark = Series::Mark::circle;
+  series.mark = DataSeries::Mark::circle;
   EXPECT_THAT(draw_series(series, x, y),
               ::testing::AllOf(HasSubstr("M146.0 200.0a4.00 4.00"), HasSubstr("fill=\"none\"")));
-  series.mark = Series::Mark::up;
+  series.mark = DataSeries::Mark::up;
   EXPECT_THAT(draw_series(series, x, y), HasSubstr("M150.0 195.4l4.00 6.92h-8.00z"));
-  series.mark = Series::Mark::down;
+  series.mark = DataSeries::Mark::down;
   EXPECT_THAT(draw_series(series, x, y), HasSubstr("M150.0 204.6l4.00 -6.92h-8.00z"));
 }
 
 TEST(Charts, ASheetOfChartsIsWellFormedWhateverItSays) {
-  Series series = points({1, 2, 3}, {3, kNaN, 1});
+  DataSeries series = points({1, 2, 3}, {3, kNaN, 1});
   series.label = kEvil;
   Chart chart = chart_of({series});
   chart.heading = chart.x_label = chart.title = chart.panels[0].y_label = kEvil;
@@ -149,10 +149,10 @@ TEST(Charts, WhatIsNoNumberIsNotDrawn) {
   for (const bool log : {false, true}) {
     for (const std::vector<double>& y :
          {std::vector<double>{}, {kNaN, kNaN}, {kInfinity, -kInfinity}, {0, 0}, {-1, kNaN}, {1}}) {
-      std::vector<Series> all;
-      for (const Series::Kind kind : {Series::Kind::line, Series::Kind::points})
-        for (const Series::Mark mark : {Series::Mark::dot, Series::Mark::circle, Series::Mark::up}) {
-          Series series = points({kNaN, 1}, y);
+      std::vector<DataSeries> all;
+      for (const DataSeries::Kind kind : {DataSeries::Kind::line, DataSeries::Kind::points})
+        for (const DataSeries::Mark mark : {DataSeries::Mark::dot, DataSeries::Mark::circle, DataSeries::Mark::up}) {
+          DataSeries series = points({kNaN, 1}, y);
           series.kind = kind, series.mark = mark;
           series.low = series.high = y;
           all.push_back(series);

@@ -14,8 +14,7 @@ namespace birefit {
 namespace {
 using namespace std::string_literals;
 
-using Config = testing::ConfigFolder;
-class ConfigSignal : public Config {};
+class ConfigSignal : public testing::ConfigFolder {};
 
 const std::string kSignal = R"(signal:
   - {file: a.csv, value: out, columns: {sample.cell.director.freedericksz.voltage_v: volts}, set:
@@ -163,7 +162,7 @@ microscope: {light: {wavelength_nm: 550}}
 
 // The radii of a table's rings are one measurement, which tells what is expected of a fit as a picture does.
 TEST(RingTable, IsReadingsOfOneSceneWithAnOutlook) {
-  const birefit::Config config = load_config(BIREFIT_SOURCE_DIR "/fit_configs/linbo3_rings.yaml", ConfigUse::plan);
+  const Config config = load_config(BIREFIT_SOURCE_DIR "/fit_configs/linbo3_rings.yaml", ConfigUse::plan);
   ASSERT_EQ(config.job.measurements.size(), 1u);
   const Readings& rings = readings(config.job, 0);
   EXPECT_EQ(rings.observable.quantity, Quantity::ring_radius_cm);

@@ -13,7 +13,8 @@ namespace {
 using namespace std::string_literals;
 
 namespace fs = std::filesystem;
-using Config = testing::ConfigFolder;
+
+using ConfigFile = testing::ConfigFolder;
 
 const std::string kRender = R"(image_size_px: [64, 48]
 micrograph: {pixel_size_um: 0.25}
@@ -32,7 +33,7 @@ sample: {crystal: {half_wave_voltage_v: {value: 1500, fit: [800, 3000]}, field_a
 microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
 )";
 
-TEST_F(Config, ReadsTheThreeFormsOfAParameter) {
+TEST_F(ConfigFile, ReadsTheThreeFormsOfAParameter) {
   const auto config = load(kRender);
   const ParameterTable& table = config.job.parameters;
   const Parameter& known = table[table.find("sample.material.ordinary")];
@@ -50,14 +51,14 @@ TEST_F(Config, ReadsTheThreeFormsOfAParameter) {
   EXPECT_EQ(prior.prior_sd, 0.05);
 }
 
-TEST_F(Config, RemembersWhereAParameterStands) {
+TEST_F(ConfigFile, RemembersWhereAParameterStands) {
   const auto config = load(kRender);
   const Parameter& parameter = config.job.parameters[config.job.parameters.find("sample.material.ordinary")];
   EXPECT_EQ(parameter.where.line, 5);
   EXPECT_EQ(parameter.where.column, 24);
 }
 
-TEST_F(Config, PutsTheCentreInTheMiddleOfARender) {
+TEST_F(ConfigFile, PutsTheCentreInTheMiddleOfARender) {
   const auto config = load(kRender);
   const Theta theta = config.job.parameters.values();
   EXPECT_EQ(theta[config.scene.view.center_x_px.index], 31.5);
@@ -66,24 +67,24 @@ TEST_F(Config, PutsTheCentreInTheMiddleOfARender) {
   EXPECT_EQ(config.scene.view.height, 48);
 }
 
-TEST_F(Config, AcceptsBothSpellingsOfPolarizerAndAnalyzer) {
+TEST_F(ConfigFile, AcceptsBothSpellingsOfPolarizerAndAnalyzer) {
   const auto config = load(replaced(replaced(kRender, "polarizer", "polariser"), "analyzer", "analyser"));
   EXPECT_TRUE(config.job.parameters.find("microscope.analyzer_deg"));
   EXPECT_NE(mistakes(replaced(kRender, "polarizer_deg: 0", "polarizer_deg: 0, polariser_deg: 1")).find("same key"),
             std::string::npos);
 }
 
-TEST_F(Config, NamesTheNearestKnownKey) {
+TEST_F(ConfigFile, NamesTheNearestKnownKey) {
   EXPECT_EQ(mistakes(replaced(kRender, "diameter_um", "diametr_um")),
             "config.yaml:4:13: unknown key diametr_um in sample.droplet; did you mean diameter_um?");
 }
 
-TEST_F(Config, SuggestsTheKeyWithItsUnit) {
+TEST_F(ConfigFile, SuggestsTheKeyWithItsUnit) {
   EXPECT_NE(mistakes(replaced(kRender, "diameter_um", "diameter")).find("did you mean diameter_um?"),
             std::string::npos);
 }
 
-TEST_F(Config, ReportsEveryMistakeOnceFromTopToBottom) {
+TEST_F(ConfigFile, ReportsEveryMistakeOnceFromTopToBottom) {
   std::string text = replaced(kRender, "[64, 48]", "[0, 48]");
   text = replaced(text, "9.3, fit", "-9.3, fit");
   text = replaced(text, "1.43", "14.3");
@@ -95,13 +96,13 @@ TEST_F(Config, ReportsEveryMistakeOnceFromTopToBottom) {
             "config.yaml:7:37: wavelength_nm = 0.59 is outside [100, 20000]; did you mean 590? the key is in nm");
 }
 
-TEST_F(Config, RefusesNumbersThatAreNone) {
+TEST_F(ConfigFile, RefusesNumbersThatAreNone) {
   for (const char* word :
        {".nan", "nan", ".inf", "-.inf", "1e999", "0x10", "1_000", "abc", "\"590\"", "true", "[590]", "", "5 90"})
     EXPECT_NE(mistakes(replaced(kRender, "590", word)).find("wavelength_nm"), std::string::npos) << word;
 }
 
-TEST_F(Config, UnderstandsADecimalCommaAndAUnitInTheValue) {
+TEST_F(ConfigFile, UnderstandsADecimalCommaAndAUnitInTheValue) {
   EXPECT_NE(mistakes(replaced(kRender, "{light: {wavelength_nm: 590}", "{light: {wavelength_nm: 590nm}"))
                 .find("did you mean 590?"),
             std::string::npos);
@@ -109,17 +110,19 @@ TEST_F(Config, UnderstandsADecimalCommaAndAUnitInTheValue) {
   EXPECT_NE(mistakes(kRender + block).find("did you mean 0.01? write a decimal point"), std::string::npos);
 }
 
-TEST_F(Config, RefusesBoundsThatExcludeTheStart) {
+TEST_F(ConfigFile, RefusesBoundsThatExcludeTheStart) {
   EXPECT_NE(mistakes(replaced(kRender, "value: 9.3", "value: 11"))
                 .find("diameter_um = 11 is outside its fit bounds [8.5, 10]"),
             std::string::npos);
 }
 
-TEST_F(Config, AllowsABoundAtThePhysicalLimit) { EXPECT_EQ(mistakes(replaced(kRender, "[8.5, 10]", "[0, 10]")), ""); }
+TEST_F(ConfigFile, AllowsABoundAtThePhysicalLimit) {
+  EXPECT_EQ(mistakes(replaced(kRender, "[8.5, 10]", "[0, 10]")), "");
+}
 
-TEST_F(Config, StatesHowWellANumberIsKnown) {
+TEST_F(ConfigFile, StatesHowWellANumberIsKnown) {
   const auto known_to = [&](const std::string& wavelength) {
-    const birefit::Config config =
+    const Config config =
         load(replaced(kRender, "wavelength_nm: 590", "wavelength_nm: " + wavelength), ConfigUse::render);
     const Parameter& p = config.job.parameters[config.scene.microscope.wavelength_nm];
     return p.known_to.of(p.value);
@@ -140,12 +143,12 @@ TEST_F(Config, StatesHowWellANumberIsKnown) {
       std::string::npos);
 }
 
-TEST_F(Config, RefusesAliases) {
+TEST_F(ConfigFile, RefusesAliases) {
   EXPECT_NE(mistakes("a: &x 1\nb: *x\n").find("config.yaml:1:4: anchors and aliases are not supported"),
             std::string::npos);
 }
 
-TEST_F(Config, RefusesDeepNestingOfEveryKind) {
+TEST_F(ConfigFile, RefusesDeepNestingOfEveryKind) {
   for (const std::string& unit : {std::string("["), std::string("{a: "), std::string("- ")}) {
     std::string text = "sample:\n  ";
     for (int i = 0; i < 10000; ++i) text += unit;
@@ -153,13 +156,13 @@ TEST_F(Config, RefusesDeepNestingOfEveryKind) {
   }
 }
 
-TEST_F(Config, CountsNoBracketsInQuotesAndComments) {
+TEST_F(ConfigFile, CountsNoBracketsInQuotesAndComments) {
   const std::string brackets(100, '[');
   EXPECT_EQ(mistakes(kRender + "# " + brackets + "\n"), "");
   EXPECT_NE(mistakes(kRender + "extra: \"" + brackets + "\"\n").find("unknown key extra"), std::string::npos);
 }
 
-TEST_F(Config, WavesNeedAnApertureAndASphere) {
+TEST_F(ConfigFile, WavesNeedAnApertureAndASphere) {
   const std::string without = replaced(kRender, ", objective_na: 0.8", ""), &with_objective = kRender;
   EXPECT_NE(mistakes(without + "physics: {ceiling: wave}\n").find("ceiling: wave needs microscope.objective_na"),
             std::string::npos);
@@ -173,7 +176,7 @@ TEST_F(Config, WavesNeedAnApertureAndASphere) {
 }
 
 // The file is missing too: all mistakes are told at once.
-TEST_F(Config, WavesOfASampledFieldNeedApertureAndSurround) {
+TEST_F(ConfigFile, WavesOfASampledFieldNeedApertureAndSurround) {
   const std::string rays =
       "image_size_px: [8, 8]\nmicrograph: {pixel_size_um: 0.1}\n"
       "sample:\n  volume: {file: none.npy, spacing_um: [0.1, 0.1, 0.1]}\n  material: {ordinary: 1.52, birefringence: "
@@ -190,7 +193,7 @@ TEST_F(Config, WavesOfASampledFieldNeedApertureAndSurround) {
   EXPECT_EQ(mistakes(complete).find("surround"), std::string::npos);  // rays leave it alone
 }
 
-TEST_F(Config, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
+TEST_F(ConfigFile, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
   const std::string without = replaced(kRender, ", objective_na: 0.8", ""), &with_objective = kRender;
   const auto ceiling = [&](const std::string& text) { return load(text).job.demand.ceiling; };
   EXPECT_EQ(ceiling(without), Ceiling::one_way);
@@ -205,11 +208,11 @@ TEST_F(Config, SpheresWithAnApertureAreDoneByWavesUnlessToldOtherwise) {
             Ceiling::wave);
 }
 
-TEST_F(Config, SaysWhatComesLater) {
+TEST_F(ConfigFile, SaysWhatComesLater) {
   EXPECT_NE(mistakes(kRender + "physics: {ceiling: reflections}\n").find("cells and slabs"), std::string::npos);
 }
 
-TEST_F(Config, ListsTheKnownMaterials) {
+TEST_F(ConfigFile, ListsTheKnownMaterials) {
   const std::string text = R"(image_size_px: [8, 8]
 sample:
   cell: {thickness_um: 5, director: {uniform: {azimuth_deg: 45}}}
@@ -219,18 +222,18 @@ microscope: {light: {wavelength_nm: 590}, polarizer_deg: 0, analyzer_deg: 90}
   EXPECT_NE(mistakes(text).find("E44-steinberg2020"), std::string::npos);
 }
 
-TEST_F(Config, NeedsAPixelSizeForADroplet) {
+TEST_F(ConfigFile, NeedsAPixelSizeForADroplet) {
   EXPECT_NE(mistakes(replaced(kRender, "{pixel_size_um: 0.25}", "{}")).find("pixel_size_um"), std::string::npos);
 }
 
-TEST_F(Config, RefusesADropletOfAnotherScaleThanTheImage) {
+TEST_F(ConfigFile, RefusesADropletOfAnotherScaleThanTheImage) {
   EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "9300")).find("did you mean 9.3?"),
             std::string::npos);
   EXPECT_NE(mistakes(replaced(kRender, "{value: 9.3, fit: [8.5, 10]}", "0.0093")).find("did you mean 9.3?"),
             std::string::npos);
 }
 
-TEST_F(Config, GivesTheCrystalItsSlowAxisHalfwayFromTheField) {
+TEST_F(ConfigFile, GivesTheCrystalItsSlowAxisHalfwayFromTheField) {
   const std::string text = R"(image_size_px: [8, 8]
 sample:
   {crystal: {half_wave_voltage_v: 1500, bias_v: 700, field_along: x, field_legendre: [0.1, {value: 0, fit: [-1, 1]}]}}
@@ -243,7 +246,7 @@ microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
   EXPECT_TRUE(config.job.parameters[config.job.parameters.find("sample.crystal.field_legendre[2]")].free);
 }
 
-TEST_F(Config, SharesWhatNoMicrographSets) {
+TEST_F(ConfigFile, SharesWhatNoMicrographSets) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   const auto config = load(kCrystal, ConfigUse::fit);
@@ -268,7 +271,7 @@ TEST_F(Config, SharesWhatNoMicrographSets) {
 
 // Two pictures of one droplet, each with a focus of its own: what a scene reads is an unknown where it is to be fitted,
 // and may be set for an image.
-TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
+TEST_F(ConfigFile, TheFocusIsAParameterLikeAnyOther) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   const std::string one = replaced(kRender, "image_size_px: [64, 48]\n", ""),
@@ -295,7 +298,7 @@ TEST_F(Config, TheFocusIsAParameterLikeAnyOther) {
 }
 
 // A camera's own curve, here light = code^2, by a table: values are proportional to light, whatever its unit.
-TEST_F(Config, LinearisesByACurve) {
+TEST_F(ConfigFile, LinearisesByACurve) {
   const Image codes = counts(100, 1);
   save("a.tif", codes);
   save("b.tif", counts(200, 2));
@@ -320,7 +323,7 @@ TEST_F(Config, LinearisesByACurve) {
   EXPECT_NE(mistakes(with, ConfigUse::fit).find("two columns, code and light"), std::string::npos);
 }
 
-TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
+TEST_F(ConfigFile, ReadsUnevenLightAndGivesAFrameItsOwn) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   const auto with = [](const std::string& text) { return "micrograph: {roi_px: [2, 4, 30, 28], " + text + "}\n"; };
@@ -348,7 +351,7 @@ TEST_F(Config, ReadsUnevenLightAndGivesAFrameItsOwn) {
             std::string::npos);
 }
 
-TEST_F(Config, KnowsTheParametersThatSetMayName) {
+TEST_F(ConfigFile, KnowsTheParametersThatSetMayName) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   EXPECT_NE(mistakes(replaced(kCrystal, "set: {sample.crystal.bias_v: 200}", "set: {sample.crystal.bias: 200}"),
@@ -357,7 +360,7 @@ TEST_F(Config, KnowsTheParametersThatSetMayName) {
             std::string::npos);
 }
 
-TEST_F(Config, TurnsCountsIntoTransmission) {
+TEST_F(ConfigFile, TurnsCountsIntoTransmission) {
   Image dark(32, 32, 100), parallel(32, 32, 1100), crossed(32, 32, 120), image(32, 32, 600);
   parallel(10, 12) = 100;  // no light here
   for (auto& [name, frame] : {std::pair<const char*, Image&>("d.tif", dark),
@@ -378,7 +381,7 @@ TEST_F(Config, TurnsCountsIntoTransmission) {
   EXPECT_GT(*offset.prior_sd, 0);
 }
 
-TEST_F(Config, ExcludesAndCountsNonFiniteAndIsolatedPixels) {
+TEST_F(ConfigFile, ExcludesAndCountsNonFiniteAndIsolatedPixels) {
   Image a = counts(100, 1), b = counts(200, 2);
   a(10, 10) = std::nan("");
   a(20, 20) = 5000;
@@ -391,7 +394,7 @@ TEST_F(Config, ExcludesAndCountsNonFiniteAndIsolatedPixels) {
   EXPECT_EQ(picture(config.job, 1).dead, 0);
 }
 
-TEST_F(Config, KeepsTheCrestsOfFineFringes) {
+TEST_F(ConfigFile, KeepsTheCrestsOfFineFringes) {
   // Rings of four pixels a period on a dark ground, nearly without noise: nothing here is a broken pixel.
   Image a(96, 96), b = counts(200, 2, 96, 96);
   for (int y = 0; y < 96; ++y)
@@ -405,7 +408,7 @@ TEST_F(Config, KeepsTheCrestsOfFineFringes) {
   EXPECT_EQ(picture(config.job, 0).dead, 0);
 }
 
-TEST_F(Config, ReadsAJointPrior) {
+TEST_F(ConfigFile, ReadsAJointPrior) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   write("fit.json", R"({"converged": true, "parameters": {"sample.crystal.half_wave_voltage_v": {"value": 1490},
@@ -429,7 +432,7 @@ TEST_F(Config, ReadsAJointPrior) {
             std::string::npos);
 }
 
-TEST_F(Config, ReadsAProfileInAnyColumnOrder) {
+TEST_F(ConfigFile, ReadsAProfileInAnyColumnOrder) {
   write("profile.csv", "n_e,n_o,az,ay,ax,depth_um\n1.7,1.5,0,0,2,1\n1.7,1.5,0,1,1,2.5\n");
   const auto config = load("sample: {slab: {profile: profile.csv}}\nmicroscope: {light: {wavelength_nm: 590}}\n");
   const auto& rows = std::get<Slab>(config.scene.sample).profile.rows;
@@ -440,7 +443,7 @@ TEST_F(Config, ReadsAProfileInAnyColumnOrder) {
   EXPECT_EQ(rows[0].k_e, 0);
 }
 
-TEST_F(Config, NamesTheCellOfABadProfile) {
+TEST_F(ConfigFile, NamesTheCellOfABadProfile) {
   write("profile.csv", "depth_um,ax,ay,az,n_o,n_e\n1,0,0,1,1.5,1.7\n1,0,0,0,1.5,x\n");
   const std::string text = "sample: {slab: {profile: profile.csv}}\nmicroscope: {light: {wavelength_nm: 590}}\n";
   EXPECT_EQ(mistakes(text), "profile.csv:3:13: n_e = x is not a finite number");
@@ -450,14 +453,14 @@ TEST_F(Config, NamesTheCellOfABadProfile) {
             "profile.csv:3:3: the axis (ax, ay, az) = (0, 0, 0) has no direction");
 }
 
-TEST_F(Config, RefusesAnImageOptionBesideMicrographs) {
+TEST_F(ConfigFile, RefusesAnImageOptionBesideMicrographs) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   EXPECT_THROW(load_config(write("config.yaml", kCrystal), ConfigUse::fit, folder_ / "a.tif"), UserError);
 }
 
 // A cone's picture ends where the objective's aperture does: 40 degrees in air need 0.64.
-TEST_F(Config, AConeIsNoWiderThanTheObjectiveTakesIn) {
+TEST_F(ConfigFile, AConeIsNoWiderThanTheObjectiveTakesIn) {
   save("a.tif", counts(100, 1));
   const auto with = [&](const std::string& na) {
     return mistakes(R"(micrograph: {image: a.tif}
@@ -473,7 +476,7 @@ microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90, ob
 }
 
 // Electrodes are read off the picture: a pixel each, wherever they are from; what is stated to be exact is.
-TEST_F(Config, WhereElectrodesAreIsKnownToAPixel) {
+TEST_F(ConfigFile, WhereElectrodesAreIsKnownToAPixel) {
   save("a.tif", counts(100, 1));
   const auto known_to = [&](const std::string& roi, const std::string& electrodes) {
     const auto config = load("micrograph: {image: a.tif" + roi + R"(}
@@ -496,7 +499,7 @@ microscope: {light: {wavelength_nm: 1550}, polarizer_deg: 0, analyzer_deg: 90}
 }
 
 // Where a cone's figure lies is set by eye, and a crystal is not cut exactly; what is stated to be exact is.
-TEST_F(Config, FigureOfAConeAndCutOfAPlateAreNotExact) {
+TEST_F(ConfigFile, FigureOfAConeAndCutOfAPlateAreNotExact) {
   save("a.tif", counts(100, 1));
   const auto known_to = [&](const std::string& centre, const std::string& tilt) {
     const auto config = load("micrograph: {image: a.tif" + centre + R"(}
@@ -518,7 +521,7 @@ microscope: {light: {wavelength_nm: 550}, polarizer_deg: 0, analyzer_deg: 90}
 }
 
 // One picture that counts as two would halve the variance of what it tells.
-TEST_F(Config, APictureIsListedOnce) {
+TEST_F(ConfigFile, APictureIsListedOnce) {
   save("a.tif", counts(100, 1));
   save("b.tif", counts(200, 2));
   EXPECT_EQ(mistakes(kCrystal, ConfigUse::fit), "");
@@ -533,7 +536,7 @@ TEST_F(Config, APictureIsListedOnce) {
 }
 
 // A field in metres or nm is no picture of a sample.
-TEST_F(Config, AFieldIsAsLargeAsWhatIsSeen) {
+TEST_F(ConfigFile, AFieldIsAsLargeAsWhatIsSeen) {
   const auto said = [&](const std::string& spacing, const std::string& more = "") {
     return mistakes("image_size_px: [32, 32]\nmicrograph: {pixel_size_um: 0.02}\nsample:\n  volume: {file: " +
                     std::string(BIREFIT_SOURCE_DIR) + "/tests/data/files/field_stored.npz, spacing_um: [" + spacing +
@@ -547,7 +550,7 @@ TEST_F(Config, AFieldIsAsLargeAsWhatIsSeen) {
 }
 
 // Each names the place and what to do, not what the parser expected.
-TEST_F(Config, SaysWhatIsWrongWithTheYaml) {
+TEST_F(ConfigFile, SaysWhatIsWrongWithTheYaml) {
   EXPECT_EQ(mistakes("sample:\n\tdroplet: 1\n"),
             "config.yaml:2:1: is indented with a tab; YAML takes spaces only: two for each level");
   EXPECT_EQ(mistakes("sample:\n  \tdroplet: 1\n"),

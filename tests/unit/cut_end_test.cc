@@ -10,8 +10,8 @@
 namespace birefit {
 namespace {
 
-constexpr int kSide = 64;
-const PixelRect kAll{0, 0, kSide, kSide};
+constexpr int kCutSide = 64;
+const PixelRect kAll{0, 0, kCutSide, kCutSide};
 
 double light_at(int x, int y) { return 3000 * std::exp(-0.04 * (std::pow(x - 30, 2) + std::pow(y - 33, 2))); }
 
@@ -20,10 +20,10 @@ LoadedImage picture(double black, double noise, double step) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;
   LoadedImage image;
-  image.values = Image(kSide, kSide);
+  image.values = Image(kCutSide, kCutSide);
   image.top_code = 65535;
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x)
+  for (int y = 0; y < kCutSide; ++y)
+    for (int x = 0; x < kCutSide; ++x)
       image.values(x, y) = std::max(0.0, step * std::round((black + light_at(x, y) + noise * normal(random)) / step));
   return image;
 }
@@ -35,11 +35,11 @@ TEST(CutEnd, IsFoundWithItsShare) {
     ASSERT_TRUE(cut) << step;
     EXPECT_EQ(cut->code, 0);
     double expected = 0;  // what rounds to nothing or less
-    for (int y = 0; y < kSide; ++y)
-      for (int x = 0; x < kSide; ++x)
-        expected += 0.5 * std::erfc((light_at(x, y) - 0.5 * step) / noise / std::sqrt(2.0)) / (kSide * kSide);
+    for (int y = 0; y < kCutSide; ++y)
+      for (int x = 0; x < kCutSide; ++x)
+        expected += 0.5 * std::erfc((light_at(x, y) - 0.5 * step) / noise / std::sqrt(2.0)) / (kCutSide * kCutSide);
     // Three standard deviations of that many pixels.
-    EXPECT_NEAR(cut->share, expected, 3 * 0.5 / kSide);
+    EXPECT_NEAR(cut->share, expected, 3 * 0.5 / kCutSide);
   }
 }
 
@@ -72,7 +72,7 @@ TEST(CutEnd, IsFoundWhereLightWasTooBright) {
   EXPECT_EQ(cut->code, 2500);
   EXPECT_FALSE(find_cut_end(End::highest, picture(100, 5, 1).values, kAll));
   // All of it: only another frame tells whether there was noise.
-  const Image all(kSide, kSide, 2500);
+  const Image all(kCutSide, kCutSide, 2500);
   EXPECT_FALSE(find_cut_end(End::highest, all, kAll));
   EXPECT_FALSE(find_cut_end(End::highest, all, kAll, 0.2));
   EXPECT_TRUE(find_cut_end(End::highest, all, kAll, 5));

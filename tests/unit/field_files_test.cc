@@ -105,6 +105,30 @@ TEST(FieldFiles, TheNormOfQIsAskedForWhereTheOrderTellsTheOther) {
   EXPECT_NEAR(load_volume(r).grid->nodes[0][0] * 21.0 / 4, 1.5, 1e-6);  // n = (1, 2, 0.5) over its length
 }
 
+// As ParaView writes a grid whose axes are given one by one.
+TEST(FieldFiles, ARectilinearGridHasItsSpacingFromItsAxes) {
+  const std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) / ("axes_" + std::to_string(getpid()) + ".vtk");
+  const auto read = [&](const std::string& y_axis) {
+    std::ofstream out(file);
+    out << "# vtk DataFile Version 3.0\naxes\nASCII\nDATASET RECTILINEAR_GRID\nDIMENSIONS 2 3 4\n"
+           "X_COORDINATES 2 float\n0 0.2\nY_COORDINATES "
+        << y_axis << "\nZ_COORDINATES 4 float\n1 1.4 1.8 2.2\nPOINT_DATA 24\nVECTORS n float\n";
+    for (int z = 0; z < 4; ++z)
+      for (int y = 0; y < 3; ++y)
+        for (int x = 0; x < 2; ++x) out << 1 + x << ' ' << 2 - y << ' ' << 0.5 + z << '\n';
+    out.close();
+    VolumeRequest r;
+    r.path = file;
+    r.where = {"c.yaml", 4, 3};
+    return r;
+  };
+  expect_field(load_volume(read("3 float\n-0.3 0 0.3")));
+  EXPECT_THAT(error_of(read("4 float\n-0.3 0 0.3 0.6")), HasSubstr("has 4 Y_COORDINATES, DIMENSIONS say 3"));
+  EXPECT_NE(error_of(read("3 float\n-0.3 0 0.9")), "none");  // layers of unequal thickness
+  std::filesystem::remove(file);
+}
+
 TEST(FieldFiles, DamagedOnesAreRefused) {
   const std::filesystem::path folder =
       std::filesystem::path(::testing::TempDir()) / ("fields_" + std::to_string(getpid()));

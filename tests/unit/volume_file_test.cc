@@ -68,7 +68,7 @@ std::array<double, 3> director(int x, int y, int z) {
 }
 
 template <class T>
-std::string bytes_of(const std::vector<T>& values) {
+std::string raw_bytes(const std::vector<T>& values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
 }
 
@@ -98,7 +98,7 @@ std::string npy_data(bool x_first, bool fortran, int components,
           const int at = fortran ? a + n[0] * (b + n[1] * (c + n[2] * d)) : ((a * n[1] + b) * n[2] + c) * n[3] + d;
           all[static_cast<std::size_t>(at)] = static_cast<T>(x_first ? value(a, b, c, d) : value(c, b, a, d));
         }
-  return bytes_of(all);
+  return raw_bytes(all);
 }
 
 double component(int x, int y, int z, int c) { return director(x, y, z)[static_cast<std::size_t>(c)]; }
@@ -268,7 +268,7 @@ std::string ascii(int components, const std::function<double(int, int, int, int)
 }
 
 TEST_F(VolumeFile, VtkInEveryFormat) {
-  const std::string doubles = bytes_of(nodes<double>(3, component)), floats = bytes_of(nodes<float>(3, component));
+  const std::string doubles = raw_bytes(nodes<double>(3, component)), floats = raw_bytes(nodes<float>(3, component));
   const LoadedVolume volume = vti(vti_text(array_text("n", 3, "Float64", "ascii", ascii(3, component))));
   expect_field(volume, 1e-15);
   EXPECT_EQ(volume.grid->spacing_um, (std::array<double, 3>{0.2, 0.3, 0.4}));
@@ -321,13 +321,13 @@ TEST_F(VolumeFile, VtkTensorsOrderAndMask) {
   const auto mask = nodes<std::uint8_t>(1, [](int x, int y, int, int) { return x == 0 && y == 0 ? 0 : 1; });
   const LoadedVolume masked = vti(
       vti_text(array_text("n", 3, "Float64", "ascii", ascii(3, holed)) +
-               array_text("domain_mask", 1, "UInt8", "binary", base64(with_length<std::uint32_t>(bytes_of(mask))))));
+               array_text("domain_mask", 1, "UInt8", "binary", base64(with_length<std::uint32_t>(raw_bytes(mask))))));
   EXPECT_EQ(trace(masked.grid->nodes[0]), 0);
   EXPECT_NEAR(trace(masked.grid->nodes[1]), 1, 1e-14);
 }
 
 TEST_F(VolumeFile, BadVtkFiles) {
-  const std::string floats = bytes_of(nodes<float>(3, component)),
+  const std::string floats = raw_bytes(nodes<float>(3, component)),
                     good = array_text("n", 3, "Float64", "ascii", ascii(3, component));
   const std::string binary = array_text("n", 3, "Float32", "binary", base64(with_length<std::uint32_t>(floats)));
   EXPECT_THAT(vti_error("<VTKFile type=\"UnstructuredGrid\"></VTKFile>"), HasSubstr("Resample To Image"));

@@ -145,7 +145,7 @@ class Draws {
   std::vector<Theta> thetas_;
 };
 
-double quantile(const std::vector<double>& sorted, double q) {
+double quantile_of_sorted(const std::vector<double>& sorted, double q) {
   return sorted[static_cast<std::size_t>(std::lround(q * static_cast<double>(sorted.size() - 1)))];
 }
 
@@ -171,13 +171,13 @@ void widen_to_draws(const std::vector<double>& deviations, double half, double p
   std::vector<double> sizes;
   for (const double by : deviations) sizes.push_back(std::abs(by));
   std::sort(sizes.begin(), sizes.end());
-  const double spread = quantile(sizes, kOne);
+  const double spread = quantile_of_sorted(sizes, kOne);
   constexpr double kLittle = 0.2;
   if (spread < kLittle * parts) return;
-  if (!(spread > kSpread * estimate.stderr_) && !(quantile(sizes, 0.95) > kReach * half)) return;
+  if (!(spread > kSpread * estimate.stderr_) && !(quantile_of_sorted(sizes, 0.95) > kReach * half)) return;
   estimate.stderr_ = std::max(estimate.stderr_, spread);
-  estimate.interval95_low = estimate.value + std::min(0.0, quantile(deviations, 0.025));
-  estimate.interval95_high = estimate.value + std::max(0.0, quantile(deviations, 0.975));
+  estimate.interval95_low = estimate.value + std::min(0.0, quantile_of_sorted(deviations, 0.025));
+  estimate.interval95_high = estimate.value + std::max(0.0, quantile_of_sorted(deviations, 0.975));
 }
 
 }  // namespace

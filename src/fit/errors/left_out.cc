@@ -43,6 +43,7 @@ Eigen::VectorXd change_of_unknowns(const Task& task, const Theta& from, const Th
 SolveOptions few_steps(const Task& task, int steps) {
   SolveOptions few;
   few.max_iterations = steps;
+  few.least_gain = 1e-3;  // a thirtieth of a standard error
   few.interrupted = task.job.options.interrupted;
   return few;
 }

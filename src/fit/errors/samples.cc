@@ -256,7 +256,7 @@ Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
 }
 
 /// Back from beyond a bound by as much as it went there.
-double within(const Parameter& parameter, double value) {
+double inside_bounds(const Parameter& parameter, double value) {
   if (value < parameter.lower) value = 2 * parameter.lower - value;
   if (value > parameter.upper) value = 2 * parameter.upper - value;
   return std::clamp(value, parameter.lower, parameter.upper);
@@ -330,7 +330,7 @@ std::optional<Samples> draw_samples(const Task& task, Optimum& optimum, const Fi
     all += student_stretch(posterior.freedom(), random) * (root * standard_normal(all.size(), random));
     for (std::size_t k = 0; k < kept.size(); ++k)
       samples.values(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-          within(task.job.parameters[task.unknowns.table_index(kept[k])], all[kept[k]]);
+          inside_bounds(task.job.parameters[task.unknowns.table_index(kept[k])], all[kept[k]]);
   }
   optimum.problem->evaluate(optimum.searched, true);
   summarise(result, samples);

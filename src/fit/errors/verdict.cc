@@ -9,22 +9,22 @@
 namespace birefit::estimation {
 namespace {
 
-std::string short_name(const std::string& path) {
+std::string shortened(const std::string& path) {
   const auto dot = path.rfind('.');
   return dot == std::string::npos ? path : path.substr(dot + 1);
 }
 
 /// Short names where they are unique among the free parameters, paths otherwise.
-std::string name_of(const FitResult& result, int j) {
-  const std::string name = short_name(result.parameters[j].name);
+std::string name_in(const FitResult& result, int j) {
+  const std::string name = shortened(result.parameters[j].name);
   int same = 0;
-  for (const ParameterEstimate& estimate : result.parameters) same += short_name(estimate.name) == name;
+  for (const ParameterEstimate& estimate : result.parameters) same += shortened(estimate.name) == name;
   return same > 1 ? result.parameters[j].name : name;
 }
 
 std::string unit_suffix(const ParameterEstimate& estimate) { return estimate.unit.empty() ? "" : " " + estimate.unit; }
 
-std::string joined(const std::vector<std::string>& parts, const std::string& last = " and ") {
+std::string in_words(const std::vector<std::string>& parts, const std::string& last = " and ") {
   std::string text;
   for (std::size_t i = 0; i < parts.size(); ++i) text += (i == 0 ? "" : i + 1 == parts.size() ? last : ", ") + parts[i];
   return text;
@@ -41,9 +41,9 @@ std::string step_in_words(const FitResult& result, const Eigen::VectorXd& step, 
   }();
   for (int j = 0; j < step.size(); ++j)
     if (std::abs(scaled[j]) > 0.1 * largest)
-      parts.push_back(fmt::format("{} {} {:.3g}{}", name_of(result, j), sign * step[j] > 0 ? "up" : "down",
+      parts.push_back(fmt::format("{} {} {:.3g}{}", name_in(result, j), sign * step[j] > 0 ? "up" : "down",
                                   std::abs(step[j]), unit_suffix(result.parameters[j])));
-  return joined(parts, " with ");
+  return in_words(parts, " with ");
 }
 
 bool in_joint_prior(const FitJob& job, const std::string& name) {
@@ -100,7 +100,7 @@ void judge_directions(FitResult& result, const Eigen::MatrixXd& factor, const Ei
       result.identifiable = false;
       if (std::abs(v[at]) > 0.999)
         direction.words =
-            fmt::format("{} has no measurable influence on the image", name_of(result, static_cast<int>(at)));
+            fmt::format("{} has no measurable influence on the image", name_in(result, static_cast<int>(at)));
       else
         direction.words =
             fmt::format("{} changes the image by less than its noise: only other combinations of them are known",
@@ -140,7 +140,7 @@ void judge_pair(FitResult& result, const FitJob& job, const Unknowns& unknowns, 
       "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the "
       "two is determined. Along it the 95 % interval is {0} {7:.5g} to {8:.5g}{2} (with {3} {9:.5g} to {10:.5g}{6}); "
       "across it, with {3} known, {0} would be known to +-{11:.2g}{2}",
-      name_of(result, a), t * sa, unit_suffix(pa), name_of(result, b), sign > 0 ? "up" : "down", t * sb,
+      name_in(result, a), t * sa, unit_suffix(pa), name_in(result, b), sign > 0 ? "up" : "down", t * sb,
       unit_suffix(pb), pa.value - t * sa, pa.value + t * sa, pb.value - sign * t * sb, pb.value + sign * t * sb,
       across);
   result.directions.push_back(std::move(direction));
@@ -202,7 +202,7 @@ void say_state(const FitResult& result, bool signal, bool rows, Sentences& sente
                              ? fmt::format("odds {:.2g}", rival.odds)
                              : fmt::format("odds {:.2g}, likelihood ratio {:.2g}", rival.odds, rival.likelihood_ratio));
     sentences.push_back(fmt::format("Ambiguous: {} other minim{} of the misfit cannot be excluded ({}).", others.size(),
-                                    others.size() == 1 ? "um" : "a", joined(others)));
+                                    others.size() == 1 ? "um" : "a", in_words(others)));
   }
 }
 
@@ -215,7 +215,7 @@ void say_bounds(const FitResult& result, Sentences& sentences) {
           d.name, d.expression, d.expected, d.value, d.unit.empty() ? "" : " " + d.unit));
   for (const ParameterEstimate& estimate : result.parameters) {
     if (!estimate.at_bound && estimate.limit.empty()) continue;
-    const std::string name = short_name(estimate.name), unit = unit_suffix(estimate);
+    const std::string name = shortened(estimate.name), unit = unit_suffix(estimate);
     const bool upper = estimate.limit == "upper";
     // What the unit of a reduced voltage means.
     const std::string below =
@@ -250,7 +250,7 @@ bool say_contradictions(const FitResult& result, Sentences& sentences) {
     sentences.push_back(
         fmt::format("{} contradicts what was known of it: {} instead of {}{}, {:.0f} standard deviations away. One of "
                     "the two is wrong.",
-                    name_of(result, j), with_error(p.value, p.stderr_), with_error(*p.prior_value, *p.prior_sd),
+                    name_in(result, j), with_error(p.value, p.stderr_), with_error(*p.prior_value, *p.prior_sd),
                     unit_suffix(p), away));
   }
   return contradicted;
@@ -262,21 +262,21 @@ void say_values(const FitResult& result, bool signal, Sentences& sentences) {
     for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
       const ParameterEstimate& estimate = result.parameters[j];
       if (estimate.linear || !std::isfinite(estimate.stderr_) || estimate.at_bound || !estimate.limit.empty()) continue;
-      values.push_back(fmt::format("{} = {}{}", name_of(result, j), with_error(estimate.value, estimate.stderr_),
+      values.push_back(fmt::format("{} = {}{}", name_in(result, j), with_error(estimate.value, estimate.stderr_),
                                    unit_suffix(estimate)));
     }
-  if (!values.empty()) sentences.push_back(joined(values) + " (standard errors: " + result.covariance_kind + ").");
+  if (!values.empty()) sentences.push_back(in_words(values) + " (standard errors: " + result.covariance_kind + ").");
   for (int j = 0; j < static_cast<int>(result.parameters.size()); ++j) {
     const ParameterEstimate& p = result.parameters[j];
     if (signal && p.profiled && std::isfinite(p.stderr_))
       sentences.push_back(fmt::format("The 95 % interval of {} is {:.4g} to {:.4g}{}, by its profile likelihood.",
-                                      name_of(result, j), p.interval95_low, p.interval95_high, unit_suffix(p)));
+                                      name_in(result, j), p.interval95_low, p.interval95_high, unit_suffix(p)));
   }
 }
 
 /// Why an answer is one with misfit.
 void say_misfit(const FitResult& result, Sentences& sentences) {
-  if (!result.misfit.empty()) sentences.push_back("With misfit: " + joined(result.misfit, "; and ") + ".");
+  if (!result.misfit.empty()) sentences.push_back("With misfit: " + in_words(result.misfit, "; and ") + ".");
 }
 
 /// The inputs whose error would be the estimates', those that are taken as exact or those that are not.
@@ -297,14 +297,14 @@ void say_inputs(const FitResult& result, bool signal, bool exact, Sentences& sen
     const bool of_value = p.unit != "deg" && std::abs(p.value) > 10 * p.stderr_;  // what may be zero has no per cent
     inputs.push_back(
         fmt::format("{} more of {} makes {} {}", input.unit == "deg" || input.unit == "px" ? "1 " + input.unit : "1 %",
-                    input.name, name_of(result, most),
+                    input.name, name_in(result, most),
                     of_value ? fmt::format("{:+.2g} %", 100 * shift / std::abs(p.value))
                              : fmt::format("{:+.2g}{}", shift, unit_suffix(p))) +
         (exact ? ""
                : fmt::format(" (known to {:.2g}{}{})", input.known_to, input.unit.empty() ? "" : " ", input.unit)));
   }
   if (signal && !inputs.empty())
-    sentences.push_back((exact ? "Taken as exact: " : "In the errors, as well as it is known: ") + joined(inputs) +
+    sentences.push_back((exact ? "Taken as exact: " : "In the errors, as well as it is known: ") + in_words(inputs) +
                         ".");
 }
 

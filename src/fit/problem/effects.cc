@@ -32,7 +32,7 @@ std::array<double, 2> slope_at(const Image& light, int x, int y) {
 }
 
 /// Of light with this slope, at a distance (dx, dy) from what stays where it is.
-double stretched(PictureEffect::Kind kind, const std::array<double, 2>& slope, double dx, double dy) {
+double stretched_light(PictureEffect::Kind kind, const std::array<double, 2>& slope, double dx, double dy) {
   const auto [by_x, by_y] = slope;
   if (kind == PictureEffect::Kind::growth) return -(dx * by_x + dy * by_y);
   return kind == PictureEffect::Kind::stretch_x ? dy * by_y - dx * by_x : -(dx * by_y + dy * by_x);
@@ -52,7 +52,7 @@ double effect_at(PictureEffect::Kind kind, const KnownLight& p, int x, int y) {
   }
   if (!has_neighbours(p, x, y)) return 0;
   if (kind == PictureEffect::Kind::blur) return blur_at(p.light, x, y);
-  return stretched(kind, slope_at(p.light, x, y), x - p.center_x, y - p.center_y);
+  return stretched_light(kind, slope_at(p.light, x, y), x - p.center_x, y - p.center_y);
 }
 
 double effect_change_at(PictureEffect::Kind kind, const KnownLight& p, const LightChange& change, int x, int y) {
@@ -61,8 +61,8 @@ double effect_change_at(PictureEffect::Kind kind, const KnownLight& p, const Lig
   if (kind == PictureEffect::Kind::curve) return by * (2 * here - 1);
   if (!has_neighbours(p, x, y)) return 0;
   if (kind == PictureEffect::Kind::blur) return blur_at(change.light, x, y);
-  return stretched(kind, slope_at(change.light, x, y), x - p.center_x, y - p.center_y) -
-         stretched(kind, slope_at(p.light, x, y), change.center_x, change.center_y);
+  return stretched_light(kind, slope_at(change.light, x, y), x - p.center_x, y - p.center_y) -
+         stretched_light(kind, slope_at(p.light, x, y), change.center_x, change.center_y);
 }
 
 }  // namespace birefit::estimation

@@ -14,7 +14,7 @@ namespace {
 
 /// The same number of every scene; empty where scenes are not alike.
 template <class Job, class Ref>
-std::vector<std::vector<Ref*>> numbers_of(Job& job) {
+std::vector<std::vector<Ref*>> numbers_in(Job& job) {
   std::vector<std::vector<Ref*>> numbers;
   bool first = true, alike = true;
   for_each_scene(job.measurements, [&](auto& scene) {
@@ -94,7 +94,7 @@ std::string path_in_frame(const std::string& name) {
 }  // namespace
 
 bool has_own_dials(const FitJob& job) {
-  const auto numbers = numbers_of<const FitJob, const ParameterRef>(job);
+  const auto numbers = numbers_in<const FitJob, const ParameterRef>(job);
   return std::any_of(numbers.begin(), numbers.end(), [&](const auto& number) {
     return is_own_dial(job, stated_of(job, number)) || is_own_scale(job, stated_of(job, number));
   });
@@ -102,7 +102,7 @@ bool has_own_dials(const FitJob& job) {
 
 FitJob with_shared_zeros(FitJob job) {
   const std::set<int> followed_by_others = followed(job);
-  for (const std::vector<ParameterRef*>& all : numbers_of<FitJob, ParameterRef>(job)) {
+  for (const std::vector<ParameterRef*>& all : numbers_in<FitJob, ParameterRef>(job)) {
     const std::vector<ParameterRef*> number = stated_of(job, all);
     const bool scale = is_own_scale(job, number);
     if (!scale && !is_own_dial(job, number)) continue;

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <regex>
 #include <sstream>
 #include <string>
@@ -76,8 +77,6 @@ void read_header(const TableRecord& record, const std::string& file, bool number
   table.header_line = record.line;
   for (const TableCell& cell : record.cells) {
     const Where place{file, record.line, cell.column};
-    for (const TableCell& earlier : table.header)
-      if (earlier.text == cell.text) problems.add(place, "duplicate column " + cell.text);
     if (cell.text.empty() && !(numbered && table.header.empty())) problems.add(place, "a column has no name");
     if (is_number(cell))
       problems.add(place, "the first line must name the columns, found " + cell.text,
@@ -85,6 +84,11 @@ void read_header(const TableRecord& record, const std::string& file, bool number
     table.header.push_back(cell);
   }
   problems.throw_if_any();
+  // Which of them a name means, nobody can tell; columns that nothing names may be called anything.
+  std::map<std::string_view, int> times;
+  for (const TableCell& cell : record.cells) ++times[cell.text];
+  for (std::size_t c = 0; c < table.header.size(); ++c)
+    if (times[record.cells[c].text] > 1) table.header[c].text += " (column " + std::to_string(c + 1) + ")";
 }
 
 void read_row(TableRecord& record, const std::string& file, char separator, TextTable& table, Problems& problems) {
@@ -187,9 +191,10 @@ bool contradicts_unit(const std::string& given, const std::string& wanted) {
 
 std::string unit_in_name(const std::string& name) {
   static const std::regex bracketed(R"(.*[(\[]([^()\[\]]+)[)\]] *)"),
-      appended(".*_(rad|mrad|deg|nm|um|mm|cm|mV|kV|V|C)");
+      appended(".*_(rad|mrad|deg|nm|um|mm|cm|mV|kV|V|C)"), place(R"( \(column \d+\)$)");
+  const std::string own = std::regex_replace(name, place, "");
   std::smatch found;
-  return std::regex_match(name, found, bracketed) || std::regex_match(name, found, appended) ? found[1].str() : "";
+  return std::regex_match(own, found, bracketed) || std::regex_match(own, found, appended) ? found[1].str() : "";
 }
 
 std::string describe_left_out(const std::string& name, const std::vector<int>& lines) {

@@ -28,7 +28,7 @@ void visit_values(const Panel& panel, bool x, bool log, Visit visit) {
     for (const double value : values)
       if (std::isfinite(value) && (!log || value > 0)) visit(value);
   };
-  for (const Series& series : panel.series) {
+  for (const DataSeries& series : panel.series) {
     see(x ? series.x : series.y);
     if (!x) see(series.low), see(series.high);
   }
@@ -85,7 +85,7 @@ std::string draw_legend(const Panel& panel, double left, double top) {
                        escape_html(label));
     at += 34 + 6.2 * label.size();
   };
-  for (const Series& series : panel.series)
+  for (const DataSeries& series : panel.series)
     if (!series.label.empty()) entry(legend_symbol(series, at, top), series.label);
   for (const Marker& marker : panel.markers)
     if (!marker.label.empty())
@@ -102,7 +102,7 @@ std::string alternative_text(const Chart& chart, double x_low, double x_high) {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     visit_values(panel, false, panel.log_y, [&](double v) { low = std::min(low, v), high = std::max(high, v); });
     std::string names;
-    for (const Series& series : panel.series)
+    for (const DataSeries& series : panel.series)
       if (!series.label.empty()) names += (names.empty() ? ": " : ", ") + series.label;
     text += fmt::format(" {}{}", panel.y_label, names);
     if (low <= high) text += fmt::format(", from {:.4g} to {:.4g}", low, high);
@@ -147,7 +147,7 @@ std::string draw_panel(const Panel& panel, const AxisScale& x, const std::vector
     if (std::isfinite(marker.x))
       out += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}\" stroke=\"{}\" stroke-width=\"1.4\"{}/>", x(marker.x), top,
                          bottom, marker.colour, marker.dashed ? " stroke-dasharray=\"4 3\"" : "");
-  for (const Series& series : panel.series) out += draw_series(series, x, y);
+  for (const DataSeries& series : panel.series) out += draw_series(series, x, y);
   out += "</svg>";
   if (look.in_file) out += draw_small_ticks(x, y);
   out += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{}\" height=\"{}\" stroke=\"{}\" stroke-width=\"0.9\"/>",
@@ -222,16 +222,16 @@ double left_of(const Sheet& sheet) {
   return std::max(50.0, std::ceil(widest) + 28);
 }
 
-std::string legend_entry(const Series& series, double left, double middle) {
+std::string legend_entry(const DataSeries& series, double left, double middle) {
   return fmt::format("{}<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"{}\">{}</text>\n", legend_symbol(series, left, middle),
                      left + 24, middle + 4, kInk, escape_html(series.label));
 }
 
 /// Side by side, in as many lines as they need; how high they are.
-std::string legend_lines(const std::vector<Series>& legend, double left, double right, double& height) {
+std::string legend_lines(const std::vector<DataSeries>& legend, double left, double right, double& height) {
   std::string out;
   double x = left, y = kTop + 8;
-  for (const Series& series : legend) {
+  for (const DataSeries& series : legend) {
     const double width = 24 + width_of(series.label);
     if (x > left && x + width > right) x = left, y += kEntry;
     out += legend_entry(series, x, y);

@@ -29,7 +29,7 @@ struct Panel {
   int height = 200;  ///< of the plotting area
   bool log_y = false;
   std::optional<std::pair<double, double>> y_range;  ///< else from the series
-  std::vector<Series> series;
+  std::vector<DataSeries> series;
   std::vector<Marker> markers;
   std::vector<ChartBand> bands;
 };
@@ -51,7 +51,7 @@ struct Sheet {
   int columns = 1;
   /// What the series of all charts look like, by their labels; x and y are not looked at. In the first place of the
   /// last row that no chart takes or, where there is none, above all.
-  std::vector<Series> legend;
+  std::vector<DataSeries> legend;
 };
 
 /// As an element of a page, which gives it its font and background.

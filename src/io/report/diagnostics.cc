@@ -37,7 +37,7 @@ std::string scan_chart(const ScanTrace& scan, const FitResult& result, int& figu
   for (std::size_t i = 0; i < std::min(scan.value.size(), scan.chi_square.size()); ++i)
     points.emplace_back(scan.value[i], scan.chi_square[i]);
   std::sort(points.begin(), points.end());
-  Series series{Series::Kind::line, "scan", {}, {}, kBlue, 1.5};
+  DataSeries series{DataSeries::Kind::line, "scan", {}, {}, kBlue, 1.5};
   for (const auto& [x, y] : points) series.x.push_back(x), series.y.push_back(y);
   panel.series.push_back(std::move(series));
   if (p != nullptr) {
@@ -61,9 +61,9 @@ std::string profile_chart(const ProfileTrace& trace, const FitResult& result, in
       short_name(trace.name) + (p->unit.empty() ? "" : " (" + std::string(p->unit == "um" ? "\u00b5m" : p->unit) + ")");
   Panel panel;
   panel.y_label = "rise of chi-square";
-  Series line{Series::Kind::line, "profile", {}, {}, kBlue, 1.5},
-      normal{Series::Kind::line, "parabola", {}, {}, "#8a919b", 1.0};
-  const Series dots{Series::Kind::points, "", trace.value, trace.rise, kBlue, 4.5};
+  DataSeries line{DataSeries::Kind::line, "profile", {}, {}, kBlue, 1.5},
+      normal{DataSeries::Kind::line, "parabola", {}, {}, "#8a919b", 1.0};
+  const DataSeries dots{DataSeries::Kind::points, "", trace.value, trace.rise, kBlue, 4.5};
   const double from = trace.value.front(), to = trace.value.back(),
                highest = *std::max_element(trace.rise.begin(), trace.rise.end());
   for (int i = 0; i <= 60; ++i) {
@@ -101,13 +101,13 @@ std::string convergence_chart(const FitResult& result, int& figure) {
   Panel panel;
   panel.y_label = "chi-square";
   panel.log_y = true;
-  Series line{Series::Kind::line, "", {}, {}, kBlue, 1.5};
+  DataSeries line{DataSeries::Kind::line, "", {}, {}, kBlue, 1.5};
   for (const Iteration& i : result.iterations) {
     line.x.push_back(i.number), line.y.push_back(i.chi_square);
     panel.log_y = panel.log_y && i.chi_square > 0;
   }
-  Series dots = line;
-  dots.kind = Series::Kind::points;
+  DataSeries dots = line;
+  dots.kind = DataSeries::Kind::points;
   dots.width = 4.5;
   panel.series = {line, dots};
   chart.panels = {panel};
@@ -138,14 +138,14 @@ std::string residual_chart(const std::vector<Frame>& frames, int& figure) {
   chart.x_range = {-kReach, kReach};
   Panel panel;
   panel.y_label = "density";
-  Series bars{Series::Kind::bars, "pixels", {}, {}, kBar, 0};
+  DataSeries bars{DataSeries::Kind::bars, "pixels", {}, {}, kBar, 0};
   double highest = 1 / std::sqrt(2 * std::numbers::pi);
   for (int i = 0; i < kBins; ++i) {
     bars.x.push_back(-kReach + (i + 0.5) * 2 * kReach / kBins);
     bars.y.push_back(histogram[i] / count / (2 * kReach / kBins));
     highest = std::max(highest, bars.y.back());
   }
-  Series normal{Series::Kind::line, "unit normal", {}, {}, kFitted, 1.5};
+  DataSeries normal{DataSeries::Kind::line, "unit normal", {}, {}, kFitted, 1.5};
   for (int i = 0; i <= 120; ++i) {
     const double x = -kReach + i * kReach / 60;
     normal.x.push_back(x), normal.y.push_back(std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi));

@@ -10,7 +10,7 @@ namespace {
 
 /// Of which places of a series something can be drawn, and where.
 struct Places {
-  const Series& series;
+  const DataSeries& series;
   const AxisScale &x, &y;
   std::size_t count = std::min(series.x.size(), series.y.size());
   std::size_t intervals = std::min({count, series.low.size(), series.high.size()});
@@ -33,7 +33,7 @@ struct Places {
   double high(std::size_t i) const { return end(series.high[i]); }
 };
 
-std::string line(const Places& at, const Series& series) {
+std::string line(const Places& at, const DataSeries& series) {
   std::string path;
   bool pen_down = false;
   for (std::size_t i = 0; i < at.count; ++i) {
@@ -49,7 +49,7 @@ std::string line(const Places& at, const Series& series) {
                      series.colour, series.width);
 }
 
-std::string dots(const Places& at, const Series& series, double diameter) {
+std::string dots(const Places& at, const DataSeries& series, double diameter) {
   // One path of zero-length round strokes is a tenth of as many circles.
   std::string path;
   for (std::size_t i = 0; i < at.count; ++i)
@@ -59,30 +59,30 @@ std::string dots(const Places& at, const Series& series, double diameter) {
 }
 
 /// A hollow circle or a triangle as a part of a path; of a triangle the centre of mass is the place.
-std::string shape(Series::Mark mark, double x, double y, double size) {
+std::string shape(DataSeries::Mark mark, double x, double y, double size) {
   const double r = size / 2;
-  if (mark == Series::Mark::circle)
+  if (mark == DataSeries::Mark::circle)
     return fmt::format("M{:.1f} {:.1f}a{:.2f} {:.2f} 0 1 0 {:.2f} 0a{:.2f} {:.2f} 0 1 0 {:.2f} 0z", x - r, y, r, r,
                        size, r, r, -size);
-  const double up = mark == Series::Mark::up ? 1 : -1;
+  const double up = mark == DataSeries::Mark::up ? 1 : -1;
   return fmt::format("M{:.1f} {:.1f}l{:.2f} {:.2f}h{:.2f}z", x, y - up * 1.15 * r, r, up * 1.73 * r, -size);
 }
 
-std::string shapes(const std::string& path, const Series& series) {
-  return series.mark == Series::Mark::circle
+std::string shapes(const std::string& path, const DataSeries& series) {
+  return series.mark == DataSeries::Mark::circle
              ? fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\"/>", path, series.colour)
              : fmt::format("<path d=\"{}\" fill=\"{}\"/>", path, series.colour);
 }
 
-std::string points(const Places& at, const Series& series) {
-  if (series.mark == Series::Mark::dot) return dots(at, series, series.width);
+std::string points(const Places& at, const DataSeries& series) {
+  if (series.mark == DataSeries::Mark::dot) return dots(at, series, series.width);
   std::string path;
   for (std::size_t i = 0; i < at.count; ++i)
     if (at.inside(i)) path += shape(series.mark, at.x(series.x[i]), at.y(series.y[i]), series.width);
   return shapes(path, series);
 }
 
-std::string bars(const Places& at, const Series& series) {
+std::string bars(const Places& at, const DataSeries& series) {
   std::string out;
   const double half = at.count > 1 ? 0.5 * (series.x[1] - series.x[0]) : 0.5;
   for (std::size_t i = 0; i < at.count; ++i)
@@ -94,7 +94,7 @@ std::string bars(const Places& at, const Series& series) {
   return out;
 }
 
-std::string interval_bars(const Places& at, const Series& series) {
+std::string interval_bars(const Places& at, const DataSeries& series) {
   std::string path;
   for (std::size_t i = 0; i < at.intervals; ++i)
     if (at.interval(i)) path += fmt::format("M{:.1f} {:.1f}V{:.1f}", at.x(series.x[i]), at.low(i), at.high(i));
@@ -102,7 +102,7 @@ std::string interval_bars(const Places& at, const Series& series) {
 }
 
 /// A closed outline of every stretch of intervals that nothing interrupts.
-std::string strip(const Places& at, const Series& series) {
+std::string strip(const Places& at, const DataSeries& series) {
   std::string path;
   for (std::size_t from = 0, to; from < at.intervals; from = to + 1) {
     for (to = from; to < at.intervals && at.interval(to);) ++to;
@@ -116,26 +116,26 @@ std::string strip(const Places& at, const Series& series) {
 
 }  // namespace
 
-std::string draw_series(const Series& series, const AxisScale& x, const AxisScale& y) {
+std::string draw_series(const DataSeries& series, const AxisScale& x, const AxisScale& y) {
   const Places at{series, x, y};
   switch (series.kind) {
-    case Series::Kind::line:
+    case DataSeries::Kind::line:
       return strip(at, series) + line(at, series) + (series.dots > 0 ? dots(at, series, series.dots) : "");
-    case Series::Kind::points:
+    case DataSeries::Kind::points:
       return interval_bars(at, series) + points(at, series);
-    case Series::Kind::bars:
+    case DataSeries::Kind::bars:
       return bars(at, series);
   }
   return {};
 }
 
-std::string legend_symbol(const Series& series, double left, double middle) {
+std::string legend_symbol(const DataSeries& series, double left, double middle) {
   const auto dot = [&](double diameter, double x) {
     return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\"/>", x, middle,
                        std::max(diameter / 2, 1.6), series.colour);
   };
   switch (series.kind) {
-    case Series::Kind::line: {
+    case DataSeries::Kind::line: {
       std::string out = fmt::format("<path d=\"M{:.1f} {:.1f}h17\" stroke=\"{}\" stroke-width=\"{}\"/>", left, middle,
                                     series.colour, series.width);
       if (!series.low.empty())
@@ -144,16 +144,16 @@ std::string legend_symbol(const Series& series, double left, double middle) {
             middle - 5, series.colour);
       return series.dots > 0 ? out + dot(series.dots, left + 8.5) : out;
     }
-    case Series::Kind::points: {
+    case DataSeries::Kind::points: {
       const std::string bar = series.low.empty()
                                   ? ""
                                   : fmt::format("<path d=\"M{:.1f} {:.1f}v12\" stroke=\"{}\" stroke-width=\"1.2\"/>",
                                                 left + 10, middle - 6, series.colour);
-      return bar + (series.mark == Series::Mark::dot
+      return bar + (series.mark == DataSeries::Mark::dot
                         ? dot(series.width, left + 10)
                         : shapes(shape(series.mark, left + 10, middle, series.width), series));
     }
-    case Series::Kind::bars:
+    case DataSeries::Kind::bars:
       return fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"14\" height=\"9\" fill=\"{}\"/>", left + 3,
                          middle - 4.5, series.colour);
   }

@@ -1,5 +1,5 @@
 #pragma once
-// Series and how they are drawn, in a chart and in its legend. Private to io and app.
+// Series of data and how they are drawn, in a chart and in its legend. Private to io and app.
 
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace birefit {
 
-struct Series {
+struct DataSeries {
   enum class Kind { line, points, bars };
   enum class Mark { dot, circle, up, down };  ///< a circle is hollow; triangles point up or down
   Kind kind = Kind::line;
@@ -22,8 +22,8 @@ struct Series {
   std::vector<double> low{}, high{};
 };
 
-std::string draw_series(const Series& series, const AxisScale& x, const AxisScale& y);
+std::string draw_series(const DataSeries& series, const AxisScale& x, const AxisScale& y);
 /// What stands before a series' label in a legend: 22 wide, around the height `middle`.
-std::string legend_symbol(const Series& series, double left, double middle);
+std::string legend_symbol(const DataSeries& series, double left, double middle);
 
 }  // namespace birefit

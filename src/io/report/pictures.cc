@@ -246,8 +246,8 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
   Panel values;
   values.y_label = frame.unit;
   values.height = 230;
-  values.series.push_back({Series::Kind::points, "measured", profile.position, profile.measured, kMeasured, dot});
-  values.series.push_back({Series::Kind::line, "fitted", profile.position, profile.fitted, kFitted, 1.5});
+  values.series.push_back({DataSeries::Kind::points, "measured", profile.position, profile.measured, kMeasured, dot});
+  values.series.push_back({DataSeries::Kind::line, "fitted", profile.position, profile.fitted, kFitted, 1.5});
   Panel residuals;
   residuals.y_label = profile.mean ? "mean residual (\u03c3)" : "residual (\u03c3)";
   residuals.height = 88;
@@ -258,8 +258,8 @@ std::string frame_section(const Frame& frame, const FitResult& result, int& figu
   residuals.y_range = {-end, end};
   if (!profile.mean || end > 1) residuals.bands = {{-2, 2, kBand2}, {-1, 1, kBand1}};
   residuals.series.push_back(
-      {Series::Kind::line, "", {profile.position.front(), profile.position.back()}, {0, 0}, "#8a919b", 0.9});
-  residuals.series.push_back({Series::Kind::points, "", profile.position, profile.residual, kMeasured, dot});
+      {DataSeries::Kind::line, "", {profile.position.front(), profile.position.back()}, {0, 0}, "#8a919b", 0.9});
+  residuals.series.push_back({DataSeries::Kind::points, "", profile.position, profile.residual, kMeasured, dot});
   chart.panels = {values, residuals};
   out += "<figure>\n" + wide_and_narrow(chart);
   out += fmt::format(
@@ -299,16 +299,16 @@ std::string signal_section(const SignalTable& table, const FitResult& result, in
   Panel values;
   values.y_label = table.quantity;
   values.height = 230;
-  values.series.push_back({Series::Kind::points, "measured", x, measured, kMeasured, dot});
-  values.series.push_back({Series::Kind::line, "fitted", x, fitted, kFitted, 1.5});
+  values.series.push_back({DataSeries::Kind::points, "measured", x, measured, kMeasured, dot});
+  values.series.push_back({DataSeries::Kind::line, "fitted", x, fitted, kFitted, 1.5});
   Panel residuals;
   residuals.y_label = "residual (\u03c3)";
   residuals.height = 88;
   const double end = std::max(1.1 * largest, 3.3);
   residuals.y_range = {-end, end};
   residuals.bands = {{-2, 2, kBand2}, {-1, 1, kBand1}};
-  residuals.series.push_back({Series::Kind::line, "", {x.front(), x.back()}, {0, 0}, "#8a919b", 0.9});
-  residuals.series.push_back({Series::Kind::points, "", x, whitened, kMeasured, dot});
+  residuals.series.push_back({DataSeries::Kind::line, "", {x.front(), x.back()}, {0, 0}, "#8a919b", 0.9});
+  residuals.series.push_back({DataSeries::Kind::points, "", x, whitened, kMeasured, dot});
   chart.panels = {values, residuals};
   return "<h3>" + escape_html(table.name) + "</h3>\n<figure>\n" + wide_and_narrow(chart) +
          fmt::format(

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "core/robust.h"
+#include "io/report/axis.h"
 #include "io/report/page.h"
 
 namespace birefit::page {
@@ -15,7 +16,6 @@ namespace {
 
 constexpr std::size_t kMostParameters = 6;
 constexpr double kLeft = 78, kTop = 22, kRight = 10, kBottom = 58, kGap = 8;
-constexpr const char* kInk = "#2b2f36";
 constexpr const char* kBars = "#b9c4d3";
 
 /// One parameter's draws, and the range that is drawn of them.

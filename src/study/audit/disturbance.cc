@@ -66,7 +66,7 @@ Theta with(Theta theta, const std::vector<int>& numbers, double more) {
 }
 
 /// Of every frame, once.
-std::vector<int> numbers_of(const FitJob& job, ParameterRef Microscope::*number) {
+std::vector<int> numbers_in(const FitJob& job, ParameterRef Microscope::*number) {
   std::vector<int> found;
   for_each_scene(job.measurements, [&](const Scene& scene) {
     const ParameterRef ref = scene.microscope.*number;
@@ -76,7 +76,7 @@ std::vector<int> numbers_of(const FitJob& job, ParameterRef Microscope::*number)
 }
 
 void add_mixed(const FitJob& job, std::vector<Disturbance>& all) {
-  if (const std::vector<int> wavelengths = numbers_of(job, &Microscope::wavelength_nm); !wavelengths.empty()) {
+  if (const std::vector<int> wavelengths = numbers_in(job, &Microscope::wavelength_nm); !wavelengths.empty()) {
     Disturbance d{"bandwidth", "standard deviation of the light's wavelengths", "nm", {3, 6, 12}};
     d.mixed = [wavelengths](Exposure& e, const Theta& theta) {
       const double off = std::sqrt(3.0) * e.size;  // Gauss and Hermite's three
@@ -85,7 +85,7 @@ void add_mixed(const FitJob& job, std::vector<Disturbance>& all) {
     };
     all.push_back(d);
   }
-  if (const std::vector<int> analyzers = numbers_of(job, &Microscope::analyzer_deg); !analyzers.empty()) {
+  if (const std::vector<int> analyzers = numbers_in(job, &Microscope::analyzer_deg); !analyzers.empty()) {
     Disturbance d{"leak", "of the analyser: the other polarization's light", "%", {0.001, 0.003, 0.01}};
     d.mixed = [analyzers](Exposure& e, const Theta& theta) {
       return std::vector<std::pair<double, Theta>>{{1, theta}, {e.size, with(theta, analyzers, 90)}};
