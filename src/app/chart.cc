@@ -293,7 +293,7 @@ constexpr const char* kRules[] = {"Gauss", "even in 1/wavelength", "even in wave
 constexpr const char* kRuleColours[] = {"#0072B2", "#56B4E9", "#D55E00", "#000000", "#009E73"};
 
 /// "1.43/40 nm" of "echoes in 1.43, 40 nm".
-std::string short_name(std::string echoes) {
+std::string short_words(std::string echoes) {
   echoes.erase(0, std::string_view("echoes in ").size());
   return echoes.replace(echoes.find(", "), 2, "/");
 }
@@ -338,7 +338,7 @@ Sheet spectra_sheet(const std::vector<SpectrumPoint>& points) {
   panel.log_y = true;
   panel.y_range = {1e-13, 1};
   for (std::size_t k = 0; k < echoes.size(); ++k) {
-    DataSeries series = line_with_dots(short_name(echoes[k]), kColours[4 + k % 6]);
+    DataSeries series = line_with_dots(short_words(echoes[k]), kColours[4 + k % 6]);
     for (const SpectrumPoint& p : points)
       if (p.scene == echoes[k])
         series.x.push_back(static_cast<double>(series.x.size())), series.y.push_back(std::max(p.error, 1e-13));

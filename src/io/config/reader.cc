@@ -9,6 +9,7 @@
 
 #include "io/files/table.h"
 #include "io/files/whole_file.h"
+#include "io/images/asked.h"
 
 namespace birefit {
 namespace {
@@ -20,11 +21,6 @@ std::string last_key(const std::string& path) {
   // "center_px.x" alone would read "x".
   if (key.size() == 1 && dot != std::string::npos) return last_key(path.substr(0, dot)) + "." + key;
   return key;
-}
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
 }
 
 /// More is no config.
