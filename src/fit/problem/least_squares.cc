@@ -1,11 +1,7 @@
 #include "fit/problem/least_squares.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <limits>
-#include <memory>
-#include <numbers>
 #include <numeric>
 #include <set>
 #include <tuple>
@@ -243,7 +239,8 @@ void LeastSquares::for_frames(const Body& body) {
   parallel_for(frames, apart ? threads : 1, [&](int g) { body(static_cast<std::size_t>(g), apart ? 1 : threads); });
 }
 
-void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
+/// `known`: intensity and, where asked for, derivatives are those of this point already.
+void LeastSquares::render_frame(std::size_t g, bool derivatives, bool known, int threads) {
   Frame& frame = frames_[g];
   std::vector<int> active;
   if (derivatives)
@@ -253,8 +250,9 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
     for (int j = 0; j < searched_size(); ++j)
       if (std::find(frame.read.begin(), frame.read.end(), j) == frame.read.end())
         searched_columns_.col(j).segment(frame.begin, frame.count).setZero();
-  render_tied(g, active, threads, intensity,
-              [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
+  if (!known)
+    render_tied(g, active, threads, intensity,
+                [&](std::size_t j) { return searched_columns_.col(frame.read[j]).segment(frame.begin, frame.count); });
   frame.intensity_low = frame.count ? intensity.minCoeff() : 0;
   frame.intensity_high = frame.count ? intensity.maxCoeff() : 0;
   set_effects(frame, intensity);
@@ -268,6 +266,19 @@ void LeastSquares::render_frame(std::size_t g, bool derivatives, int threads) {
     });
     whiten(frame, term.whitened, threads);
   }
+}
+
+void LeastSquares::render_frames(const Eigen::VectorXd& searched, bool derivatives) {
+  constexpr Eigen::Index kMostKept = 1 << 23;  // 64 MB
+  const Eigen::Index p = searched.size();
+  const bool known = rendered_at_ == searched;
+  if (known) intensity_ = rendered_.col(p);
+  if (known && derivatives) searched_columns_.topRows(pixel_rows_) = rendered_.leftCols(p);
+  for_frames([&](std::size_t g, int threads) { render_frame(g, derivatives, known, threads); });
+  if (known || !derivatives || pixel_rows_ * (p + 1) > kMostKept) return;
+  rendered_.resize(pixel_rows_, p + 1);
+  rendered_ << searched_columns_.topRows(pixel_rows_), intensity_;
+  rendered_at_ = searched;
 }
 
 Eigen::MatrixXd LeastSquares::intensity_by(const std::vector<int>& table_indices) {
@@ -356,7 +367,7 @@ void LeastSquares::evaluate(const Eigen::VectorXd& searched, bool derivatives) {
   has_derivatives_ = false;
   if (derivatives) searched_columns_.resize(residual_.size(), p);
   ++evaluations_;
-  for_frames([&](std::size_t g, int threads) { render_frame(g, derivatives, threads); });
+  render_frames(searched, derivatives);
   solve_linear();
   if (!derivatives) return;
 

@@ -149,7 +149,8 @@ class LeastSquares {
     double intensity_low = 0, intensity_high = 0;
     Rendering rendering;  ///< kept for its memory
   };
-  void render_frame(std::size_t frame, bool derivatives, int threads);
+  void render_frame(std::size_t frame, bool derivatives, bool known, int threads);
+  void render_frames(const Eigen::VectorXd& searched, bool derivatives);
   using ColumnOf = std::function<Eigen::Ref<Eigen::VectorXd>(std::size_t)>;
   void render_used(std::size_t frame, const std::vector<int>& active, int threads,
                    Eigen::Ref<Eigen::VectorXd> intensity, const ColumnOf& derivative);
@@ -192,6 +193,11 @@ class LeastSquares {
 
   Theta theta_;
   Eigen::VectorXd intensity_;  ///< raw
+  /// d intensity / d searched and, last, the intensity where derivatives were asked for last: a solver ends where it
+  /// looked before its last step, and between two fits from there weights have changed, not the sample. Kept unless it
+  /// would take much memory.
+  Eigen::MatrixXd rendered_;
+  std::optional<Eigen::VectorXd> rendered_at_;
   Eigen::VectorXd whitened_value_;
   Eigen::MatrixXd linear_information_;
   Eigen::VectorXd residual_;
