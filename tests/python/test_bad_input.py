@@ -64,6 +64,7 @@ def test_every_bad_input_of_the_program_raises_at_its_place(tmp_path):
     (np.zeros((0, 4)), "without pixels"),
     (np.zeros((36, 40, 3)), "colour channels"),
     (np.full((36, 40), np.nan), "no usable pixel"),
+    (np.random.default_rng(1).normal(1e200, 1e198, (36, 40)), "whose squares no number holds"),
     (np.full((36, 40), "a"), "no real numbers"),
     (np.zeros((36, 40), complex), "no real numbers"),
     (np.full((36, 40), 255, np.uint8), "saturated"),

@@ -397,5 +397,18 @@ TEST(Fit, AnImageWithoutUsablePixelsIsTheUsersMistake) {
   EXPECT_THROW(fit(bar.job), UserError);
 }
 
+// Chi-square is made of squares.
+TEST(Fit, ValuesWhoseSquaresOverflowAreNamed) {
+  Bar bar;
+  bar.free(bar.bias, 500, 100, 4000);
+  for (double& value : bar.add_image(16, 16, bar.bias).values.values()) value = 1e200;
+  try {
+    fit(bar.job);
+    FAIL() << "fitted";
+  } catch (const UserError& error) {
+    EXPECT_NE(error.problems().front().what.find("whose squares"), std::string::npos) << error.problems().front().what;
+  }
+}
+
 }  // namespace
 }  // namespace birefit

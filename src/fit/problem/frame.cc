@@ -69,6 +69,18 @@ void note_rounding(const Task& task, Frames& frames) {
   }
 }
 
+/// Chi-square is made of squares.
+void refuse_what_overflows(const Picture& picture) {
+  double largest = 0;
+  for (std::size_t i = 0; i < picture.values.values().size(); ++i)
+    if (const double value = picture.values.values()[i]; picture.mask.values()[i] && std::isfinite(value))
+      largest = std::max(largest, std::abs(value));
+  if (!std::isfinite(largest * largest))
+    throw UserError(Where{},
+                    fmt::format("{} has values up to {:.2g}, whose squares no number holds", picture.name, largest),
+                    "divide them by a power of ten");
+}
+
 }  // namespace
 
 Start prepare(const Task& task) {
@@ -82,6 +94,7 @@ Start prepare(const Task& task) {
   std::size_t used = 0;
   for (int g = 0; g < task.frames(); ++g) {
     const Picture& micrograph = task.picture(g);
+    refuse_what_overflows(micrograph);
     Frame frame;
     frame.plan = task.planned(g, start.theta);
     frame.noise = micrograph.noise ? *micrograph.noise : estimate_noise(micrograph);
