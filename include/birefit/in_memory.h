@@ -14,6 +14,8 @@ struct ArrayImage {
   /// Of the samples; integers of 8 and 16 bits are counts, and saturate at their top code.
   enum class Sample { uint8, uint16, float32, float64 };
   Sample sample = Sample::float64;
+  /// Of samples that were integers of so many bits, 8 or 16, before some became NaN, which no fit uses; 0: of others
+  int count_bits = 0;
   int width = 0, height = 0, channels = 1;                            ///< three or four channels: r, g, b, alpha
   std::ptrdiff_t row_bytes = 0, column_bytes = 0, channel_bytes = 0;  ///< from one to the next; any sign
   const void* first = nullptr;                                        ///< sample of row 0, column 0, channel 0

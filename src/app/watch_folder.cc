@@ -115,7 +115,8 @@ class Watched {
     for (const Json& one : list) {
       const FileState state{one.value("device", std::uint64_t{0}), one.value("inode", std::uint64_t{0}),
                             one.value("size", std::uint64_t{0}), one.value("changed_ns", std::int64_t{0})};
-      const Arrival arrival{one.value("file", ""), state, {}, false};
+      const Arrival arrival{
+          one.contains("bytes") ? text_of_bytes(one["bytes"]) : one.value("file", ""), state, {}, false};
       if (arrival.name.empty() || arrival.name.find('/') != std::string::npos) continue;
       const std::string reason = one.value("unreadable", "");
       std::error_code code;
@@ -177,6 +178,11 @@ class Watched {
                       {"size", states_[i].size},
                       {"changed_ns", states_[i].changed_ns}});
       if (!series_.frames[i].unreadable.empty()) list.back()["unreadable"] = series_.frames[i].unreadable;
+      // A name that is no UTF-8 is not in JSON what it was.
+      const std::string& name = series_.frames[i].name;
+      if (const std::string as_text = Json(name).dump(-1, ' ', false, Json::error_handler_t::replace);
+          Json::parse(as_text).get<std::string>() != name)
+        list.back()["bytes"] = std::vector<unsigned char>(name.begin(), name.end());
     }
     write_files({{out_ / "series.csv", series_csv(series_, result)},
                  {out_ / kArrivals, list.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"}});
@@ -190,6 +196,12 @@ class Watched {
  private:
   static constexpr const char* kArrivals = "arrivals.json";
 
+  static std::string text_of_bytes(const Json& bytes) {
+    std::string text;
+    for (const Json& byte : bytes)
+      if (byte.is_number_unsigned()) text.push_back(static_cast<char>(byte.get<unsigned>()));
+    return text;
+  }
   static std::string reason_of(const UserError& error) {
     std::string words;
     for (const Problem& problem : error.problems())

@@ -1,6 +1,7 @@
 #include "python/arrays.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "birefit/error.h"
@@ -44,8 +45,15 @@ ArrayImage image_of(const py::array& given, const std::string& name) {
   constexpr py::ssize_t kMost = 1 << 20;
   for (py::ssize_t i = 0; i < given.ndim(); ++i)
     if (given.shape(i) > kMost) refuse(name, "has too many pixels on a side", "crop it to the object, or bin it");
-  const py::array array = readable(given, name);
+  py::array array = readable(given, name);
   ArrayImage image;
+  const py::object masked = py::module_::import("numpy").attr("ma");
+  if (py::isinstance(given, masked.attr("MaskedArray"))) {
+    const bool some = masked.attr("is_masked")(given).cast<bool>();
+    if (some && (is(array, "uint8") || is(array, "uint16"))) image.count_bits = is(array, "uint8") ? 8 : 16;
+    array = (some ? array.attr("astype")("float64").attr("filled")(py::float_(std::nan(""))) : array.attr("data"))
+                .cast<py::array>();
+  }
   image.sample = sample_of(array);
   image.height = static_cast<int>(array.shape(0)), image.width = static_cast<int>(array.shape(1));
   image.row_bytes = array.strides(0), image.column_bytes = array.strides(1);

@@ -85,6 +85,12 @@ mkdir own_name && cp droplet/droplet.png own_name/fitted.tif && sed 's/droplet.p
 [ $? -eq 2 ] || fail 'a fit over its own image'
 says replaced.txt 'which the config reads and the results would replace'
 cmp -s droplet/droplet.png own_name/fitted.tif || fail 'the image was replaced'
+# Nor the config itself, where --set makes another of it.
+mkdir own_config && cp droplet/droplet.png own_config && cp droplet/droplet.yaml own_config/config.yaml
+"$birefit" fit own_config/config.yaml --out own_config --set sample.droplet.diameter_um.value=9 > replaced.txt 2>&1
+[ $? -eq 2 ] || fail 'a fit over its own config'
+says replaced.txt 'this very config, which the results would replace'
+cmp -s droplet/droplet.yaml own_config/config.yaml || fail 'the config was replaced'
 "$birefit" render droplet/droplet.yaml --out droplet/droplet.png > replaced.txt 2>&1
 [ $? -eq 2 ] || fail 'a picture over the image of its config'
 "$birefit" new droplet --image nothing.png > none.txt 2>&1

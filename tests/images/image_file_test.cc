@@ -88,6 +88,53 @@ TEST_F(ImageFile, ReadsTiledTiff) {
   EXPECT_EQ(image.values.values(), std::vector<double>(samples.begin(), samples.end()));
 }
 
+// OpenImageIO 2.4 hands out parts of such strips as zeros, and tiles as whatever memory held.
+TEST_F(ImageFile, Reads64BitFloatTiffWholeOrInPartAndRefusesTiles) {
+  std::vector<double> samples(60 * 46);
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = 100 + 0.37 * static_cast<double>(i);
+  ImageSpec spec(60, 46, 1, TypeDesc::DOUBLE);
+  for (const int rows : {1, 7, 46}) {
+    spec.attribute("tiff:RowsPerStrip", rows);
+    const fs::path file = write("a.tif", spec, samples);
+    EXPECT_EQ(load(file).values.values(), samples) << rows;
+    for (const PixelRect part : {PixelRect{0, 5, 60, 41}, PixelRect{0, 7, 60, 42}, PixelRect{3, 0, 9, 2}}) {
+      ImageRequest request{file, {}, {}, {"job.yaml", 3, 5}};
+      request.region = part;
+      const LoadedImage image = load_image(request);
+      for (int y = part.y0; y < part.y1; ++y)
+        for (int x = part.x0; x < part.x1; ++x)
+          ASSERT_EQ(image.values(x - image.x0, y - image.y0), samples[static_cast<std::size_t>(60 * y + x)])
+              << rows << ", " << x << ", " << y;
+    }
+  }
+  spec.tile_width = spec.tile_height = 16;
+  const fs::path tiled = write("tiled.tif", spec, samples);
+  EXPECT_THAT(message_of([&] { load(tiled); }), HasSubstr("64-bit float samples in tiles"));
+}
+
+// Layers of a renderer: the one without a name is the picture.
+TEST_F(ImageFile, OfSeveralLayersTheOneWithoutANameIsThePicture) {
+  const auto layers = [&](std::vector<std::string> names) {
+    ImageSpec spec(2, 1, static_cast<int>(names.size()), TypeDesc::FLOAT);
+    spec.channelnames = std::move(names);
+    std::vector<float> samples(2 * static_cast<std::size_t>(spec.nchannels));
+    for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<float>(i % samples.size());
+    return write("a.exr", spec, samples);
+  };
+  for (const auto& names : {std::vector<std::string>{"R", "G", "B", "diffuse.R", "diffuse.G", "diffuse.B"},
+                            std::vector<std::string>{"AO.R", "AO.G", "AO.B", "R", "G", "B"}}) {
+    const fs::path file = layers(names);
+    const auto input = OIIO::ImageInput::open(file.string());  // stored in an order of its own
+    const auto& stored = input->spec().channelnames;
+    const auto at = std::find(stored.begin(), stored.end(), "R") - stored.begin();
+    std::vector<float> all(12);
+    ASSERT_TRUE(input->read_image(0, 0, 0, 6, TypeDesc::FLOAT, all.data()));
+    EXPECT_EQ(load(file, "r").values(0, 0), all[static_cast<std::size_t>(at)]) << names[0];
+  }
+  const fs::path both = layers({"left.R", "left.G", "left.B", "right.R", "right.G", "right.B"});
+  EXPECT_THAT(message_of([&] { load(both, "r"); }), HasSubstr("several layers of colours"));
+}
+
 TEST_F(ImageFile, RestoresCountsOfPacked12BitTiff) {
   ImageSpec spec(64, 64, 1, TypeDesc::UINT16);
   spec.attribute("oiio:BitsPerSample", 12);
@@ -324,6 +371,10 @@ TEST_F(ImageFile, OmePhysicalSizeIsTrustedAndItsUnitDefaultsToMicrometres) {
   EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"0.065\" PhysicalSizeY=\"0.065\""), 0.065);
   EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"65\" PhysicalSizeXUnit=\"nm\""), 0.065);
   EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"0.065\" PhysicalSizeXUnit=\"\xc2\xb5m\""), 0.065);
+  // As Python's ElementTree writes it.
+  EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"0.065\" PhysicalSizeXUnit=\"&#181;m\""), 0.065);
+  EXPECT_DOUBLE_EQ(size("PhysicalSizeX=\"0.065\" PhysicalSizeXUnit=\"&#xB5;m\""), 0.065);
+  EXPECT_EQ(size("PhysicalSizeX=\"1\" PhysicalSizeXUnit=\"Mm\""), 0);
   EXPECT_EQ(size("PhysicalSizeX=\"1\" PhysicalSizeXUnit=\"pixel\""), 0);
   EXPECT_EQ(size("PhysicalSizeX=\"0.1\" PhysicalSizeY=\"0.2\""), 0) << "not square";
 }

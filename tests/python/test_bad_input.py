@@ -92,6 +92,7 @@ def test_images_that_are_none(droplet, image, words):
     (lambda job: job.fit(threads=1.5), "threads is 1.5"),
     (lambda job: job.residual(job.theta0[:-1]), "a number for each of"),
     (lambda job: job.residual(job.theta0 + 0j), "complex"),
+    (lambda job: job.residual(np.ma.masked_array(job.theta0, [True] + [False] * (len(job.theta0) - 1))), "masked"),
     (lambda job: job.log_posterior(np.zeros((2, 2, 2))), "has the shape"),
 ])
 def test_numbers_that_are_none(droplet, call, words):
@@ -105,6 +106,12 @@ def test_numbers_that_are_none(droplet, call, words):
 def test_what_is_no_tree(tree):
     with pytest.raises(birefit.Error):
         birefit.Job(tree)
+
+
+@pytest.mark.parametrize("set", ["sample.droplet.diameter_um=4.5", [3], {"sample.droplet.diameter_um": 3 + 0j}])
+def test_what_cannot_be_set(droplet, set):
+    with pytest.raises(birefit.Error, match="set"):
+        birefit.Job(droplet, set=set)
 
 
 def test_keywords_count_above_values(droplet):

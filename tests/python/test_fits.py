@@ -221,6 +221,41 @@ def test_what_is_masked_is_left_out(droplet, photograph):
     assert both.fit().values == both.fit(photograph).values
 
 
+def test_masked_counts_saturate_as_others_do(droplet):
+    light = birefit.Job(droplet).render(birefringence=0.152)
+    noise = np.random.default_rng(3).normal(0, 4, light.shape)
+    counts = np.clip(np.rint(270 * light / light.max() + 8 + noise), 0, 255).astype(np.uint8)
+    mask = np.zeros(counts.shape, bool)
+    mask[0, 0] = True
+    job = birefit.Job(droplet)
+    masked = job.fit(np.ma.masked_array(counts, mask))
+    droplet["micrograph"] |= {"image": "photo", "mask": "usable"}
+    expected = birefit.Job(droplet, arrays={"photo": counts, "usable": (~mask).astype(np.uint8)}).fit()
+    saturated = masked.to_dict()["pixels"]["saturated"]
+    assert saturated == np.count_nonzero(counts == 255) > 0
+    assert masked.values == expected.values
+
+
+def test_names_are_found_by_their_endings_however_one_asks(result):
+    values = result.values
+    assert "birefringence" in values and "sample.material.birefringence" in values and "birefringenc" not in values
+    assert values.get("birefringence") == values["birefringence"] and values.get("none", 3) == 3
+    assert values.copy()["birefringence"] == values["birefringence"]
+    with pytest.raises(birefit.Error, match="is no name"):
+        values[3]
+
+
+def test_quantities_at_a_kink_or_the_edge_of_what_is_defined(droplet, photograph, result):
+    at = result.values["birefringence"]
+    droplet["report"] = {"size": f"abs(birefringence - {at:.17g})", "edge": f"log(birefringence - {at - 1e-9:.17g})"}
+    derived = {each["name"]: each for each in birefit.Job(droplet).fit(photograph).to_dict()["derived"]}
+    low, high = derived["size"]["interval_95"]
+    # No size is negative; of a normal distribution's, 97.5 % lie within 2.24 standard deviations.
+    assert 0 <= low < high < 2.5 * result.stderr["birefringence"]
+    # Half of what the picture allows has no logarithm.
+    assert derived["edge"]["stderr"] is None
+
+
 def test_what_follows_from_a_limit_is_not_known(droplet):
     """A thickness that the picture does not tell from 0 has no product with an error."""
     cell = {

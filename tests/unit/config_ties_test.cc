@@ -96,6 +96,20 @@ TEST_F(ConfigTies, SayWhatIsWrongAndWhere) {
   EXPECT_THAT(mistakes(cell("[8, 8]", "[\"2 * polarizer_deg\", 8]")), HasSubstr("an expression that reads others"));
 }
 
+TEST_F(ConfigTies, QuantitiesAreInTheUnitThatTheirNamesEndIn) {
+  const auto reported = [&](const std::string& name, const std::string& law) {
+    const Config config = load(kCell + ("report: {" + name + ": \"" + law + "\"}\n"));
+    const Derived& derived = config.job.derived.at(0);
+    return std::pair(derived.unit, config.job.parameters.value_of(derived.tie, config.job.parameters.values()));
+  };
+  EXPECT_EQ(reported("p_pa", "3 * MPa").first, "Pa");
+  EXPECT_NEAR(reported("p_pa", "3 * MPa").second, 3e6, 1e-3);
+  EXPECT_NEAR(reported("drive_kv", "1638 * V").second, 1.638, 1e-12);
+  EXPECT_NEAR(reported("drive_mv", "2 * V").second, 2000, 1e-9);
+  EXPECT_NEAR(reported("area_mm2", "(1000 * um) * (1000 * um)").second, 1, 1e-12);
+  EXPECT_THAT(mistakes(kCell + std::string("report: {a_kv: thickness_um}\n")), HasSubstr("not in kV"));
+}
+
 TEST_F(ConfigTies, NameTheCircle) {
   const std::string text =
       cell("twist_deg: 90, azimuth_deg: 10", "twist_deg: 2 * azimuth_deg, azimuth_deg: twist_deg / 2");

@@ -158,6 +158,19 @@ TEST_F(CalibrationFrames, CountsOfTwoKindsAreNotSubtracted) {
   EXPECT_EQ(problems(with("dark: dark_8.png")), "");  // floats have the scale that their maker gave them
 }
 
+// A frame that was smoothed has no noise for its own slopes to be told from.
+TEST_F(CalibrationFrames, OfSmoothFramesNoPixelIsDead) {
+  constexpr int kSize = 60;
+  Image flat(kSize, kSize), image(kSize, kSize, 0.5);
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      flat(x, y) = 1000 - 0.1 * (x - 20) * (x - 20) - 0.15 * (y - 35) * (y - 35), image(x, y) = 0.5 * flat(x, y);
+  save_image(flat, folder_ / "light.tif");
+  save_image(image, folder_ / "image.tif");
+  const Config config = load(with("flat: light.tif"));
+  EXPECT_EQ(picture(config.job, 0).dead, 0);
+}
+
 TEST_F(CalibrationFrames, FlatAloneDivides) {
   const Config config = load(with("flat: light.tif"));
   EXPECT_DOUBLE_EQ(picture(config.job, 0).values(0, 0), 120.0 / 220);

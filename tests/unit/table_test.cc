@@ -96,6 +96,21 @@ TEST_F(TableFile, ALineOfUnitsIsTakenForUnitsAndSaid) {
   EXPECT_FALSE(contradicts_unit("a.u.", "V"));
 }
 
+// Degrees are what angles are asked for in: radians under whatever name are not.
+TEST_F(TableFile, UnitsMayBeSpeltOut) {
+  for (const char* unit : {"radians", "Radian", "rad", "Rad", "milliradians"})
+    EXPECT_TRUE(contradicts_unit(unit, "deg")) << unit;
+  for (const char* unit : {"degrees", "degree", "Deg"}) EXPECT_FALSE(contradicts_unit(unit, "deg")) << unit;
+  EXPECT_TRUE(contradicts_unit("millivolts", "V"));
+  EXPECT_TRUE(contradicts_unit("nanometers", "um"));
+  EXPECT_FALSE(contradicts_unit("Kelvin", "K"));
+  EXPECT_FALSE(contradicts_unit("micrometres", "um"));
+  for (const char* name : {"a (radians)", "a/rad", "a_Rad", "a, rad", "angle in rad", "a_rad"})
+    EXPECT_TRUE(contradicts_unit(unit_in_name(name), "deg")) << name;
+  for (const char* name : {"angle", "grad", "a_deg", "drive V", "brad"})
+    EXPECT_FALSE(contradicts_unit(unit_in_name(name), "deg")) << name;
+}
+
 TEST_F(TableFile, RowsWithoutANumberAreLeftOutWhereThatIsAsked) {
   const std::string text = "m,r_cm\n1,2\n2,NaN\n3,\n4,OL\n5,6\n";
   const PlacedTable table = read(text, MissingNumbers::left_out);

@@ -121,7 +121,9 @@ class Draws {
       thetas_.push_back(std::move(theta));
     }
   }
-  /// Deviations of a number from `value`, sorted. `alone`: what nothing fitted depends on, and how well it is known.
+  std::size_t size() const { return thetas_.size(); }
+  /// Deviations of a number from `value`, sorted, of draws that have one. `alone`: what nothing fitted depends on, and
+  /// how well it is known.
   std::vector<double> deviations(const ValueAt& value_at, double value,
                                  const std::vector<std::pair<int, double>>& alone) {
     std::vector<double> all;
@@ -161,23 +163,33 @@ double error_of_parts(const Task& task, const FitResult& result, const std::vect
   return std::sqrt(squares);
 }
 
-/// Errors by draws, where these spread clearly farther than to first order. `half`: of the interval to first order.
+/// Errors by draws, where these spread clearly farther than to first order, or on one side clearly less: at a kink, or
+/// beside a pole. Not known where some of the draws have no value. `half`: of the interval to first order.
 /// `parts`: where parts make up for each other (a thickness and a birefringence, of which the picture knows the
 /// product), the little that is left is not for draws to say: they go straight on where the valley bends.
-void widen_to_draws(const std::vector<double>& deviations, double half, double parts, DerivedEstimate& estimate) {
+void take_from_draws(const std::vector<double>& deviations, std::size_t drawn, double half, double parts,
+                     DerivedEstimate& estimate) {
   constexpr std::size_t kEnough = 500;
   constexpr double kOne = 0.6827, kSpread = 1.1, kReach = 1.15;  // beyond what so many draws scatter by
-  if (deviations.size() < kEnough) return;
+  constexpr double kCut = 0.7;
+  if (drawn < kEnough) return;
+  constexpr double kUndefined = 0.025;
+  if (static_cast<double>(drawn - deviations.size()) > kUndefined * static_cast<double>(drawn)) {
+    estimate.stderr_ = estimate.interval95_low = estimate.interval95_high = std::numeric_limits<double>::quiet_NaN();
+    return;
+  }
   std::vector<double> sizes;
   for (const double by : deviations) sizes.push_back(std::abs(by));
   std::sort(sizes.begin(), sizes.end());
   const double spread = quantile_of_sorted(sizes, kOne);
   constexpr double kLittle = 0.2;
   if (spread < kLittle * parts) return;
-  if (!(spread > kSpread * estimate.stderr_) && !(quantile_of_sorted(sizes, 0.95) > kReach * half)) return;
-  estimate.stderr_ = std::max(estimate.stderr_, spread);
-  estimate.interval95_low = estimate.value + std::min(0.0, quantile_of_sorted(deviations, 0.025));
-  estimate.interval95_high = estimate.value + std::max(0.0, quantile_of_sorted(deviations, 0.975));
+  const double low = quantile_of_sorted(deviations, 0.025), high = quantile_of_sorted(deviations, 0.975);
+  const bool cut = low > -kCut * half || high < kCut * half;
+  if (!cut && !(spread > kSpread * estimate.stderr_) && !(quantile_of_sorted(sizes, 0.95) > kReach * half)) return;
+  estimate.stderr_ = cut ? spread : std::max(estimate.stderr_, spread);
+  estimate.interval95_low = estimate.value + std::min(0.0, low);
+  estimate.interval95_high = estimate.value + std::max(0.0, high);
 }
 
 }  // namespace
@@ -202,8 +214,8 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
     estimate.interval95_high = value + reach;
     if (std::isfinite(estimate.stderr_) && std::isfinite(half) && !result.interrupted) {
       if (!draws) draws.emplace(task, covariances, result);
-      widen_to_draws(draws->deviations(value_at, value, known_alone(task, covariances.stated, tie)), half,
-                     error_of_parts(task, result, slopes), estimate);
+      take_from_draws(draws->deviations(value_at, value, known_alone(task, covariances.stated, tie)), draws->size(),
+                      half, error_of_parts(task, result, slopes), estimate);
     }
     // Of one fitted number alone: what that number's own interval says, which need not be symmetric.
     const int only = slopes.size() == 1 && of.by_stated == 0 ? task.unknowns.of_entry(slopes[0].index) : -1;

@@ -251,7 +251,8 @@ std::vector<Bin> binned(std::vector<Sample> samples, const Codes& codes, double 
   std::vector<std::vector<Sample>> parts(number);
   for (const Sample& sample : samples) {
     const double position = high > low ? (sample.signal - low) / (high - low) * static_cast<double>(number) : 0;
-    parts[static_cast<std::size_t>(std::clamp(position, 0.0, static_cast<double>(number - 1)))].push_back(sample);
+    if (std::isfinite(position))  // the spread of the largest numbers is none
+      parts[static_cast<std::size_t>(std::clamp(position, 0.0, static_cast<double>(number - 1)))].push_back(sample);
   }
   std::vector<Bin> bins, near_cut;
   for (std::vector<Sample>& part : parts)

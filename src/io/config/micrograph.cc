@@ -68,18 +68,27 @@ void read_center(ConfigReader& reader, const Block& block, const Scene& scene, M
     settings.center_x = reader.number_at(node->items[0], path + ".x", pixel_spec());
     settings.center_y = reader.number_at(node->items[1], path + ".y", pixel_spec());
   } else {
-    settings.center_x = reader.constant(path + ".x", pixel_spec(), std::numeric_limits<double>::quiet_NaN());
-    settings.center_y = reader.constant(path + ".y", pixel_spec(), std::numeric_limits<double>::quiet_NaN());
+    // `--set micrograph.center_px.x=26` beside {fit: auto}, or beside nothing.
+    const YamlNode *x = node && node->is_map() ? node->find("x") : nullptr,
+                   *y = node && node->is_map() ? node->find("y") : nullptr;
+    const auto number = [&](const YamlNode* given, const std::string& name) {
+      return given ? reader.number_at(*given, name, pixel_spec())
+                   : reader.constant(name, pixel_spec(), std::numeric_limits<double>::quiet_NaN());
+    };
+    settings.center_x = number(x, path + ".x");
+    settings.center_y = number(y, path + ".y");
     const YamlNode* fit = node && node->is_map() ? node->find("fit") : nullptr;
-    const bool automatic = fit && fit->is_scalar() && fit->text == "auto" && node->entries.size() == 1;
+    const std::size_t known = (fit ? 1 : 0) + (x ? 1 : 0) + (y ? 1 : 0);
+    const bool automatic = node && node->is_map() && known > 0 && node->entries.size() == known &&
+                           (!fit || (fit->is_scalar() && fit->text == "auto"));
     if (node && !automatic)
       reader.problems.add(node->where,
                           "center_px must be [x, y] (each a number or {value, fit}) or {fit: auto}, found " +
                               (node->is_sequence() ? std::to_string(node->items.size()) + " items" : node->describe()));
     // Where a droplet lies is hardly ever known, and its image shows it.
     if (automatic || (!node && droplet && reader.use != ConfigUse::render)) {
-      make_automatic(reader, settings.center_x);
-      make_automatic(reader, settings.center_y);
+      if (!x) make_automatic(reader, settings.center_x);
+      if (!y) make_automatic(reader, settings.center_y);
     }
   }
   // The figure of a cone of light is put in the middle of the camera by eye.

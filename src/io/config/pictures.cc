@@ -379,10 +379,18 @@ std::optional<Calibration> load_calibration(ConfigReader& reader, const Microgra
     for (std::size_t i = 0; i < frame->values.size(); ++i)
       if (!std::isfinite(frame->values.values()[i]) || calibration.saturated.values()[i])
         calibration.usable.values()[i] = 0;
-    if (settings.mosaic.parts.empty())
-      exclude_outliers(frame->values, area, step, Smoothness::frame, calibration.usable);
-    else
-      exclude_outliers_in_cells(frame->values, area, step, Smoothness::frame, calibration.usable);
+    const auto leave_out = [&](Smoothness smoothness, Mask& usable) {
+      return settings.mosaic.parts.empty() ? exclude_outliers(frame->values, area, step, smoothness, usable)
+                                           : exclude_outliers_in_cells(frame->values, area, step, smoothness, usable);
+    };
+    // A frame that was smoothed has no noise for its own slopes to be told from: so many are no defects.
+    constexpr double kMostDefects = 0.02;
+    Mask usable = calibration.usable;
+    if (leave_out(Smoothness::frame, usable) > kMostDefects * area.width() * area.height()) {
+      usable = calibration.usable;
+      leave_out(Smoothness::image, usable);
+    }
+    calibration.usable = std::move(usable);
   }
 
   if (dark.image) calibration.dark = dark.image->values;

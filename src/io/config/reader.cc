@@ -157,7 +157,12 @@ std::optional<double> ConfigReader::finite(const YamlNode& node, const std::stri
   } else if (digits != std::string::npos && digits > 0) {
     std::string number = node.text.substr(0, digits);
     while (!number.empty() && (number.back() == 'e' || number.back() == 'E')) number.pop_back();
-    if (parse_number(number)) hint = "did you mean " + number + "? the unit is part of the key";
+    const std::size_t word = node.text.find_first_not_of(" ", digits);
+    const std::string unit = word == std::string::npos ? "" : node.text.substr(word);
+    if (parse_number(number) && name.ends_with("_" + lower_case(unit)))
+      hint = "did you mean " + number + "? the unit is part of the key";
+    else if (!unit.empty() && std::isalpha(static_cast<unsigned char>(unit.front())))
+      hint = "the unit is part of the key: give the number in it";
   }
   problems.add(node.where, name + " must be a number, found " + node.describe(), hint);
   return std::nullopt;

@@ -22,7 +22,9 @@ const std::vector<std::pair<const char*, const char*>> kEndings{
     {"_um", "um"},       {"_nm", "nm"},         {"_mm", "mm"},
     {"_cm", "cm"},       {"_px", "px"},         {"_pn", "pN"},
     {"_k", "K"},         {"_v", "V"},           {"_n", "N"},
-    {"_s", "s"}};
+    {"_s", "s"},         {"_kv", "kV"},         {"_mv", "mV"},
+    {"_ms", "ms"},       {"_pa", "Pa"},         {"_um2", "um2"},
+    {"_mm2", "mm2"}};
 
 std::optional<std::string> unit_by_name(const std::string& name) {
   for (const auto& [ending, unit] : kEndings)

@@ -179,6 +179,7 @@ RawVolume read_npz(const std::string& content, const VolumeRequest& request) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
   std::string field = request.array;
+  if (field.empty() && has("n") && has("Q")) refuse(file, "has both n and Q", "`array: n` or `array: Q` chooses one");
   if (field.empty())
     for (const char* usual : {"n", "Q", "director"})
       if (field.empty() && has(usual)) field = usual;

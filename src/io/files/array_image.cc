@@ -58,8 +58,9 @@ LoadedImage load_array(const ImageRequest& request, const ArrayImage& array) {
   loaded.width = array.width, loaded.height = array.height;
   loaded.x0 = part.x0, loaded.y0 = part.y0;
   loaded.colour = array.channels >= 3;
-  const bool counts = array.sample == ArrayImage::Sample::uint8 || array.sample == ArrayImage::Sample::uint16;
-  loaded.bits = array.sample == ArrayImage::Sample::uint8 ? 8 : counts ? 16 : 32;
+  const bool counts =
+      array.sample == ArrayImage::Sample::uint8 || array.sample == ArrayImage::Sample::uint16 || array.count_bits > 0;
+  loaded.bits = array.sample == ArrayImage::Sample::uint8 || array.count_bits == 8 ? 8 : counts ? 16 : 32;
   loaded.top_code = !counts ? 0 : loaded.bits == 8 ? 255 : 65535;
   if (part.width() == 0) return loaded;
   loaded.values = Image(part.width(), part.height());

@@ -1,4 +1,5 @@
 #include "io/files/table.h"
+#include "io/images/asked.h"
 
 #include <algorithm>
 #include <array>
@@ -33,7 +34,16 @@ std::string plain_unit(std::string unit) {
   if (unit == "\xc2\xb0" || unit == "\xb0" || unit == "degree" || unit == "degrees") return "deg";
   if (unit == "\xc2\xb0\x43" || unit == "\xb0\x43" || unit == "degC" || unit == "deg C" || unit == "celsius")
     return "C";
-  if (unit == "volt" || unit == "volts" || unit == "Volt" || unit == "Volts") return "V";
+  static const std::map<std::string, std::string> kSpeltOut = {
+      {"volt", "V"},       {"volts", "V"},          {"millivolt", "mV"},      {"millivolts", "mV"}, {"kilovolt", "kV"},
+      {"kilovolts", "kV"}, {"rad", "rad"},          {"radian", "rad"},        {"radians", "rad"},   {"deg", "deg"},
+      {"mrad", "mrad"},    {"milliradian", "mrad"}, {"milliradians", "mrad"}, {"kelvin", "K"},      {"micron", "um"},
+      {"microns", "um"},   {"metre", "m"},          {"meter", "m"},           {"metres", "m"},      {"meters", "m"}};
+  std::string word = lower_case(unit);
+  if (const auto found = kSpeltOut.find(word); found != kSpeltOut.end()) return found->second;
+  for (const auto& [prefix, sign] : {std::pair{"nano", "n"}, {"micro", "u"}, {"milli", "m"}, {"centi", "c"}})
+    for (const char* rest : {"metre", "meter", "metres", "meters"})
+      if (word == std::string(prefix) + rest) return std::string(sign) + "m";
   return unit;
 }
 
@@ -191,7 +201,8 @@ bool contradicts_unit(const std::string& given, const std::string& wanted) {
 
 std::string unit_in_name(const std::string& name) {
   static const std::regex bracketed(R"(.*[(\[]([^()\[\]]+)[)\]] *)"),
-      appended(".*_(rad|mrad|deg|nm|um|mm|cm|mV|kV|V|C)"), place(R"( \(column \d+\)$)");
+      appended(".*(?:_|/|, ?| in )((?:m?[Rr]ad(?:ians?)?)|[Dd]eg(?:rees?)?|nm|um|mm|cm|mV|kV|V|C)"),
+      place(R"( \(column \d+\)$)");
   const std::string own = std::regex_replace(name, place, "");
   std::smatch found;
   return std::regex_match(own, found, bracketed) || std::regex_match(own, found, appended) ? found[1].str() : "";

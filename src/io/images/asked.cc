@@ -52,16 +52,24 @@ std::vector<int> channels_asked(const ImageRequest& request, const std::vector<S
 
   std::vector<int> colours;
   std::array<int, 3> rgb = {-1, -1, -1};
+  std::array<bool, 3> layer{}, again{};  ///< it is of a layer with a name; there is another one like it
   std::string names;
   const int count = static_cast<int>(stored.size());
   for (int c = 0; c < count; ++c) {
     const std::string& name = stored[static_cast<std::size_t>(c)].name;
     const std::string last = lower_case(name.substr(name.rfind('.') + 1));
-    names += (c ? ", " : "") + name;
+    names += (c ? ", " : "") + (name.empty() ? std::to_string(c) : name);
     if (stored[static_cast<std::size_t>(c)].no_light || last == "a" || last == "alpha") continue;
     colours.push_back(c);
-    for (int i = 0; i < 3; ++i)
-      if (last == std::array{"r", "g", "b"}[i] || last == std::array{"red", "green", "blue"}[i]) rgb[i] = c;
+    // Of layers the one without a name is the picture; of several with names, whoever asks has to say which.
+    const bool named = name.find('.') != std::string::npos;
+    for (int i = 0; i < 3; ++i) {
+      if (last != std::array{"r", "g", "b"}[i] && last != std::array{"red", "green", "blue"}[i]) continue;
+      if (rgb[i] < 0 || (layer[i] && !named))
+        rgb[i] = c, layer[i] = named, again[i] = false;
+      else
+        again[i] = again[i] || layer[i] == named;
+    }
   }
   if (by_number) {
     const int number = choice.size() < 9 ? std::stoi(choice) : count;
@@ -85,6 +93,9 @@ std::vector<int> channels_asked(const ImageRequest& request, const std::vector<S
     refuse_image(request,
                  fmt::format("has {} channels ({}) that are neither grey nor red, green and blue", count, names),
                  "add `channel: 0` for the first, or save the one to be fitted as a grey image");
+  if (again[0] || again[1] || again[2])
+    refuse_image(request, fmt::format("has several layers of colours ({})", names),
+                 "choose by number, from 0: `channel: 0`");
   if (choice.empty())
     refuse_image(
         request,

@@ -18,6 +18,7 @@ double micrometres_in(std::string unit) {
   // The two micro signs of Unicode (U+00B5, U+03BC), ImageJ's escape and Latin-1.
   for (const char* micro : {"\xc2\xb5", "\xce\xbc", "\\u00B5", "\\u00b5", "\xb5"})
     if (unit.rfind(micro, 0) == 0) unit = "u" + unit.substr(std::strlen(micro));
+  if (unit == "Mm") return 0;  // no millimetre
   std::transform(unit.begin(), unit.end(), unit.begin(), [](unsigned char c) { return std::tolower(c); });
   if (unit == "um" || unit == "micron" || unit == "microns" || unit == "micrometer" || unit == "micrometre") return 1;
   if (unit == "nm" || unit == "nanometer" || unit == "nanometre") return 1e-3;
@@ -33,7 +34,10 @@ double micrometres_in(std::string unit) {
 std::string attribute_value(const std::string& tag, const std::string& name) {
   std::smatch match;
   const std::regex pattern("\\s" + name + "\\s*=\\s*[\"']([^\"']*)[\"']");
-  return std::regex_search(tag, match, pattern) ? match[1].str() : std::string();
+  if (!std::regex_search(tag, match, pattern)) return {};
+  // As Python's ElementTree writes what is no ASCII.
+  static const std::regex micro("&(#181|#[xX]0*[bB]5|#956|#[xX]0*3[bB][cC]|micro);");
+  return std::regex_replace(match[1].str(), micro, "u");
 }
 
 }  // namespace

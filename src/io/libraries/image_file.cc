@@ -151,15 +151,21 @@ Image read_samples(const ImageRequest& request, const Signature& signature, OIIO
   const bool half = spec.format == TypeDesc::HALF || !spec.channelformats.empty();
   const TypeDesc type = half ? TypeDesc(TypeDesc::FLOAT) : spec.format;
 
-  // Whole tiles, or whole rows, that hold the part.
-  const bool tiled = spec.tile_width > 0;
+  // Whole tiles, or whole rows, that hold the part. Of 64 bits OpenImageIO (2.4) hands out whole pages of strips right,
+  // parts of them as zeros and tiles as whatever memory held, and reports success.
+  const bool tiled = spec.tile_width > 0, wide = type == TypeDesc::DOUBLE;
+  if (wide && tiled)
+    refuse_image(request, "has 64-bit float samples in tiles, which this program cannot read",
+                 "save it as 32-bit float");
   const int tile_width = tiled ? spec.tile_width : spec.width, tile_height = tiled ? spec.tile_height : 1;
   const auto up = [](int end, int step, int most) { return std::min((end + step - 1) / step * step, most); };
-  const PixelRect held{part.x0 / tile_width * tile_width, part.y0 / tile_height * tile_height,
-                       up(part.x1, tile_width, spec.width), up(part.y1, tile_height, spec.height)};
+  const PixelRect held = wide ? PixelRect{0, 0, spec.width, spec.height}
+                              : PixelRect{part.x0 / tile_width * tile_width, part.y0 / tile_height * tile_height,
+                                          up(part.x1, tile_width, spec.width), up(part.y1, tile_height, spec.height)};
   const std::size_t row_bytes = std::size_t(held.width()) * (last - first) * type.size();
-  const int band = up(static_cast<int>(std::clamp<std::size_t>(kBandBytes / row_bytes, 1, held.height())), tile_height,
-                      held.height());
+  const int band = wide ? held.height()
+                        : up(static_cast<int>(std::clamp<std::size_t>(kBandBytes / row_bytes, 1, held.height())),
+                             tile_height, held.height());
   Block block;
   block.channels = last - first;
   block.bytes.resize(row_bytes * band);
@@ -276,7 +282,7 @@ void check_header(const ImageRequest& request, const Signature& signature, const
     refuse_image(request, "is stored in a print or perceptual colour space (CMYK, Lab, ...)", "save it as grey or RGB");
   if (const std::string space = spec.get_string_attribute("jpeg:ColorSpace", ""); space == "CMYK" || space == "YCbCrK")
     refuse_image(request, "is stored in the print colour space " + space, "save it as grey or RGB");
-  if (stored.bits == 24 && !stored.is_float && stored.tiff)
+  if (stored.bits == 24 && stored.tiff)
     refuse_image(request, "has 24 bits per sample", "save it as 16-bit integers or float");
   if (!spec.channelformats.empty())
     for (const TypeDesc& type : spec.channelformats)
@@ -410,6 +416,12 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
       refuse_image(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
     loaded.notes.push_back("it " + found + ": the first is used");
   }
+  // Of tifffile, where only the first of many planes has a directory.
+  if (!several && !request.page && description.starts_with("{\"shape\"") &&
+      description.find("\"truncated\": true") != std::string::npos)
+    refuse_image(request,
+                 "is a stack of tifffile, truncated: one directory for all of its planes (" + description + ")",
+                 "save the image to be fitted on its own, or add `page: 0` for the first");
   const OIIO::ImageSpec& scaled = who_states("XResolution");
   const StatedResolution resolution{scaled.get_float_attribute("XResolution", 0),
                                     scaled.get_float_attribute("YResolution", 0),

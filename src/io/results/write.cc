@@ -9,6 +9,7 @@
 #include "core/printable.h"
 #include "io/files/csv.h"
 #include "io/files/file.h"
+#include "io/files/whole_file.h"
 
 namespace birefit {
 namespace {
@@ -125,14 +126,24 @@ std::vector<FileContent> result_files(const Config& config, const FitResult& res
 
 void refuse_to_replace_inputs(const fs::path& folder, const Config& config) {
   static const std::regex kOurs(kPictures + R"(|samples\.csv|log\.txt|report\.html|fit\.json)");
-  std::error_code code;
+  const auto is_there = [&](const fs::path& file) {
+    std::error_code code;
+    return fs::equivalent(file.parent_path().empty() ? "." : file.parent_path(), folder, code);
+  };
+  const auto refuse = [&](const fs::path& file, const char* whose) {
+    throw UserError({folder.string()},
+                    "holds " + printable(file.filename().string()) + ", " + whose + " the results would replace",
+                    "choose another --out");
+  };
   for (const fs::path& input : config.inputs)
-    if (std::regex_match(input.filename().string(), kOurs) &&
-        fs::equivalent(input.parent_path().empty() ? "." : input.parent_path(), folder, code))
-      throw UserError(
-          {folder.string()},
-          "holds " + printable(input.filename().string()) + ", which the config reads and the results would replace",
-          "choose another --out");
+    if (std::regex_match(input.filename().string(), kOurs) && is_there(input))
+      refuse(input, "which the config reads and");
+  constexpr std::uintmax_t kMostMb = 64;
+  // As it was run is written without its remarks and with what --set says.
+  std::error_code code;
+  if (config.path.filename() == "config.yaml" && is_there(config.path) && fs::exists(config.path, code) &&
+      read_whole(config.path, kMostMb, {config.path.string()}, "", "") != config.text)
+    refuse(config.path, "this very config, which");
 }
 
 void write_result_files(const fs::path& folder, std::vector<FileContent> files) {

@@ -33,6 +33,8 @@ def threads_of(place: str, value: Any) -> int:
 def reals(place: str, value: Any, shapes: str) -> npt.NDArray[np.float64]:
     """Numbers of a parameter vector; complex ones would lose half of themselves in silence."""
     hint = f"give real numbers, {shapes}"
+    if np.ma.is_masked(value):
+        refuse(place, "some of the numbers are masked", hint)
     try:
         array = np.asarray(value)
     except ValueError:  # rows of several lengths

@@ -131,7 +131,8 @@ class Job:
         """The picture at the config's values, changed by ``values`` and by keywords: ``job.render(diameter_um=9.3)``.
 
         values
-            numbers by name, in their units; a fit's ``result.values`` will do. Keywords count above them.
+            numbers by name, in their units; a fit's ``result.values`` will do (what the config states stays as stated,
+            where a fit may have moved it: ``result.fitted`` is the fit's own picture). Keywords count above them.
         derivatives
             names of numbers (fitted or not), or the name of one, by which to differentiate as well.
         threads
@@ -271,7 +272,10 @@ def _items(set: Settings) -> list[str]:
         return []
     if isinstance(set, Mapping):
         return [f"{path}={_value(value)}" for path, value in set.items()]
-    return list(set)
+    items = [] if isinstance(set, (str, bytes)) else list(set)
+    if isinstance(set, (str, bytes)) or not all(isinstance(item, str) for item in items):
+        refuse("set", f"is {set!r}", "a dict of paths and values, or a list of 'path=value'")
+    return items
 
 
 def _value(value: Any) -> str:
@@ -282,23 +286,24 @@ def _value(value: Any) -> str:
         return value
     if isinstance(value, os.PathLike):
         return os.fspath(value)
-    as_list = lambda other: os.fspath(other) if isinstance(other, os.PathLike) else other.tolist()
-    return json.dumps(value, ensure_ascii=False, default=as_list)
+
+
+    def plain(other: Any) -> Any:
+        if isinstance(other, os.PathLike):
+            return os.fspath(other)
+        if hasattr(other, "tolist"):
+            return other.tolist()
+        refuse("set", f"has the value {other!r}", "numbers, text, lists and dicts can be set")
+
+    return json.dumps(value, ensure_ascii=False, default=plain)
 
 
 def _in_place(image: Picture) -> Any:
-    if isinstance(image, np.ma.MaskedArray):
-        return _unmasked(image)
     if image is None or isinstance(image, (bytes, np.ndarray)):  # bytes: the name of a file
         return image
     if isinstance(image, (str, os.PathLike)):
         return os.fsencode(image)
     return np.asarray(image)
-
-
-def _unmasked(array: np.ma.MaskedArray) -> np.ndarray:
-    """Masked elements as NaN, which no fit uses."""
-    return array.astype(float).filled(np.nan) if np.ma.is_masked(array) else array.data
 
 
 def _held(arrays: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
@@ -313,12 +318,14 @@ def _held(arrays: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, b
         if isinstance(value, Mapping):
             np.savez(file, **value)
         else:
-            array = _unmasked(value) if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
+            array = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
             if array.dtype.hasobject:
                 refuse(f"array '{name}'", "has elements that are no numbers", "a picture or a field has integers or floats")
             if array.ndim < 4:
                 images[name] = array
                 continue
-            np.save(file, array, allow_pickle=False)
+            if np.ma.is_masked(array):  # a place without a director
+                array = array.astype(float).filled(np.nan)
+            np.save(file, np.asarray(array), allow_pickle=False)
         fields[name] = file.getvalue()
     return images, fields

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _birefit
+from ._errors import Error
 from ._given import reals, refuse, threads_of
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +23,23 @@ class Named(dict):
     """
 
     def __missing__(self, name: str) -> Any:
+        if not isinstance(name, str):
+            refuse("names", f"{name!r} is no name", "names are text, as in the config")
         return self[_birefit.path_named(list(self), name, "name")]
+
+    def __contains__(self, name: object) -> bool:
+        if super().__contains__(name) or not isinstance(name, str):
+            return super().__contains__(name)
+        try:
+            return bool(_birefit.path_named(list(self), name, "name"))
+        except Error:
+            return False
+
+    def get(self, name: str, default: Any = None) -> Any:
+        return self[name] if name in self else default
+
+    def copy(self) -> Named:
+        return Named(self)
 
 
 class Objective:
