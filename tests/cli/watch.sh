@@ -54,5 +54,23 @@ values = {r['file']: float(r['sample.crystal.half_wave_voltage_v']) for r in row
 assert len(values) == 12 and len(set(values.values())) == 1, values
 PYTHON
 
+# A name that is no UTF-8 is found again.
+mkdir odd
+cp pool/1.tif odd/$'n\xff.tif'
+for run in '' --resume; do
+  "$birefit" watch crystal.yaml --folder odd --out odd_out --threads 1 $run > "odd$run.txt" 2>&1 &
+  pid=$!
+  for ((k = 0; k < 600; ++k)); do
+    grep -q ', answer\|,answer' odd_out/series.csv 2> /dev/null && break
+    sleep 0.1
+  done
+  sleep 1
+  kill -TERM "$pid"
+  wait "$pid"
+  cp odd_out/series.csv "odd$run.csv"
+done
+cmp -s odd.csv odd--resume.csv || fail "a name that is no UTF-8: $(tail -1 odd--resume.csv | head -c 200)"
+grep -q 'is now called' odd--resume.txt && fail 'a file that was not renamed'
+
 [ $failures -eq 0 ] && echo "all as required" || echo "$failures failures"
 exit $((failures > 0))
