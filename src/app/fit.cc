@@ -73,7 +73,16 @@ std::vector<std::string> picture_formats(const FitArguments& arguments) {
 }
 
 std::filesystem::path folder_of(const FitArguments& arguments) {
-  return arguments.out.empty() ? std::filesystem::path(arguments.config).stem().string() + "-fit" : arguments.out;
+  return arguments.out.empty()
+             ? std::filesystem::path(arguments.config).stem().string() + (arguments.each ? "-each" : "-fit")
+             : arguments.out;
+}
+
+/// Nothing stale beside new results: `file` is what another command, or option, leaves.
+void refuse_beside(const std::filesystem::path& out, const char* file, const char* whose) {
+  std::error_code code;
+  if (std::filesystem::exists(out / file, code))
+    throw UserError({out.string()}, fmt::format("holds {}, of {}", file, whose), "choose another --out");
 }
 
 /// Every droplet in view by a fit of its own: a folder of results each, and a table.
@@ -81,6 +90,8 @@ int run_each(const FitArguments& arguments) {
   const std::vector<EachDroplet> droplets = droplets_in_view(read(arguments));
   const std::filesystem::path out = folder_of(arguments);
   OutputFolder folder(out);
+  refuse_beside(out, "fit.json", "a fit without --each");
+  refuse_beside(out, "series.csv", "a series");
   const Interrupt interrupt;
   std::vector<FitResult> results;
   const auto folder_of_droplet = [&](std::size_t i) { return out / "droplets" / std::to_string(i + 1); };
@@ -134,6 +145,8 @@ int run_fit(const FitArguments& arguments) {
   try {
     folder = std::make_unique<OutputFolder>(out);
     refuse_to_replace_inputs(out, config);
+    refuse_beside(out, "droplets.csv", "a fit with --each");
+    refuse_beside(out, "series.csv", "a series");
   } catch (const UserError& error) {
     problems.add(error);
   }

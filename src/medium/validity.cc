@@ -38,7 +38,7 @@ std::vector<ParameterRef> clearing_points(const LawIndices& law) {
 }
 
 void check_validity(const Scene& scene, const std::vector<ParameterRef>& temperatures, const Theta& theta) {
-  const auto value = [&](ParameterRef ref) { return theta.at(static_cast<std::size_t>(ref.index)); };
+  const auto value = [&](ParameterRef ref) { return ref.in(theta); };
   if (const auto range = wavelengths_um(scene.material, scene.surround_dispersion)) {
     const double nm = value(scene.microscope.wavelength_nm), slack = 1e-9 * nm;
     if (nm < 1000 * range->lower - slack || nm > 1000 * range->upper + slack)

@@ -78,6 +78,9 @@ awk -F, '
     $(column["sample.material.birefringence_low95"]) <= 0.22 && 0.22 <= $(column["sample.material.birefringence_high95"]) && $NF ~ /^answer/ { ++right }
   END { exit right != 3 }' each/droplets.csv || { fail 'each: not three right droplets'; cat each/droplets.csv; }
 [ -f each/droplets/3/report.html ] || fail 'each: no report of the third'
+# Neither stands beside the other's results.
+"$birefit" fit "$cases/host_off/config.yaml" --out each > one.txt 2> one.err
+[ $? -eq 2 ] && grep -q 'holds droplets.csv' one.err || fail 'a fit into the folder of --each'
 "$birefit" fit "$cases/host_off/config.yaml" --each --out one > one.txt 2> one.err
 [ $? -eq 2 ] || fail '--each of one droplet does not end in 2'
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "birefit/expression.h"
+#include "birefit/fit.h"
 #include "config_fixture.h"
 
 namespace birefit {
@@ -94,6 +95,36 @@ TEST_F(ConfigTies, SayWhatIsWrongAndWhere) {
   EXPECT_THAT(mistakes(cell("ordinary: 1.5", "ordinary: {value: \"2 * birefringence\", fit: [1, 2]}")),
               HasSubstr("ordinary is tied to other numbers and has fit"));
   EXPECT_THAT(mistakes(cell("[8, 8]", "[\"2 * polarizer_deg\", 8]")), HasSubstr("an expression that reads others"));
+}
+
+// A number that a table sets for all of its rows may follow from what each row has.
+TEST_F(ConfigTies, ATablesOwnNumberFollowsItsRows) {
+  write("t.csv", "angle,out\n0,0.1\n30,0.4\n60,0.3\n");
+  const std::string text =
+      replaced(kCell, "image_size_px: [8, 8]\n",
+               "signal: {file: t.csv, value: out, noise: 0.01, columns: {microscope.polarizer_deg: angle},\n"
+               "  set: {microscope.analyzer_deg: \"microscope.polarizer_deg + 90 * deg\"}}\n");
+  const Config config = load(text, ConfigUse::fit);
+  const Theta theta = config.job.parameters.values();
+  const Readings& table = std::get<Readings>(config.job.measurements.at(0));
+  ASSERT_EQ(table.rows.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(table.rows[i].microscope.polarizer_deg.in(theta), 30.0 * static_cast<double>(i));
+    EXPECT_EQ(table.rows[i].microscope.analyzer_deg.in(theta), 30.0 * static_cast<double>(i) + 90);
+  }
+}
+
+// Rows share what their wavelengths may be off by: the law's range is one of wavelengths all the same.
+TEST_F(ConfigTies, RowsThatShareAZeroStayWithinALawsRange) {
+  std::string rows = "nm,out\n";
+  for (int i = 0; i < 9; ++i) rows += std::to_string(480 + 20 * i) + "," + std::to_string(0.2 + 0.07 * i) + "\n";
+  write("t.csv", rows);
+  std::string text =
+      replaced(kCell, "image_size_px: [8, 8]\n",
+               "signal: {file: t.csv, value: out, noise: 0.01, columns: {microscope.light.wavelength_nm: nm}}\n");
+  text = replaced(text, "{ordinary: 1.5, birefringence: 0.12}", "{name: 5CB-li2005}");
+  const Config config = load(text, ConfigUse::fit);
+  EXPECT_NO_THROW(fit(config.job));
 }
 
 TEST_F(ConfigTies, QuantitiesAreInTheUnitThatTheirNamesEndIn) {

@@ -174,6 +174,12 @@ void warn_of_misfit(const std::string& name, const Rows& rows, double unknowns, 
                  : "; the errors allow for it as far as the residuals show it."));
 }
 
+/// Rows of a table say the same with numbers of their own: the first speaks for all.
+std::string without_digits(std::string words) {
+  std::erase_if(words, [](char c) { return (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '+'; });
+  return words;
+}
+
 /// What is said of several micrographs in the same words ("NAME: words") is one line.
 std::vector<std::string> with_shared_lines(const Task& task, const std::vector<std::string>& warnings) {
   std::vector<std::pair<std::string, std::vector<std::string>>> said;  // words, of whom; of nobody: a line as it is
@@ -230,8 +236,9 @@ void collect_warnings(const Task& task, const Optimum& optimum, FitResult& resul
     const MicrographResult& micrograph = result.micrographs[static_cast<std::size_t>(g)];
     for (const std::string& warning : micrograph.plan.warnings) warn(result, warning);
     for (const std::string& sentence : micrograph.plan.left_out)
-      if (std::find(result.taken_as_exact.begin(), result.taken_as_exact.end(), sentence) ==
-          result.taken_as_exact.end())
+      if (std::none_of(result.taken_as_exact.begin(), result.taken_as_exact.end(), [&](const std::string& said) {
+            return said == sentence || (micrograph.used == 1 && without_digits(said) == without_digits(sentence));
+          }))
         result.taken_as_exact.push_back(sentence);
     if (micrograph.used == 1) {  // a row of a table (name:line): judged with the others of it
       Rows& rows = tables[task.sights[static_cast<std::size_t>(g)].table];

@@ -236,23 +236,25 @@ class Binder {
     for (const TiedNumber& tie : reader_.ties) visit(tie.index);
   }
 
-  /// The entry that a scene with numbers of its own under these names has in place of this one.
+  /// The entry that a scene with numbers of its own under these names has in place of this one, which is shared or of a
+  /// wider name: a table's own number may follow from its rows'.
   int own(int index, const std::vector<std::string>& scopes) {
-    const std::string name = reader_.table[index].name;
-    if (scopes.empty() || !scope_of(name).empty()) return index;
+    const std::string from = scope_of(reader_.table[index].name),
+                      name = reader_.table[index].name.substr(from.size());
     for (const std::string& scope : scopes)
-      if (const auto found = by_name_.find(scope + name); found != by_name_.end()) return found->second;
+      if (const auto found = by_name_.find(scope + name); scope.size() > from.size() && found != by_name_.end())
+        return found->second;
     const auto tie = tied_.find(index);
-    if (tie == tied_.end() || tie->second->of.empty()) return index;
+    if (scopes.empty() || tie == tied_.end() || tie->second->of.empty()) return index;
     TiedNumber copy = *tie->second;
-    std::string scope;  // the narrowest that makes a difference
+    std::string scope = from;  // the narrowest that makes a difference
     for (int& of : copy.of) {
       const int there = own(of, scopes);
       if (there == of) continue;
       of = there;
       if (const std::string its = scope_of(reader_.table[there].name); its.size() > scope.size()) scope = its;
     }
-    if (scope.empty()) return index;
+    if (scope == from) return index;
     Parameter parameter = reader_.table[index];
     parameter.name = scope + name;
     copy.index = reader_.table.add(parameter).index;
