@@ -114,6 +114,17 @@ TEST_F(ConfigTies, ATablesOwnNumberFollowsItsRows) {
   }
 }
 
+TEST_F(ConfigTies, ACircleThroughATablesOwnNumberIsNamed) {
+  write("t.csv", "angle,out\n0,0.1\n30,0.4\n60,0.3\n");
+  const std::string text =
+      replaced(kCell, "image_size_px: [8, 8]\n",
+               "signal: {file: t.csv, value: out, noise: 0.01, columns: {microscope.analyzer_deg: angle},\n"
+               "  set: {sample.cell.thickness_um: \"2 * polarizer_deg / deg * um\"}}\n");
+  EXPECT_THAT(
+      mistakes(replaced(text, "polarizer_deg: 20", "polarizer_deg: \"thickness_um / um * deg\""), ConfigUse::fit),
+      HasSubstr("tied in a circle"));
+}
+
 // Rows share what their wavelengths may be off by: the law's range is one of wavelengths all the same.
 TEST_F(ConfigTies, RowsThatShareAZeroStayWithinALawsRange) {
   std::string rows = "nm,out\n";

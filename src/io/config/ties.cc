@@ -239,13 +239,15 @@ class Binder {
   /// The entry that a scene with numbers of its own under these names has in place of this one, which is shared or of a
   /// wider name: a table's own number may follow from its rows'.
   int own(int index, const std::vector<std::string>& scopes) {
-    const std::string from = scope_of(reader_.table[index].name),
-                      name = reader_.table[index].name.substr(from.size());
+    const std::string from = scope_of(reader_.table[index].name), name = reader_.table[index].name.substr(from.size());
     for (const std::string& scope : scopes)
       if (const auto found = by_name_.find(scope + name); scope.size() > from.size() && found != by_name_.end())
         return found->second;
+    const bool narrower =
+        std::any_of(scopes.begin(), scopes.end(), [&](const auto& scope) { return scope.size() > from.size(); });
     const auto tie = tied_.find(index);
-    if (scopes.empty() || tie == tied_.end() || tie->second->of.empty()) return index;
+    // A circle of numbers of one's own is named once all are there (tie_all).
+    if (!narrower || tie == tied_.end() || tie->second->of.empty() || !asked_.insert(index).second) return index;
     TiedNumber copy = *tie->second;
     std::string scope = from;  // the narrowest that makes a difference
     for (int& of : copy.of) {
@@ -254,6 +256,7 @@ class Binder {
       of = there;
       if (const std::string its = scope_of(reader_.table[there].name); its.size() > scope.size()) scope = its;
     }
+    asked_.erase(index);
     if (scope == from) return index;
     Parameter parameter = reader_.table[index];
     parameter.name = scope + name;
@@ -300,6 +303,7 @@ class Binder {
   std::map<std::string, int> shared_;   ///< what may be named without a picture
   std::map<int, TiedNumber*> tied_;
   std::set<int> used_;
+  std::set<int> asked_;  ///< on the way to what own() is asked for
 };
 
 }  // namespace
