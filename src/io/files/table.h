@@ -39,7 +39,8 @@ TextTable load_text_table(const std::filesystem::path& path, const Where& where,
 /// Is `given` ("mV", "[nm]") a unit that is known not to be `wanted` ("V", "um")? What is not known is no
 /// contradiction.
 bool contradicts_unit(const std::string& given, const std::string& wanted);
-/// "angle (rad)", "angle [rad]" and "angle_rad" are in rad; empty where a column's name says nothing of a unit.
+/// "angle (rad)", "angle [rad]", "angle_rad", "angle/rad" and "angle in radians" are in rad; empty where a column's
+/// name says nothing of a unit.
 std::string unit_in_name(const std::string& name);
 
 /// "table.csv: 2 rows without a number are left out (lines 3 and 7)."

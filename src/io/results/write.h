@@ -16,7 +16,7 @@ std::string log_text(const Config& config, const FitResult& result);
 std::vector<FileContent> result_files(const Config& config, const FitResult& result,
                                       const std::vector<std::string>& picture_formats);
 /// UserError where a fit's results in this folder would replace a file that its config reads (a table called
-/// fitted.csv, the fit.json of its prior).
+/// fitted.csv, the fit.json of its prior), or the config itself by another (a config.yaml with what --set says).
 void refuse_to_replace_inputs(const std::filesystem::path& folder, const Config& config);
 /// Writes these: makes the folder, and takes away what an earlier fit left there and these do not replace.
 void write_result_files(const std::filesystem::path& folder, std::vector<FileContent> files);

@@ -287,7 +287,6 @@ def _value(value: Any) -> str:
     if isinstance(value, os.PathLike):
         return os.fspath(value)
 
-
     def plain(other: Any) -> Any:
         if isinstance(other, os.PathLike):
             return os.fspath(other)
