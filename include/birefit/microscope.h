@@ -25,7 +25,8 @@ struct Retarder {
   static constexpr const char* kKey = "retarder";
   /// Either of phase (at the light's wavelength) and retardance, and the azimuth of the slow axis from +x.
   ParameterRef phase_deg, retardance_nm, azimuth_deg;
-  double turned_deg = 0;  ///< added to the azimuth: of a plate that is mounted at an angle to a polarizer
+  /// Added to the azimuth where given: of a plate that turns with a polarizer, which it is mounted on at an angle.
+  ParameterRef turned_deg;
   /// The retardance is that at `at_nm` and goes with the crystal's birefringence; none: the same at all wavelengths.
   PlateCrystal crystal = PlateCrystal::none;
   double at_nm = 589.3;
@@ -37,6 +38,7 @@ struct Retarder {
     visit.number("retardance_nm", self.retardance_nm, numbers::within(-1e5, 1e5, "nm").left_out().known_within(5),
                  "the same at all wavelengths, or a crystal's at one");
     visit.number("azimuth_deg", self.azimuth_deg, numbers::dial(), "of the slow axis, from +x");
+    visit.number("turned_deg", self.turned_deg, numbers::dial().of_short_forms(), "of the slow axis, from a polarizer");
   }
 };
 /// Turns the polarization by angle_deg, counter-clockwise in the image.

@@ -24,6 +24,7 @@ struct NumberSpec {
   bool fixed = false;                                              ///< cannot be fitted
   std::optional<double> fallback;                                  ///< value where it is not given
   bool optional = false;                                           ///< not given: an empty reference
+  bool implied = false;                                            ///< by a short form; no key of its own
   Uncertainty known_to;                                            ///< where it is stated without another
 
   /// The range has the value; a limit that is open is no part of it.
@@ -41,6 +42,12 @@ struct NumberSpec {
   NumberSpec left_out() const {
     NumberSpec spec = *this;
     spec.optional = true;
+    return spec;
+  }
+  /// Configs have no key for it: it comes with a short form, or not at all.
+  NumberSpec of_short_forms() const {
+    NumberSpec spec = left_out();
+    spec.implied = true;
     return spec;
   }
   /// `fit: auto`: pictures tell where to start.

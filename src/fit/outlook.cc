@@ -232,7 +232,11 @@ std::vector<Shot> next_shots(const FitJob& job, const std::string& parameter) {
   const Scene& scene = first_picture(base).scene;
   if (traits_of(scene).isoclinics && now.before.empty() && now.behind.empty())
     candidates.emplace_back("with quarter-wave plates (circular polariscope)", [=](Scene& s, ParameterTable& t) {
-      make_circular_polariscope(s.microscope, constant(t, "next phase_deg", 90));
+      make_circular_polariscope(s.microscope, [&t](const std::string& name, const NumberSpec& spec, double value) {
+        const ParameterRef added = t.add_constant("next " + name, value);
+        t[added].known_to = spec.known_to;
+        return added;
+      });
     });
   if (base.demand.ceiling == Ceiling::wave && (!now.focus_um || known(now.focus_um)))
     for (const double by : {-3.0, 3.0}) {

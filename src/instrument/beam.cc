@@ -54,8 +54,9 @@ Su2<S> plate_matrix(const S& phase, const S& azimuth) {
 }
 template <class S>
 Su2<S> matrix_of(const Retarder& retarder, const S& wavelength_nm, const Values<S>& value) {
-  return plate_matrix(phase_of(retarder, wavelength_nm, value),
-                      S(value.radians(retarder.azimuth_deg) + retarder.turned_deg * (std::numbers::pi / 180)));
+  S azimuth = value.radians(retarder.azimuth_deg);
+  if (retarder.turned_deg) azimuth += value.radians(retarder.turned_deg);
+  return plate_matrix(phase_of(retarder, wavelength_nm, value), azimuth);
 }
 
 template <class S>

@@ -96,7 +96,7 @@ DiscScene scene_of(const testing::IndependentDisc& d, int size, double analyzer_
   r.scene.microscope.wavelength_nm = r.t.fixed("wavelength_nm", d.wavelength_nm);
   r.scene.microscope.polarizer_deg = r.t.fixed("polarizer_deg", d.polarizer_deg);
   r.scene.microscope.analyzer_deg = r.t.fixed("analyzer_deg", analyzer_deg);
-  if (d.circular) make_circular_polariscope(r.scene.microscope, r.t.fixed("quarter_deg", 90));
+  if (d.circular) make_circular_polariscope(r.scene.microscope, r.t.fixing());
   r.scene.view.width = r.scene.view.height = size;
   r.scene.view.pixel_size_um = r.t.fixed("pixel_size_um", d.um_per_px);
   r.scene.view.center_x_px = r.t.fixed("center_x", d.center_x_px);

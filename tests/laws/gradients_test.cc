@@ -409,7 +409,7 @@ std::vector<Case> cases() {
     disc.residual_shear_mpa = {c.t.fixed("s1", -0.2), c.t.fixed("sx", 0.1), c.t.fixed("sy", 0.3),
                                c.t.fixed("sxx", 0.6)};
     c.scene.sample = disc;
-    if (circular) make_circular_polariscope(c.scene.microscope, c.t.fixed("quarter_deg", 90));
+    if (circular) make_circular_polariscope(c.scene.microscope, c.t.fixing());
     all.push_back(c);
     c.name += ", broad and uneven light";
     disc.illumination = {c.t.fixed("light_x", 0.4), c.t.fixed("light_y", -0.2), c.t.fixed("light_xx", 0.3)};

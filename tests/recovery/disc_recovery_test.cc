@@ -52,7 +52,7 @@ FitJob disc_job(double counts_per_photon, double read_counts, unsigned long seed
   scene.microscope.wavelength_nm = b.fixed("wavelength_nm", d.wavelength_nm);
   scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
-  make_circular_polariscope(scene.microscope, b.fixed("quarter_deg", 90));
+  make_circular_polariscope(scene.microscope, b.fixing());
   scene.view.width = scene.view.height = kSide;
   scene.view.pixel_size_um = b.fixed("pixel_size_um", d.um_per_px);
   scene.view.center_x_px = b.fitted("center_x", 32, 29, 35);
@@ -134,7 +134,7 @@ TEST(DiscRecovery, ZonesAroundTheForcesFollowTheDirection) {
     scene.microscope.wavelength_nm = b.fixed("wavelength_nm", d.wavelength_nm);
     scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
     scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
-    make_circular_polariscope(scene.microscope, b.fixed("quarter_deg", 90));
+    make_circular_polariscope(scene.microscope, b.fixing());
     scene.view.width = scene.view.height = kWide;
     scene.view.pixel_size_um = b.fixed("pixel_size_um", d.um_per_px);
     scene.view.center_x_px = b.fitted("center_x", 63.5, 59, 68);

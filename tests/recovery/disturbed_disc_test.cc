@@ -59,7 +59,7 @@ FitResult fit_of(const Nature& nature, unsigned long seed) {
   scene.microscope.wavelength_nm = b.fixed("wavelength_nm", d.wavelength_nm);
   scene.microscope.polarizer_deg = b.fixed("polarizer_deg", 0);
   scene.microscope.analyzer_deg = b.fixed("analyzer_deg", 90);
-  make_circular_polariscope(scene.microscope, b.fixed("quarter_deg", 90));
+  make_circular_polariscope(scene.microscope, b.fixing());
   scene.view.width = scene.view.height = kSide;
   scene.view.pixel_size_um = b.fixed("pixel_size_um", d.um_per_px);
   scene.view.center_x_px = b.fitted("center_x", 32, 29, 35);

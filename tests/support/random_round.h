@@ -148,7 +148,7 @@ inline void stressed_disc(RandomProblem& p) {
   model.circular = p.chance(0.5);
   Scene s = seen(p, kSize, model.um_per_px);
   s.microscope.wavelength_nm = p.b.fixed("wavelength_546", model.wavelength_nm);
-  if (model.circular) make_circular_polariscope(s.microscope, p.b.fixed("quarter_deg", 90));
+  if (model.circular) make_circular_polariscope(s.microscope, p.b.fixing());
   s.view.center_x_px = p.anywhere("center_x", 46, 49);
   s.view.center_y_px = p.anywhere("center_y", 46, 49);
   StressedDisc disc;

@@ -27,6 +27,10 @@ inline int first_problem() {
 struct TableBuilder {
   ParameterTable table;
   ParameterRef fixed(const std::string& name, double value) { return table.add_constant(name, value); }
+  /// The same for what asks for a number by its name, what it may be and its value.
+  auto fixing() {
+    return [this](const std::string& name, const NumberSpec&, double value) { return fixed(name, value); };
+  }
   ParameterRef fitted(const std::string& name, double start, double lower, double upper) {
     Parameter p;
     p.name = name;

@@ -97,10 +97,21 @@ TEST_F(MicroscopeConfig, ACondenserAndItsShortForm) {
 
 TEST_F(MicroscopeConfig, ShortFormsAreParts) {
   const auto circular = load(", quarter_wave: true");
-  ASSERT_EQ(circular.scene.microscope.before.size(), 1u);
-  const Retarder& first = std::get<Retarder>(circular.scene.microscope.before[0]);
-  EXPECT_EQ(first.azimuth_deg, circular.scene.microscope.polarizer_deg);
-  EXPECT_EQ(first.turned_deg, 45);
+  const auto& [before, behind] = std::pair(circular.scene.microscope.before, circular.scene.microscope.behind);
+  ASSERT_EQ(before.size(), 1u);
+  ASSERT_EQ(behind.size(), 1u);
+  std::set<int> numbers;
+  for (const auto& [part, turned] : {std::pair(before[0], 45), std::pair(behind[0], -45)}) {
+    const Retarder& plate = std::get<Retarder>(part);
+    EXPECT_EQ(plate.azimuth_deg, circular.scene.microscope.polarizer_deg);
+    EXPECT_EQ(value(circular, plate.turned_deg), turned);
+    EXPECT_EQ(value(circular, plate.phase_deg), 90);
+    // As of parts that are listed: each plate is off by itself, in its phase and on its mount.
+    EXPECT_EQ(circular.job.parameters[plate.turned_deg].known_to.sd, 1);
+    EXPECT_EQ(circular.job.parameters[plate.phase_deg].known_to.sd, 3);
+    numbers.insert({plate.turned_deg.index, plate.phase_deg.index});
+  }
+  EXPECT_EQ(numbers.size(), 4u);
   const auto compensated = load(", compensator: {phase_deg: 20, azimuth_deg: 30}");
   ASSERT_EQ(compensated.scene.microscope.behind.size(), 1u);
   EXPECT_TRUE(compensated.job.parameters.find("microscope.compensator.phase_deg"));

@@ -15,7 +15,7 @@ template <class Number>
 struct NumberVisitor {
   const Number& each;
   void number(const char* key, ParameterRef& ref, const NumberSpec& spec, const char* words) {
-    each(key, spec, words, &ref);
+    if (!spec.implied) each(key, spec, words, &ref);
   }
   void vector(const char* key, std::array<ParameterRef, 3>&, const NumberSpec& spec, const char* words) {
     each(key, spec, words, nullptr);

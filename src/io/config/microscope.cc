@@ -128,8 +128,9 @@ void read_short_forms(ConfigReader& reader, const Block& block, Microscope& micr
                           "quarter_wave: true stands for a polarizer and all parts of a circular polariscope",
                           "list its plates under before and behind, or leave out what else is there");
     else
-      make_circular_polariscope(
-          microscope, reader.constant("microscope.quarter_wave.phase_deg", numbers::angle().known_within(3), 90));
+      make_circular_polariscope(microscope, [&](const std::string& name, const NumberSpec& spec, double value) {
+        return reader.constant("microscope.quarter_wave." + name, spec, value);
+      });
   }
   if (block.find("compensator")) {
     const Block compensator = reader.block(block, "compensator", {"phase_deg", "azimuth_deg"}, true);

@@ -58,6 +58,7 @@ Json& place_of(Json& block, const std::string& key) {
 struct SchemaVisitor {
   Json& block;
   void number(const char* key, ParameterRef&, const NumberSpec& spec, const char* words) {
+    if (spec.implied) return;
     const std::string path = key;
     // Two numbers of a list: [x, y], [low, high].
     if (const std::size_t dot = path.rfind('.'); dot != std::string::npos && path.substr(0, dot).ends_with("_px")) {
