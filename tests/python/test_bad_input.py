@@ -94,6 +94,13 @@ def test_images_that_are_none(droplet, image, words):
     (lambda job: job.residual(job.theta0 + 0j), "complex"),
     (lambda job: job.residual(np.ma.masked_array(job.theta0, [True] + [False] * (len(job.theta0) - 1))), "masked"),
     (lambda job: job.log_posterior(np.zeros((2, 2, 2))), "has the shape"),
+    (lambda job: job.render(0.2), "values is 0.2"),
+    (lambda job: job.render(derivatives=3), "derivatives is 3"),
+    (lambda job: job.render(derivatives=[3]), r"derivatives is \[3\]"),
+    (lambda job: job.render_many([[0.1]], names=[3]), r"names is \[3\]"),
+    (lambda job: job.fit(progress=3), "progress is 3"),
+    (lambda job: job.explain(3), "next is 3"),
+    (lambda job: birefit.load(None), "path is None"),
 ])
 def test_numbers_that_are_none(droplet, call, words):
     job = birefit.Job(droplet)
@@ -108,10 +115,16 @@ def test_what_is_no_tree(tree):
         birefit.Job(tree)
 
 
-@pytest.mark.parametrize("set", ["sample.droplet.diameter_um=4.5", [3], {"sample.droplet.diameter_um": 3 + 0j}])
+@pytest.mark.parametrize("set", [3, "sample.droplet.diameter_um=4.5", [3], {"sample.droplet.diameter_um": 3 + 0j}])
 def test_what_cannot_be_set(droplet, set):
     with pytest.raises(birefit.Error, match="set"):
         birefit.Job(droplet, set=set)
+
+
+@pytest.mark.parametrize("arrays", [3, ["a"], {3: np.zeros((4, 4))}])
+def test_what_are_no_arrays(droplet, arrays):
+    with pytest.raises(birefit.Error, match="arrays is"):
+        birefit.Job(droplet, arrays=arrays)
 
 
 def test_keywords_count_above_values(droplet):

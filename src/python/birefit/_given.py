@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Iterable, Mapping
 from typing import Any, NoReturn
 
 import numpy as np
@@ -24,6 +25,22 @@ def count(place: str, name: str, value: Any, hint: str) -> int:
     if not 0 <= number < 2**31:
         refuse(place, f"{name} is {number}", hint)
     return number
+
+
+def names(place: str, what: str, value: Any) -> list[str]:
+    """Names, or one."""
+    if isinstance(value, str):
+        return [value]
+    found = list(value) if isinstance(value, Iterable) and not isinstance(value, (bytes, Mapping)) else [value]
+    if not all(isinstance(name, str) for name in found):
+        refuse(place, f"{what} is {value!r}", "give names of numbers, or the name of one")
+    return [str(name) for name in found]
+
+
+def mapping(place: str, what: str, value: Any, hint: str) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        refuse(place, f"{what} is {value!r}", hint)
+    return value
 
 
 def threads_of(place: str, value: Any) -> int:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from . import _birefit
 from ._errors import Interrupted
-from ._given import count, real, reals, refuse, threads_of
+from ._given import count, mapping, names as names_of, real, reals, refuse, threads_of
 from ._result import Named, Objective, Result
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +42,10 @@ def load(
     Raises birefit.Error for whatever is wrong with the config. Pictures are read when a fit needs them, and what is
     wrong with them is said then.
     """
-    name = os.fspath(path)
+    try:
+        name = os.fsdecode(path)
+    except TypeError:
+        refuse("load", f"path is {path!r}", "give the name of a YAML file; Job takes a dictionary or text")
     return Job(_birefit.read_text(os.fsencode(name)), image=image, set=set, arrays=arrays, name=name)
 
 
@@ -74,7 +77,7 @@ class Job:
         name: str = "config",
     ) -> None:
         text = _text(tree)
-        images, fields = _held(arrays or {})
+        images, fields = _held({} if arrays is None else arrays)
         self._state = (text, name, _items(set), images, fields, _in_place(image))
         self._job = _birefit.Job(text, os.fsencode(name), *self._state[2:])
         self._objective: Objective | None = None
@@ -144,8 +147,9 @@ class Job:
         for the picture follows the values, as of ``birefit render``; equal values give equal bits, with derivatives equal
         numbers to rounding.
         """
-        given, above = ([(name, real("render", name, value)) for name, value in of.items()] for of in (values or {}, more))
-        active = [derivatives] if isinstance(derivatives, str) else list(derivatives or [])
+        known = mapping("render", "values", {} if values is None else values, "give numbers by name: {'birefringence': 0.2}")
+        given, above = ([(name, real("render", name, value)) for name, value in of.items()] for of in (known, more))
+        active = [] if derivatives is None else names_of("render", "derivatives", derivatives)
         picture, jacobian = self._job.render(given, above, active, threads_of("render", threads))
         if derivatives is None:
             return picture
@@ -168,7 +172,7 @@ class Job:
             if any(column.ndim > 1 for column in each) or len({column.size for column in each} - {1}) > 1:
                 refuse("render_many", "the columns have several lengths", "one number a picture in each, or a single number")
             thetas = np.stack(np.broadcast_arrays(*each), axis=1) if each else np.empty((1, 0))
-        columns = [names] if isinstance(names, str) else list(names) if names is not None else self.names
+        columns = self.names if names is None else names_of("render_many", "names", names)
         rows = reals("render_many", thetas, "(pictures, parameters)")
         return self._job.render_many(columns, rows, threads_of("render_many", threads))
 
@@ -198,6 +202,8 @@ class Job:
         Raises birefit.Error for images that cannot be read or fitted, and birefit.Interrupted on Ctrl-C, with what was
         found so far. A fit without an answer is a result that says why.
         """
+        if progress is not None and not callable(progress):
+            refuse("fit", f"progress is {progress!r}", "give a function of one line of text, as print")
         draws = count("fit", "samples", samples, "0 for none, or how many to draw")
         fitted = self._job.fit(_in_place(image), progress, threads_of("fit", threads), draws)
         if isinstance(fitted, tuple):
@@ -242,15 +248,21 @@ class Job:
     def explain(self, next: str = "") -> str:
         """Which model and method would run, why, what it costs and errs, and what the image can tell: the lines of
         ``birefit explain``. ``next``: the parameter for which the next image is to be proposed."""
-        return self._job.explain(next, False)
+        return self._job.explain(_next(next), False)
 
     def explanation(self, next: str = "") -> dict[str, Any]:
         """The same as a dictionary: method, physics, reasons, numerical_error, cost_seconds, parameters, .."""
-        return json.loads(self._job.explain(next, True))
+        return json.loads(self._job.explain(_next(next), True))
 
 
 def _job_again(cls: type[Job], text: str | bytes, name: str, set: list[str], images: Any, fields: Any, image: Any) -> Job:
     return cls(text, arrays={**images, **fields}, image=image, set=set, name=name)
+
+
+def _next(name: Any) -> str:
+    if not isinstance(name, str):
+        refuse("explain", f"next is {name!r}", "give the name of a fitted parameter")
+    return name
 
 
 def _text(tree: Any) -> str | bytes:
@@ -272,8 +284,8 @@ def _items(set: Settings) -> list[str]:
         return []
     if isinstance(set, Mapping):
         return [f"{path}={_value(value)}" for path, value in set.items()]
-    items = [] if isinstance(set, (str, bytes)) else list(set)
-    if isinstance(set, (str, bytes)) or not all(isinstance(item, str) for item in items):
+    items = list(set) if isinstance(set, Iterable) and not isinstance(set, (str, bytes)) else []
+    if not isinstance(set, Iterable) or isinstance(set, (str, bytes)) or not all(isinstance(item, str) for item in items):
         refuse("set", f"is {set!r}", "a dict of paths and values, or a list of 'path=value'")
     return items
 
@@ -309,7 +321,7 @@ def _held(arrays: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, b
     """Pictures, and fields as the files that NumPy would write of them."""
     images: dict[str, np.ndarray] = {}
     fields: dict[str, bytes] = {}
-    for name, value in arrays.items():
+    for name, value in mapping("arrays", "arrays", arrays, "give arrays by the names that the config has").items():
         if isinstance(value, (bytes, bytearray, memoryview)):
             fields[name] = bytes(value)
             continue
