@@ -232,6 +232,38 @@ std::unique_ptr<Refit> beside_close_rivals(const Task& task, const Minima& minim
   return has_close_rival(wider->task, wider->optimum) ? std::move(wider) : nullptr;
 }
 
+/// Minima along each number that is asked for become rivals: numbers that are fitted along can open some that the
+/// search without them has not seen, as the other side of a half wave. All else is as it is at the optimum, or, where
+/// it moves along no straight line, follows for a few steps. Of pictures for which looking costs next to nothing.
+void look_along(const Task& wider, Optimum& optimum, bool bent) {
+  constexpr int kPlaces = 128, kPlacesOfBent = 32, kSteps = 8;
+  if (optimum.stopped || !costs_microseconds(wider)) return;
+  SolveOptions few;
+  few.max_iterations = kSteps;
+  few.interrupted = wider.job.options.interrupted;
+  for (Eigen::Index j = 0; j < optimum.searched.size(); ++j) {
+    const Parameter& parameter = wider.searched(static_cast<std::size_t>(j));
+    if (parameter.nuisance || parameter.prior_sd || !std::isfinite(parameter.upper - parameter.lower)) continue;
+    few.held = static_cast<int>(j);
+    std::vector<Eigen::VectorXd> places;
+    std::vector<double> objective;
+    const int last = bent ? kPlacesOfBent : kPlaces;
+    for (int i = 0; i <= last; ++i) {
+      Eigen::VectorXd x = optimum.searched;
+      x[j] = parameter.lower + (parameter.upper - parameter.lower) * i / last;
+      if (bent)
+        optimum.problem->solve(x, few);
+      else
+        optimum.problem->evaluate(x, false);
+      objective.push_back(optimum.problem->objective());
+      places.push_back(std::move(x));
+    }
+    for (std::size_t i = 1; i + 1 < places.size(); ++i)
+      if (objective[i] < objective[i - 1] && objective[i] <= objective[i + 1]) optimum.rivals.push_back(places[i]);
+  }
+  optimum.problem->evaluate(optimum.searched, true);
+}
+
 /// The fit from the search's minima on. What another branch has beaten is reported where the search left it.
 Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   if (minima.hopeless && !beaten)
@@ -252,6 +284,7 @@ Outcome finish(const Task& task, const Minima& minima, bool beaten) {
   const Task wider(job);
   optimum = told.better ? settle(wider, best_with_nuisances(wider, task, optimum, minima))
                         : with_settled_misfit(wider, with_nuisances_from(wider, task, std::move(optimum)));
+  look_along(wider, optimum, told.bent);
   const Minima places = widened(wider, task, optimum.theta, minima);
   return with_what_is_left(wider, places, std::move(optimum), beaten);
 }

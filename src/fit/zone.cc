@@ -101,7 +101,8 @@ FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(c
   }
   now.options.values_only = depends;  // until it has settled
   FitResult result = fit(now);
-  constexpr int kRounds = 6;
+  constexpr int kRounds = 8;
+  constexpr int kToAndFro = 2;       // rounds after which what was left out stays so
   constexpr double kSettled = 1e-3;  // of the pixels: a zone's edge may pass to and fro over some
   double changed = 1;
   int evaluations = 0;
@@ -118,6 +119,8 @@ FitResult fit_following_zones(const FitJob& job, const std::function<FitResult(c
         now.options.values_only = false;
         return fit(now);
       }
+      for (std::size_t i = 0; round >= kToAndFro && i < before.size(); ++i)
+        if (!before.values()[i]) picture.mask.values()[i] = 0;
       for (std::size_t i = 0; i < before.size(); ++i)
         changed += picture.mask.values()[i] != before.values()[i], pixels += picture.mask.values()[i] != 0;
     }

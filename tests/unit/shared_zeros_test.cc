@@ -2,6 +2,8 @@
 
 #include "fit/problem/shared_zeros.h"
 
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "scene_builder.h"
@@ -57,6 +59,57 @@ TEST(SharedZeros, MoveAllFramesTogether) {
 TEST(SharedZeros, AreOfDialsThatAreNotExactAlone) {
   EXPECT_FALSE(has_own_dials(Frames(true, 0).job));
   EXPECT_FALSE(has_own_dials(Frames(false, 1).job));
+}
+
+/// Cells of which every picture states a thickness and a birefringence for itself, and a filter.
+struct Cells {
+  TableBuilder b;
+  FitJob job;
+  ParameterRef fitted = b.fitted("sample.material.birefringence", 0.1, 0, 0.2);
+
+  Cells() {
+    for (int k = 0; k < 4; ++k) {
+      const std::string at = "micrographs[" + std::to_string(k) + "].";
+      const auto known = [&](const std::string& name, double value, double share) {
+        const ParameterRef ref = b.fixed(at + name, value);
+        b.table[ref].known_to.share = share;
+        return ref;
+      };
+      Picture picture;
+      Cell cell;
+      cell.thickness_um = known("sample.cell.thickness_um", 5 + k, 0.005);
+      picture.scene.sample = cell;
+      // The last shows the empty field.
+      picture.scene.material =
+          ConstantIndices{b.fixed("ordinary", 1.5), k < 3 ? fitted : known("sample.material.birefringence", 0, 0.01)};
+      picture.scene.microscope.wavelength_nm = known("microscope.light.wavelength_nm", k % 2 ? 633 : 546, 0.003);
+      job.measurements.push_back(picture);
+    }
+    job.parameters = b.table;
+  }
+  const Scene& scene(const FitJob& of, std::size_t k) const { return std::get<Picture>(of.measurements[k]).scene; }
+};
+
+// A calliper reads all thicknesses, and each filter is one, however often it is stated. What is fitted elsewhere stays.
+TEST(SharedZeros, WhatIsKnownToAShareHasOneScaleAndFiltersAreOneEach) {
+  const Cells cells;
+  ASSERT_TRUE(has_own_dials(cells.job));
+  const FitJob job = with_shared_zeros(cells.job);
+  EXPECT_FALSE(has_own_dials(job));
+  const ParameterRef scale = job.parameters.find("scale of sample.cell.thickness_um");
+  ASSERT_TRUE(scale);
+  EXPECT_EQ(job.parameters[scale].known_to.sd, 0.005);
+  EXPECT_FALSE(job.parameters.find("scale of sample.material.birefringence"));
+  Theta theta = job.parameters.values();
+  theta[static_cast<std::size_t>(scale.index)] = 1.01;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Scene& scene = cells.scene(job, k);
+    EXPECT_DOUBLE_EQ(std::get<Cell>(scene.sample).thickness_um.in(theta), 1.01 * (5.0 + static_cast<double>(k)));
+    EXPECT_EQ(std::get<ConstantIndices>(scene.material).birefringence == cells.fitted, k < 3);
+    EXPECT_EQ(scene.microscope.wavelength_nm.index, cells.scene(job, k % 2).microscope.wavelength_nm.index);
+    EXPECT_EQ(scene.microscope.wavelength_nm.in(theta), k % 2 ? 633 : 546);
+  }
+  EXPECT_NE(cells.scene(job, 0).microscope.wavelength_nm.index, cells.scene(job, 1).microscope.wavelength_nm.index);
 }
 
 }  // namespace

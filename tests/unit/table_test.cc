@@ -105,6 +105,13 @@ TEST_F(TableFile, UnitsMayBeSpeltOut) {
   EXPECT_TRUE(contradicts_unit("nanometers", "um"));
   EXPECT_FALSE(contradicts_unit("Kelvin", "K"));
   EXPECT_FALSE(contradicts_unit("micrometres", "um"));
+  // What spectrometers and catalogues state light by, a factor of ten beside nanometres among them.
+  for (const char* unit : {"A", "\xc3\x85", "\xe2\x84\xab", "angstrom", "Angstroms", "1/cm", "cm-1", "eV", "THz"})
+    EXPECT_TRUE(contradicts_unit(unit, "nm")) << unit;
+  for (const char* name : {"wavelength_A", "wavelength (\xc3\x85)", "lambda_angstrom", "photon energy (eV)", "k, cm-1"})
+    EXPECT_TRUE(contradicts_unit(unit_in_name(name), "nm")) << name;
+  for (const char* unit : {"gon", "grad", "arcmin", "turns"}) EXPECT_TRUE(contradicts_unit(unit, "deg")) << unit;
+  EXPECT_FALSE(contradicts_unit("A", "V"));  // amperes of a supply, which nothing is set to
   for (const char* name : {"a (radians)", "a/rad", "a_Rad", "a, rad", "angle in rad", "a_rad"})
     EXPECT_TRUE(contradicts_unit(unit_in_name(name), "deg")) << name;
   for (const char* name : {"angle", "grad", "a_deg", "drive V", "brad"})

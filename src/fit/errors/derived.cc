@@ -192,6 +192,31 @@ void take_from_draws(const std::vector<double>& deviations, std::size_t drawn, d
   estimate.interval95_high = estimate.value + std::max(0.0, high);
 }
 
+/// Of one fitted number alone, all else exact: what that number's own interval says, which need not be symmetric.
+void take_from_profile(const Task& task, const Stated& stated, const std::vector<TieSlope>& slopes,
+                       const ValueAt& value_at, const FitResult& result, DerivedEstimate& estimate) {
+  const ParameterTable& table = task.job.parameters;
+  const TieSlope* only = nullptr;
+  for (const TieSlope& slope : slopes) {
+    const bool fitted = task.unknowns.of_entry(slope.index) >= 0;
+    const Parameter& parameter = table[slope.index];
+    if (!fitted && !is_stated(stated, slope.index) && !(parameter.known_to.of(parameter.value) > 0)) continue;
+    if (only || !fitted) return;
+    only = &slope;
+  }
+  if (!only) return;
+  const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(task.unknowns.of_entry(only->index))];
+  if (!p.profiled) return;
+  const auto at = [&](double end) {
+    Theta theta = result.theta;
+    theta[static_cast<std::size_t>(only->index)] = std::clamp(end, p.lower, p.upper);
+    table.follow(theta);
+    return value_at(theta);
+  };
+  const auto [low, high] = std::minmax({at(p.interval95_low), at(p.interval95_high)});
+  if (low <= estimate.value && estimate.value <= high) estimate.interval95_low = low, estimate.interval95_high = high;
+}
+
 }  // namespace
 
 void report_derived(const Task& task, const Covariances& covariances, FitResult& result) {
@@ -217,19 +242,7 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
       take_from_draws(draws->deviations(value_at, value, known_alone(task, covariances.stated, tie)), draws->size(),
                       half, error_of_parts(task, result, slopes), estimate);
     }
-    // Of one fitted number alone: what that number's own interval says, which need not be symmetric.
-    const int only = slopes.size() == 1 && of.by_stated == 0 ? task.unknowns.of_entry(slopes[0].index) : -1;
-    if (only >= 0 && result.parameters[static_cast<std::size_t>(only)].profiled && !std::isnan(estimate.stderr_)) {
-      const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(only)];
-      const auto at = [&](double end) {
-        Theta theta = result.theta;
-        theta[static_cast<std::size_t>(slopes[0].index)] = std::clamp(end, p.lower, p.upper);
-        table.follow(theta);
-        return value_at(theta);
-      };
-      const auto [low, high] = std::minmax({at(p.interval95_low), at(p.interval95_high)});
-      if (low <= value && value <= high) estimate.interval95_low = low, estimate.interval95_high = high;
-    }
+    if (!std::isnan(estimate.stderr_)) take_from_profile(task, covariances.stated, slopes, value_at, result, estimate);
     result.derived.push_back(std::move(estimate));
   };
   for (const int index : table.tied()) {

@@ -57,11 +57,13 @@ std::string judge_rows(const Task& task, const Optimum& optimum, FitResult& resu
 }
 
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {
-  constexpr double kMostOfContrast = 0.03, kMostOfValue = 0.1, kMostOfBounds = 0.25;
+  constexpr double kMostOfContrast = 0.03, kMostOfBounds = 0.25, kFarthest = 11.5;
+  const bool round = traits_of(task.picture(0).scene).round.has_value();
+  const double most_of_value = round ? 0.1 : 0.2;
   double squares = 0;  // over the colours of a photograph
   for (int g = 0; g < task.frames(); ++g) squares += std::pow(missed_of_contrast(task, optimum, g), 2);
   const double missed = std::sqrt(squares / task.frames());
-  if (missed > kMostOfContrast) {
+  if (round && missed > kMostOfContrast) {
     result.described = false;
     return fmt::format(
         "Not described: the model misses {:.2g} % of the image's contrast, where 3 % is the most that its "
@@ -69,13 +71,24 @@ std::string judge_discrepancy(const Task& task, const Optimum& optimum, const In
         100 * missed);
   }
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
-    if (task.job.parameters[task.unknowns.table_index(static_cast<int>(j))].nuisance) continue;
     const ParameterEstimate& p = result.parameters[j];
+    const Parameter& parameter = task.job.parameters[task.unknowns.table_index(static_cast<int>(j))];
+    if (parameter.nuisance) {
+      // What is stated may be wrong by as much, and then it describes the picture; twelve deviations are the end.
+      const bool stated = parameter.prior_sd && parameter.known_to.of(parameter.value) > 0;
+      const double off = stated ? std::abs(p.value - parameter.value) / *parameter.prior_sd : 0;
+      if (!(off > kFarthest)) continue;
+      result.described = false;
+      return fmt::format(
+          "Not described: {} would have to be {:.0f} times what it is known to away from what is stated, and the model "
+          "leaves over what noise does not explain all the same.",
+          p.name, off);
+    }
     const double half = 0.5 * (p.interval95_high - p.interval95_low);
     if (p.linear || !p.limit.empty() || !std::isfinite(half)) continue;
-    const bool may_be_zero = p.lower <= 0 && p.upper >= 0;
-    const double most = may_be_zero || p.unit == "deg" || p.unit == "px" ? kMostOfBounds * (p.upper - p.lower)
-                                                                         : kMostOfValue * std::abs(p.value);
+    const bool by_bounds = (p.lower <= 0 && p.upper >= 0) || p.unit == "deg" || p.unit == "px";
+    if (by_bounds && !round) continue;
+    const double most = by_bounds ? kMostOfBounds * (p.upper - p.lower) : most_of_value * std::abs(p.value);
     const auto at = static_cast<Eigen::Index>(j);
     const bool noise_alone = 2 * std::sqrt(of_noise.covariance(at, at)) > most;
     if (!(half > most) || noise_alone) continue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -25,15 +26,33 @@ struct Question {
   }
 };
 
+/// A place on a profile, and how far all unknowns are there from the estimate.
+struct Place {
+  double value = 0;
+  Eigen::VectorXd change;
+};
+Place place_at(const Question& q, const Profile& profile, double value) {
+  q.optimum.problem->evaluate(profile.place_nearest(value), false);
+  Place place{value, Eigen::VectorXd(q.task.unknowns.size())};
+  for (int j = 0; j < q.task.unknowns.size(); ++j) {
+    const auto at = static_cast<std::size_t>(q.task.unknowns.table_index(j));
+    place.change[j] = q.optimum.problem->theta()[at] - q.optimum.theta[at];
+  }
+  return place;
+}
+
+/// Nor has a model that misses the picture by many times its noise a likelihood to follow: it is as wrong elsewhere.
+/// (By the result: profiles of others have moved the problem.)
+bool misses_by_far(const FitResult& result) {
+  constexpr double kMissed = 10;
+  return result.reduced_chi_square > kMissed;
+}
+
 /// Where the profile likelihood of a searched unknown, going up from the estimate, leaves 95 % one-sided confidence;
 /// nothing when it stays below that up to the bound, or when the physical limit at its lower bound is itself excluded.
 /// Needed where the curvature at the estimate says nothing: a director below its threshold hardly answers to the
 /// voltage, above it does.
-struct UpperLimit {
-  double value = 0;
-  Eigen::VectorXd change;  ///< of all unknowns, from the estimate to there
-};
-std::optional<UpperLimit> upper_limit(const Question& q) {
+std::optional<Place> upper_limit(const Question& q) {
   const Parameter& parameter = q.parameter();
   const std::optional<JointPrior>& joint = q.task.job.prior;
   const bool prior =
@@ -42,15 +61,6 @@ std::optional<UpperLimit> upper_limit(const Question& q) {
   const double allowed = std::pow(student_t_quantile(0.95, q.result.interval_degrees_of_freedom), 2);
   Profile profile = q.profile();
   if (profile.rise(parameter.lower, allowed) > allowed) return std::nullopt;
-  const auto limit_at = [&](double value) {
-    q.optimum.problem->evaluate(profile.place_nearest(value), false);
-    UpperLimit limit{value, Eigen::VectorXd(q.task.unknowns.size())};
-    for (int j = 0; j < q.task.unknowns.size(); ++j) {
-      const auto at = static_cast<std::size_t>(q.task.unknowns.table_index(j));
-      limit.change[j] = q.optimum.problem->theta()[at] - q.optimum.theta[at];
-    }
-    return limit;
-  };
   constexpr int kSteps = 40, kHalvings = 12;  // the limit to 1e-5 of the range
   double inside = q.optimum.theta[static_cast<std::size_t>(q.task.unknowns.table_index(q.unknown))];
   const double step = (parameter.upper - inside) / kSteps;
@@ -65,7 +75,7 @@ std::optional<UpperLimit> upper_limit(const Question& q) {
       const double middle = 0.5 * (inside + outside);
       (profile.rise(middle, allowed) <= allowed ? inside : outside) = middle;
     }
-    return limit_at(outside);
+    return place_at(q, profile, outside);
   }
   return std::nullopt;
 }
@@ -82,10 +92,7 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
   // where the earlier data do not (docs/methods.md, "Profiles").
   if (q.task.job.prior) return;
   const Parameter& parameter = q.parameter();
-  // Nor has a model that misses the picture by many times its noise a likelihood to follow: it is as wrong elsewhere.
-  constexpr double kMissed = 10;
-  // (By the result: profiles of others have moved the problem.)
-  if (q.result.reduced_chi_square > kMissed) return;
+  if (misses_by_far(q.result)) return;
   // What noise does to it is lost in what the model leaves out, however its likelihood bends.
   constexpr double kOfError = 0.1;
   if (sd < kOfError * estimate.stderr_) return;
@@ -192,12 +199,31 @@ bool may_have_a_limit(const Question& q, const ParameterEstimate& estimate, bool
   return !estimate.linear && q.parameter().lower == q.parameter().physical_lower && !limited && !at_upper;
 }
 
-/// What others owe to an unknown that is known to lie below a limit and nowhere in particular: at the limit they are
-/// elsewhere, and where the picture answers to its square, as at nature's zero, no curvature at the estimate says so.
-void pay_for_limit(const UpperLimit& limit, double t, int unknown, FitResult& result) {
-  Eigen::VectorXd change = limit.change / t;
+/// What others owe to an unknown that lies anywhere between the estimate and this place, `t` standard errors away:
+/// where the picture answers to its square, as at nature's zero, no curvature at the estimate says so.
+void pay_for(const Place& place, double t, int unknown, FitResult& result) {
+  Eigen::VectorXd change = place.change / t;
   change[unknown] = 0;
   result.covariance += change * change.transpose();
+}
+
+/// The ends of the interval of an unknown that its likelihood on both sides knows, though its slope at the estimate
+/// says next to nothing; it and what others owe to it are in the covariance then.
+std::optional<std::array<double, 2>> settle_turning_point(const Question& q, double t) {
+  if (q.unknown >= static_cast<int>(q.task.unknowns.searched.size()) || q.optimum.stopped || !q.optimum.converged ||
+      misses_by_far(q.result))
+    return std::nullopt;
+  Profile profile = q.profile();
+  const auto ends = profile.about_turning_point(t * t);
+  if (!ends) return std::nullopt;
+  constexpr double kBetter = 1;  // of chi-square
+  if (profile.lowest() < -kBetter) q.optimum.better = profile.lowest_place();
+  q.result.covariance.row(q.unknown).setZero();
+  q.result.covariance.col(q.unknown).setZero();
+  for (const double end : *ends) pay_for(place_at(q, profile, end), std::numbers::sqrt2 * t, q.unknown, q.result);
+  q.result.covariance(q.unknown, q.unknown) = std::pow(0.5 * ((*ends)[1] - (*ends)[0]) / t, 2);
+  q.result.profiles.push_back(profile.trace());
+  return ends;
 }
 
 /// t standard errors of what the fit itself has found; what is stated has a standard deviation that is no estimate.
@@ -214,14 +240,16 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
   const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
   const auto question = [&](int j) { return Question{task, optimum, of_noise, result, j}; };
   // The curvature at the estimate need not be that of the way to nature's bound: ask there.
-  std::vector<std::optional<UpperLimit>> limits(static_cast<std::size_t>(task.unknowns.size()));
+  std::vector<std::optional<Place>> limits(static_cast<std::size_t>(task.unknowns.size()));
+  std::vector<std::optional<std::array<double, 2>>> turns(limits.size());
   for (int j = 0; j < task.unknowns.size(); ++j) {
     ParameterEstimate estimate = estimate_of(task, optimum, result.covariance, j);
     FitResult unused;
     const bool at_upper = settle_at_bound(question(j).parameter(), gradient[j], estimate, unused);
-    if (!may_have_a_limit(question(j), estimate, at_upper)) continue;
-    limits[static_cast<std::size_t>(j)] = upper_limit(question(j));
-    if (const auto& limit = limits[static_cast<std::size_t>(j)]) pay_for_limit(*limit, t, j, result);
+    auto& limit = limits[static_cast<std::size_t>(j)];
+    if (may_have_a_limit(question(j), estimate, at_upper)) limit = upper_limit(question(j));
+    if (limit) pay_for(*limit, t, j, result);
+    if (!limit && !estimate.at_bound) turns[static_cast<std::size_t>(j)] = settle_turning_point(question(j), t);
   }
   for (int j = 0; j < task.unknowns.size(); ++j) {
     ParameterEstimate estimate = estimate_of(task, optimum, result.covariance, j);
@@ -235,8 +263,12 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
       estimate.interval95_low = question(j).parameter().lower;
       estimate.interval95_high = limit->value;
     }
+    if (const auto& ends = turns[static_cast<std::size_t>(j)]) {
+      estimate.interval95_low = (*ends)[0], estimate.interval95_high = (*ends)[1];
+      estimate.profiled = true;
+    }
     // (Of what is fitted along for its error alone no interval is reported.)
-    if (!estimate.linear && !estimate.at_bound && estimate.limit.empty() && !question(j).parameter().nuisance)
+    else if (!estimate.linear && !estimate.at_bound && estimate.limit.empty() && !question(j).parameter().nuisance)
       settle_interval(question(j), estimate);
     result.names.push_back(question(j).parameter().name);
     result.parameters.push_back(std::move(estimate));

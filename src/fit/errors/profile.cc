@@ -5,6 +5,13 @@
 
 namespace birefit::estimation {
 
+bool is_known_there(const FitJob& job, const Parameter& parameter, double reach) {
+  constexpr double kKnown = 0.25;
+  const double width = parameter.upper - parameter.lower;
+  return parameter.nuisance || parameter.prior_sd || job.prior || !std::isfinite(width) ||
+         (reach > 0 && reach < kKnown * width);
+}
+
 Profile::Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best,
                  const Eigen::MatrixXd& covariance, int unknown)
     : problem_(problem), job_(job), unknowns_(unknowns), best_(best), unknown_(unknown) {
@@ -101,25 +108,39 @@ std::optional<double> Profile::newton_crossing(double end, double allowed) {
   return std::nullopt;
 }
 
+std::optional<std::array<double, 2>> Profile::about_turning_point(double allowed) {
+  const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(unknown_)]];
+  if (is_known_there(job_, parameter, std::sqrt(allowed) * sd_)) return std::nullopt;
+  std::array<double, 2> ends{parameter.lower, parameter.upper};
+  for (const double end : ends)
+    if (!(rise(end, allowed) > allowed)) return std::nullopt;
+  for (double& end : ends) end = bisected_crossing(end, allowed);
+  return ends;
+}
+
 double Profile::bisected_crossing(double end, double allowed) {
   const double from = best_[unknown_], wanted = std::sqrt(allowed), sign = end < from ? -1 : 1;
   const auto limited = [&](double v) { return sign * (end - v) < 0 ? end : v; };
   double inside = from, root_inside = 0, outside = end, root_outside = -1;  // root of the rise; -1: not known
-  double value = limited(from + sign * wanted * sd_);
+  // (Without a slope there is no step to start by.)
+  double value = sd_ > 0 ? limited(from + sign * wanted * sd_) : end;
+  int from_inside = 0;
   for (int i = 0; i < 16; ++i) {
     const double root = std::sqrt(std::max(0.0, rise(value)));
     if (std::abs(root - wanted) < 0.01 * wanted) return value;
     if (root < wanted) {
       if (value == end) return end;
-      inside = value, root_inside = root;
+      inside = value, root_inside = root, ++from_inside;
     } else {
-      outside = value, root_outside = root;
+      outside = value, root_outside = root, from_inside = 0;
     }
     if (root_outside < 0) {  // the root grows next to linearly: on by its slope, at most twice as far
       const double factor = root > 0 ? std::min(2.0, wanted / root * 1.02) : 2.0;
       value = limited(from + (value - from) * std::max(1.05, factor));
     } else {
-      const double fraction = (wanted - root_inside) / (root_outside - root_inside);
+      // A root that grows as the square keeps chords on the inside: then by halves.
+      constexpr int kChords = 3;
+      const double fraction = from_inside > kChords ? 0.5 : (wanted - root_inside) / (root_outside - root_inside);
       value = inside + (outside - inside) * std::clamp(fraction, 0.05, 0.95);
     }
   }

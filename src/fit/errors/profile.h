@@ -1,12 +1,17 @@
 #pragma once
 // Profile likelihood: where an interval is not value +- t standard errors.
 
+#include <array>
 #include <optional>
 #include <vector>
 
 #include "fit/problem/least_squares.h"
 
 namespace birefit::estimation {
+
+/// Whether the curvature at the optimum knows a searched unknown, or a prior does: `reach`, so many standard errors,
+/// within a quarter of its bounds' width.
+bool is_known_there(const FitJob& job, const Parameter& parameter, double reach);
 
 /// How the objective rises when one searched unknown is held away from its best value and all others follow (D. J.
 /// Venzon & S. H. Moolgavkar, Appl. Statist. 37, 87 (1988)). Moves `problem`; whoever needs it at the optimum evaluates
@@ -23,6 +28,10 @@ class Profile {
   /// below. By Venzon and Moolgavkar's iteration, by bisection where that fails; where bisection takes more than
   /// sixteen places, the nearest that is beyond.
   double crossing(double end, double allowed);
+  /// The places on both sides where the rise is `allowed`, of an unknown that is not known there (is_known_there) while
+  /// the data exclude both of its bounds: they answer to its square alone, as to a phase about half a wave or to an
+  /// azimuth about the polarizer's. Nothing elsewhere.
+  std::optional<std::array<double, 2>> about_turning_point(double allowed);
   /// Of all rises so far; clearly below zero: the estimate was not the minimum.
   double lowest() const;
   const Eigen::VectorXd& lowest_place() const;

@@ -267,7 +267,8 @@ FitResult report(const Task& task, Optimum& optimum, const Minima& minima, Rival
   if (!signal) result.identifiable = false;
   std::string misfit;
   const bool nearly = (covariances.discrepancy() && (task.frames() == 1 || are_of_spheres(task))) || left_out.by_light;
-  if (nearly && result.described && traits_of(task.picture(0).scene).round)
+  const bool round = traits_of(task.picture(0).scene).round.has_value();
+  if (nearly && result.described && (round || task.frames() == 1))
     misfit = judge_discrepancy(task, optimum, covariances.of_noise, result);
   else if (result.described && covariances.discrepancy() && are_rows(optimum.frames))
     misfit = judge_rows(task, optimum, result);

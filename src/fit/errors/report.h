@@ -47,9 +47,9 @@ void weigh_inputs(const Task& task, const Optimum& optimum, const Inverse& of_no
 /// A model that is better than that and yet leaves most of what there is to see is not the sample's, whatever its
 /// parameters' errors: result.described.
 bool judge_description(const Task& task, const Optimum& optimum, double chi_square, int places, FitResult& result);
-/// Where a discrepancy is left over: a model that misses more than 3 % of the contrast is no answer, nor are values
-/// that it, and not noise alone, leaves next to unknown. Says why in a sentence, with result.described = false; else
-/// nothing.
+/// Where a discrepancy is left over: a model of a round sample that misses over 3 % of the contrast is no answer, nor
+/// are values that it, and not noise alone, leaves next to unknown: to a tenth, or to a fifth of flat samples, whose
+/// real pictures miss more. Says why in a sentence, with result.described = false; else nothing.
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result);
 /// The same of tables: 3 % of the range of a table's values.
 std::string judge_rows(const Task& task, const Optimum& optimum, FitResult& result);

@@ -7,6 +7,7 @@
 
 #include "fit/errors/changed_input.h"
 #include "fit/errors/discrepancy.h"
+#include "fit/errors/profile.h"
 #include "fit/errors/statistics.h"
 #include "fit/problem/shared_zeros.h"
 
@@ -15,11 +16,14 @@ namespace {
 
 bool is_exact(const Parameter& parameter) { return !(parameter.known_to.of(parameter.value) > 0); }
 
-/// Read by every frame, not fitted, and not exact. What frames or rows have for themselves, as a spectrum its
-/// wavelengths, is exact: were each free, they would describe anything.
+/// Read by some frame, not fitted, and not exact. What rows have for themselves is exact beside what all of them share
+/// (fit/problem/shared_zeros.h): were each free, they would describe anything.
 std::vector<int> uncertain(const Task& task) {
-  std::vector<int> found = known_to_all_frames(task);
-  std::erase_if(found, [&](int index) { return is_exact(task.job.parameters[index]); });
+  std::vector<int> found = known_to_some_frames(task);
+  std::erase_if(found, [&](int index) {
+    const Parameter& stated = task.job.parameters[index];
+    return is_exact(stated) || stated.name.find("].row[") != std::string::npos;
+  });
   return found;
 }
 
@@ -100,6 +104,50 @@ std::unique_ptr<LeastSquares> before_scatter(const Task& task, const Optimum& op
   return problem;
 }
 
+/// Whether an unknown is known by its likelihood on both sides alone. Errors by derivatives would leave out what is
+/// stated then: where they are zero, it moves nothing.
+bool has_turning_point(const Task& task, const Optimum& optimum, const Inverse& inverse) {
+  constexpr double kReach = 2;  // standard errors
+  bool found = false;
+  for (Eigen::Index j = 0; j < optimum.searched.size() && !found; ++j) {
+    const Parameter& parameter = task.searched(static_cast<std::size_t>(j));
+    if (is_known_there(task.job, parameter, kReach * std::sqrt(inverse.covariance(j, j)))) continue;
+    Profile profile(*optimum.problem, task.job, task.unknowns, optimum.searched, inverse.covariance,
+                    static_cast<int>(j));
+    found = profile.about_turning_point(kReach * kReach).has_value();
+    optimum.problem->evaluate(optimum.searched, true);
+  }
+  return found;
+}
+
+/// Those that move an estimate by as much as its error and not along a straight line: where two standard deviations of
+/// one make of it what its derivative does not foretell, by most of its standard error, an interval by derivatives may
+/// miss the truth by many of its widths (a weak plate behind an analyser whose zero is off by a degree looks like a
+/// stronger one that lies otherwise). Of pictures for which looking costs next to nothing.
+std::vector<int> bent_numbers(const Task& task, const Optimum& optimum, const Stated& stated,
+                              const Eigen::MatrixXd& covariance) {
+  constexpr double kShare = 0.1, kFar = 2, kBent = 0.75;
+  if (!costs_microseconds(task)) return {};
+  const Eigen::Index n = optimum.searched.size();
+  const Eigen::ArrayXd variance =
+      covariance.diagonal().head(n).array() + stated.shift.topRows(n).rowwise().squaredNorm().array();
+  std::vector<int> much;
+  bool bent = false;
+  for (Eigen::Index i = 0; i < stated.sd.size(); ++i) {
+    const Eigen::VectorXd linear = stated.shift.col(i);
+    if (!(linear.head(n).array().square() > kShare * variance).any()) continue;
+    const int index = stated.index[static_cast<std::size_t>(i)];
+    much.push_back(index);
+    for (const double by : {-kFar, kFar}) {
+      if (bent) break;
+      const double value = optimum.theta[static_cast<std::size_t>(index)] + by * stated.sd[i];
+      const Eigen::VectorXd off = shift_by_input(task, optimum, index, value, by * linear) - by * linear;
+      bent = !off.allFinite() || (off.head(n).array().abs() > kBent * variance.sqrt()).any();
+    }
+  }
+  return bent ? much : std::vector<int>{};
+}
+
 }  // namespace
 
 Stated linear_stated_numbers(const Task& task, LeastSquares& problem, const Theta& theta,
@@ -155,6 +203,9 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   const std::unique_ptr<LeastSquares> own = scatter ? before_scatter(task, optimum) : nullptr;
   LeastSquares& problem = own ? *own : *optimum.problem;
   const Inverse inverse = invert_normal_equations(problem.factor());
+  if (!own && has_turning_point(task, optimum, inverse))
+    return {fittable(task, linear_stated_numbers(task, problem, problem.theta(), inverse.covariance)).index, false,
+            true};
   if (std::count(inverse.undetermined.begin(), inverse.undetermined.end(), true) > 0) return {};
   const Stated stated = fittable(task, linear_stated_numbers(task, problem, problem.theta(), inverse.covariance));
   const Eigen::Index k = stated.sd.size();
@@ -181,15 +232,15 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum) {
   const bool by_frames = task.frames() > 1 && (scatter || optimum.misfit.beyond_noise) &&
                          !(are_colours(task) && missed_of_contrast(task, optimum) < kNearly);
   if (by_frames && task.frames() < task.unknowns.size() + static_cast<int>(told.size()) + kFreedom) return {};
-  if (gain_by(unit) > enough && (gain_by(unit) > kOfExcess * excess || gain_by(1) > enough)) return {told, true};
+  if (gain_by(unit) > enough && (gain_by(unit) > kOfExcess * excess || gain_by(1) > enough)) return {told, true, false};
   if (by_frames) return {};
   const Eigen::MatrixXd posterior = (prior + stated.information).ldlt().solve(prior);
   for (Eigen::Index j = 0; j < optimum.searched.size(); ++j) {
     const double noise = inverse.covariance(j, j), stated_alone = stated.shift.row(j).squaredNorm(),
                  fitted = stated.shift.row(j) * posterior * stated.shift.row(j).transpose();
-    if (noise + stated_alone > kWider * (noise + fitted)) return {told_by(1), false};
+    if (noise + stated_alone > kWider * (noise + fitted)) return {told_by(1), false, false};
   }
-  return {};
+  return {bent_numbers(task, optimum, stated, inverse.covariance), false, true};
 }
 
 FitJob with_nuisances(const FitJob& job, const std::vector<int>& numbers) {

@@ -33,6 +33,7 @@ Eigen::MatrixXd covariance_by(const Stated& stated);
 struct WorthFitting {
   std::vector<int> numbers;  ///< table indices
   bool better = false;       ///< the pictures want them elsewhere: other minima may be the best then
+  bool bent = false;         ///< the estimates follow them along no straight line: other minima may be as good
 };
 WorthFitting worth_fitting(const Task& task, const Optimum& optimum);
 

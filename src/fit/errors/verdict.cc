@@ -94,8 +94,12 @@ void judge_directions(FitResult& result, const Eigen::MatrixXd& factor, const Ei
     direction.identifiable = direction.stderr_ <= kHalfWidth;
     Eigen::Index at;
     v.cwiseAbs().maxCoeff(&at);
-    // A limit is an answer, though the estimate itself is not known.
-    if (std::abs(v[at]) > 0.999 && !result.parameters[at].limit.empty()) direction.identifiable = true;
+    // A limit is an answer, though the estimate itself is not known; so is what the likelihood on both sides says.
+    const ParameterEstimate& largest = result.parameters[static_cast<std::size_t>(at)];
+    const bool both_sides = largest.profiled && largest.interval95_high - largest.interval95_low < scale[at];
+    if (std::abs(v[at]) > 0.999 && (!largest.limit.empty() || both_sides)) direction.identifiable = true;
+    if (!(direction.stderr_ <= kHalfWidth) && direction.identifiable && both_sides)
+      direction.stderr_ = largest.stderr_ / scale[at];
     if (!direction.identifiable) {
       result.identifiable = false;
       if (std::abs(v[at]) > 0.999)
@@ -127,6 +131,13 @@ void judge_pair(FitResult& result, const FitJob& job, const Unknowns& unknowns, 
   if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) return;  // the prior's own correlation
   if (!(of_data_a > kValley * inverse.conditional_sd[a] && of_data_b > kValley * inverse.conditional_sd[b])) return;
   const double sa = std::sqrt(result.covariance(a, a)), sb = std::sqrt(result.covariance(b, b));
+  // Of tables each within a few per cent, what models err by and what is stated included, is an answer, however they
+  // act together: a film's index and thickness by its interference. (In pictures what is not modelled slides along,
+  // too.)
+  constexpr double kFew = 0.03;
+  const bool tables = std::all_of(job.measurements.begin(), job.measurements.end(),
+                                  [](const Measurement& m) { return std::holds_alternative<Readings>(m); });
+  if (tables && t * sa < kFew * std::abs(pa.value) && t * sb < kFew * std::abs(pb.value)) return;
   result.identifiable = false;
   FisherDirection direction;
   const double sign = correlation > 0 ? 1 : -1;
@@ -161,7 +172,7 @@ void judge_identifiability(FitResult& result, const FitJob& job, const Unknowns&
   const Eigen::VectorXd scale = scale_asked(result, job, n);
   judge_directions(result, factor, scale);
   for (int j = 0; j < n; ++j)
-    if (inverse.undetermined[j] && result.parameters[j].limit.empty()) {
+    if (inverse.undetermined[j] && result.parameters[j].limit.empty() && !result.parameters[j].profiled) {
       result.identifiable = false;
       not_known(result.parameters[j]);
     }

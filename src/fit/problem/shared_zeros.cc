@@ -1,6 +1,7 @@
 #include "fit/problem/shared_zeros.h"
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -31,35 +32,52 @@ std::vector<std::vector<Ref*>> numbers_in(Job& job) {
   return numbers;
 }
 
-/// What scenes state of it: what is tied follows other dials.
-template <class Ref>
-std::vector<Ref*> stated_of(const FitJob& job, std::vector<Ref*> number) {
-  std::erase_if(number, [&](const Ref* ref) { return job.parameters.tie_of(ref->index) != nullptr; });
-  return number;
+/// Of "signal[1].row[3].sample.temperature_k" what follows the frame.
+std::string path_in_frame(const std::string& name) {
+  const std::size_t frame = name.rfind("].");
+  return frame == std::string::npos ? name : name.substr(frame + 2);
+}
+bool is_of_row(const Parameter& stated) { return stated.name.find("].row[") != std::string::npos; }
+/// Pictures at several wavelengths have a filter each; rows of a spectrum are read off one scale.
+bool is_of_light(const Parameter& stated) {
+  const std::string path = path_in_frame(stated.name);
+  return path.ends_with("wavelength_nm") || path.ends_with("centre_nm") || path.ends_with("fwhm_nm");
 }
 
-/// Stated by every scene that does not tie it, not by all the same one, and known within a standard deviation.
+/// Those places of one number that frames state each for itself and that have something in common.
 template <class Ref>
-bool is_own_dial(const FitJob& job, const std::vector<Ref*>& number) {
-  if (number.empty()) return false;
-  const bool own =
-      std::any_of(number.begin(), number.end(), [&](const Ref* ref) { return ref->index != number.front()->index; });
-  return own && std::all_of(number.begin(), number.end(), [&](const Ref* ref) {
-           return *ref && !job.parameters[*ref].free && !job.parameters[*ref].linear &&
-                  job.parameters[*ref].known_to.sd > 0;
-         });
-}
-
-/// Stated by every row for itself, and known to a share.
+struct Shared {
+  std::vector<Ref*> dial;   ///< known within a standard deviation: one zero
+  std::vector<Ref*> scale;  ///< known to a share of them: one scale
+  std::vector<Ref*> equal;  ///< filters, which are one where their values are
+};
 template <class Ref>
-bool is_own_scale(const FitJob& job, const std::vector<Ref*>& number) {
-  if (number.empty()) return false;
-  return std::all_of(number.begin(), number.end(), [&](const Ref* ref) {
-    if (!*ref) return false;
+Shared<Ref> shared_of(const FitJob& job, const std::vector<Ref*>& number) {
+  const auto own = [](const std::vector<Ref*>& some) {
+    return std::any_of(some.begin(), some.end(), [&](const Ref* ref) { return ref->index != some.front()->index; });
+  };
+  Shared<Ref> shared;
+  bool of_row = false;
+  for (Ref* ref : number) {
+    // What is tied follows other dials.
+    if (!*ref || job.parameters.tie_of(ref->index)) continue;
     const Parameter& stated = job.parameters[*ref];
-    return !stated.free && !stated.linear && stated.known_to.sd == 0 && stated.known_to.share > 0 &&
-           stated.name.find("].row[") != std::string::npos;
+    if (stated.free || stated.linear) continue;
+    if (stated.known_to.sd > 0)
+      shared.dial.push_back(ref);
+    else if (stated.known_to.share > 0 && is_of_light(stated) && !is_of_row(stated))
+      shared.equal.push_back(ref);
+    else if (stated.known_to.share > 0)
+      shared.scale.push_back(ref), of_row = of_row || is_of_row(stated);
+  }
+  if (!own(shared.dial)) shared.dial.clear();
+  if (!of_row && !own(shared.scale)) shared.scale.clear();
+  std::map<double, int> filters;
+  const bool twice = std::any_of(shared.equal.begin(), shared.equal.end(), [&](const Ref* ref) {
+    return filters.emplace(job.parameters[*ref].value, ref->index).first->second != ref->index;
   });
+  if (!twice) shared.equal.clear();
+  return shared;
 }
 
 /// What other numbers follow from.
@@ -85,10 +103,43 @@ void tie_to(ParameterTable& table, int index, ParameterRef common, const char* b
   table.tie(index, {std::move(law), {common.index, constant.index}});
 }
 
-/// Of "signal[1].row[3].sample.temperature_k" what follows the frame.
-std::string path_in_frame(const std::string& name) {
-  const std::size_t frame = name.rfind("].");
-  return frame == std::string::npos ? name : name.substr(frame + 2);
+/// From now on what was stated and the zero, or times the scale.
+void follow(FitJob& job, const std::vector<ParameterRef*>& places, bool scale,
+            const std::set<int>& followed_by_others) {
+  if (places.empty()) return;
+  const Parameter first = job.parameters[*places.front()];
+  const std::string path = path_in_frame(first.name);
+  const ParameterRef common = scale ? job.parameters.add_constant("scale of " + path, 1, "")
+                                    : job.parameters.add_constant("zero of " + path, 0, first.unit);
+  double sd = 0;
+  for (const ParameterRef* ref : places) {
+    const Uncertainty& known_to = job.parameters[*ref].known_to;
+    sd = std::max(sd, scale ? known_to.share : known_to.sd);
+  }
+  job.parameters[common].known_to.sd = sd;
+  for (ParameterRef* ref : places) {
+    if (followed_by_others.contains(ref->index)) {
+      if (!job.parameters.tie_of(ref->index)) tie_to(job.parameters, ref->index, common, scale ? kByScale : kByZero);
+      continue;
+    }
+    ParameterRef moved = *ref;
+    const double stated = job.parameters[*ref].value;
+    if (scale)
+      moved.times *= stated;
+    else
+      moved.plus += moved.times * stated;
+    moved.index = common.index;
+    *ref = moved;
+  }
+}
+
+/// One filter is one number.
+void unite(const FitJob& job, const std::vector<ParameterRef*>& places, const std::set<int>& followed_by_others) {
+  std::map<double, int> by_value;
+  for (ParameterRef* ref : places) {
+    if (followed_by_others.contains(ref->index)) continue;
+    ref->index = by_value.emplace(job.parameters[*ref].value, ref->index).first->second;
+  }
 }
 
 }  // namespace
@@ -96,39 +147,18 @@ std::string path_in_frame(const std::string& name) {
 bool has_own_dials(const FitJob& job) {
   const auto numbers = numbers_in<const FitJob, const ParameterRef>(job);
   return std::any_of(numbers.begin(), numbers.end(), [&](const auto& number) {
-    return is_own_dial(job, stated_of(job, number)) || is_own_scale(job, stated_of(job, number));
+    const auto shared = shared_of(job, number);
+    return !shared.dial.empty() || !shared.scale.empty() || !shared.equal.empty();
   });
 }
 
 FitJob with_shared_zeros(FitJob job) {
   const std::set<int> followed_by_others = followed(job);
-  for (const std::vector<ParameterRef*>& all : numbers_in<FitJob, ParameterRef>(job)) {
-    const std::vector<ParameterRef*> number = stated_of(job, all);
-    const bool scale = is_own_scale(job, number);
-    if (!scale && !is_own_dial(job, number)) continue;
-    const Parameter first = job.parameters[*number.front()];
-    const std::string path = path_in_frame(first.name);
-    const ParameterRef common = scale ? job.parameters.add_constant("scale of " + path, 1, "")
-                                      : job.parameters.add_constant("zero of " + path, 0, first.unit);
-    double& sd = job.parameters[common].known_to.sd;
-    for (const ParameterRef* ref : number) {
-      const Uncertainty& known_to = job.parameters[*ref].known_to;
-      sd = std::max(sd, scale ? known_to.share : known_to.sd);
-    }
-    for (ParameterRef* ref : number) {
-      if (followed_by_others.contains(ref->index)) {
-        if (!job.parameters.tie_of(ref->index)) tie_to(job.parameters, ref->index, common, scale ? kByScale : kByZero);
-        continue;
-      }
-      ParameterRef moved = *ref;
-      const double stated = job.parameters[*ref].value;
-      if (scale)
-        moved.times *= stated;
-      else
-        moved.plus += moved.times * stated;
-      moved.index = common.index;
-      *ref = moved;
-    }
+  for (const std::vector<ParameterRef*>& number : numbers_in<FitJob, ParameterRef>(job)) {
+    const Shared<ParameterRef> shared = shared_of(job, number);
+    follow(job, shared.dial, false, followed_by_others);
+    follow(job, shared.scale, true, followed_by_others);
+    unite(job, shared.equal, followed_by_others);
   }
   return job;
 }

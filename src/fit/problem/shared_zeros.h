@@ -12,9 +12,11 @@ inline constexpr const char* kByScale = "its.scale * as.stated";
 
 /// Pictures at several angles, or rows at several temperatures, are read off one dial, whose zero is known no better
 /// than one of its readings: where frames state numbers of their own that are known within a standard deviation
-/// (Parameter::known_to.sd), what all of them are off by is a number of its own, stated as 0. Rows of a table whose
-/// numbers are known to a share of them (Parameter::known_to.share), wavelengths say, are read off one scale, a number
-/// of its own, stated as 1; pictures at several wavelengths have a filter each. A job without such is as it was.
+/// (Parameter::known_to.sd), what all of them are off by is a number of its own, stated as 0. Frames of their own
+/// thickness, or whatever is known to a share of it (Parameter::known_to.share), and the wavelengths of a table's rows,
+/// are read off one scale, a number of its own, stated as 1. Pictures at several wavelengths have a filter each, which
+/// is one number where its value is. What is free or exact in some frames is left as it is there. A job without such
+/// is as it was.
 FitJob with_shared_zeros(FitJob job);
 /// Whether that would change it.
 bool has_own_dials(const FitJob& job);

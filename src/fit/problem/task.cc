@@ -85,7 +85,10 @@ bool follows_from(const ParameterTable& table, ParameterRef number, int index) {
   return std::find(roots.begin(), roots.end(), index) != roots.end();
 }
 
-std::vector<int> known_to_all_frames(const Task& task) {
+namespace {
+
+/// How many frames read each number that is not fitted.
+std::map<int, int> readers_of_known(const Task& task) {
   std::map<int, int> readers;
   for (int g = 0; g < task.frames(); ++g) {
     std::set<int> read;
@@ -95,8 +98,20 @@ std::vector<int> known_to_all_frames(const Task& task) {
     });
     for (const int index : read) ++readers[index];
   }
+  return readers;
+}
+
+}  // namespace
+
+std::vector<int> known_to_some_frames(const Task& task) {
   std::vector<int> known;
-  for (const auto& [index, number] : readers)
+  for (const auto& [index, number] : readers_of_known(task)) known.push_back(index);
+  return known;
+}
+
+std::vector<int> known_to_all_frames(const Task& task) {
+  std::vector<int> known;
+  for (const auto& [index, number] : readers_of_known(task))
     if (number == task.frames()) known.push_back(index);
   return known;
 }

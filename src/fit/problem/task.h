@@ -46,8 +46,9 @@ std::vector<Sight> sights_of(const FitJob& job);
 struct Task;
 /// Whether the number is that entry, or tied to it.
 bool follows_from(const ParameterTable& table, ParameterRef number, int index);
-/// Table indices of the numbers that every frame of a task reads, or what it reads follows from, and that are not
-/// fitted, in ascending order.
+/// Table indices of the numbers that some frame of a task reads, or what it reads follows from, and that are not
+/// fitted, in ascending order; and of those that every frame does.
+std::vector<int> known_to_some_frames(const Task& task);
 std::vector<int> known_to_all_frames(const Task& task);
 
 /// A job and what is estimated of it. Refers to the job, which has to outlive it.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <regex>
 #include <utility>
 
 #include <fmt/format.h>
@@ -213,6 +214,15 @@ void check_unit(ConfigReader& reader, const TextTable& text, int column, const S
                         "{column: " + taken.name + ", scale: .., plus: ..} converts it");
 }
 
+/// Spectrometers save what they show: decibels, absorbances.
+void warn_of_logarithms(ConfigReader& reader, const std::string& unit, const std::string& name) {
+  static const std::regex absorbance("(.*[^a-z])?(absorbance|optical density|od|dbm?)([^a-z].*)?", std::regex::icase);
+  if (unit == "dB" || unit == "dBm" || std::regex_match(name, absorbance))
+    reader.warnings.push_back(name +
+                              " is a logarithm of light by its name, and a signal is proportional to light: give "
+                              "transmission, 10^(dB / 10) or 10^(-absorbance).");
+}
+
 }  // namespace
 
 std::vector<SignalItem> read_signals(ConfigReader& reader, const Block& root) {
@@ -345,6 +355,8 @@ void append_signal(ConfigReader& reader, const SignalItem& item, const TextTable
     if (const auto [given, by] = unit_of(text, value_column, item.value_column); contradicts_unit(given, "um"))
       reader.problems.add(item.file_where, item.value_column + " is in " + given + by + "quantity retardance_um in um",
                           "give the retardances in um");
+  if (value_column >= 0 && item.quantity == Quantity::intensity)
+    warn_of_logarithms(reader, unit_of(text, value_column, item.value_column).first, item.value_column);
   const std::vector<SetColumn> columns = set_columns(reader, item, text, header);
   std::vector<int> only;
   for (const SignalItem::Only& each : item.only) only.push_back(header.at(each.column, each.where));

@@ -34,11 +34,21 @@ std::string plain_unit(std::string unit) {
   if (unit == "\xc2\xb0" || unit == "\xb0" || unit == "degree" || unit == "degrees") return "deg";
   if (unit == "\xc2\xb0\x43" || unit == "\xb0\x43" || unit == "degC" || unit == "deg C" || unit == "celsius")
     return "C";
+  for (const char* angstrom : {"\xc3\x85", "\xe2\x84\xab", "\xc5"})  // as a letter, as a sign, in Latin-1
+    if (unit == angstrom) return "A";
   static const std::map<std::string, std::string> kSpeltOut = {
-      {"volt", "V"},       {"volts", "V"},          {"millivolt", "mV"},      {"millivolts", "mV"}, {"kilovolt", "kV"},
-      {"kilovolts", "kV"}, {"rad", "rad"},          {"radian", "rad"},        {"radians", "rad"},   {"deg", "deg"},
-      {"mrad", "mrad"},    {"milliradian", "mrad"}, {"milliradians", "mrad"}, {"kelvin", "K"},      {"micron", "um"},
-      {"microns", "um"},   {"metre", "m"},          {"meter", "m"},           {"metres", "m"},      {"meters", "m"}};
+      {"angstrom", "A"},  {"angstroms", "A"},      {"ev", "eV"},
+      {"thz", "THz"},     {"gon", "gon"},          {"gons", "gon"},
+      {"grad", "gon"},    {"arcmin", "arcmin"},    {"arcsec", "arcsec"},
+      {"turn", "turn"},   {"turns", "turn"},       {"cm-1", "1/cm"},
+      {"cm^-1", "1/cm"},  {"1/cm", "1/cm"},        {"volt", "V"},
+      {"volts", "V"},     {"millivolt", "mV"},     {"millivolts", "mV"},
+      {"kilovolt", "kV"}, {"kilovolts", "kV"},     {"rad", "rad"},
+      {"radian", "rad"},  {"radians", "rad"},      {"deg", "deg"},
+      {"mrad", "mrad"},   {"milliradian", "mrad"}, {"milliradians", "mrad"},
+      {"kelvin", "K"},    {"micron", "um"},        {"microns", "um"},
+      {"metre", "m"},     {"meter", "m"},          {"metres", "m"},
+      {"meters", "m"}};
   std::string word = lower_case(unit);
   if (const auto found = kSpeltOut.find(word); found != kSpeltOut.end()) return found->second;
   for (const auto& [prefix, sign] : {std::pair{"nano", "n"}, {"micro", "u"}, {"milli", "m"}, {"centi", "c"}})
@@ -191,7 +201,11 @@ std::string number_hint(std::string_view text) {
 
 bool contradicts_unit(const std::string& given, const std::string& wanted) {
   static const std::vector<std::vector<std::string>> kKinds = {
-      {"uV", "mV", "V", "kV"}, {"m", "mm", "cm", "um", "nm", "pm", "inch"}, {"deg", "rad", "mrad"}, {"K", "C"}};
+      {"uV", "mV", "V", "kV"},
+      // What light is stated by in place of a wavelength, too.
+      {"m", "mm", "cm", "um", "nm", "pm", "inch", "A", "1/cm", "eV", "THz"},
+      {"deg", "rad", "mrad", "gon", "arcmin", "arcsec", "turn"},
+      {"K", "C"}};
   const std::string a = plain_unit(given), b = plain_unit(wanted);
   return a != b && std::any_of(kKinds.begin(), kKinds.end(), [&](const auto& kind) {
            return std::find(kind.begin(), kind.end(), a) != kind.end() &&
@@ -201,7 +215,9 @@ bool contradicts_unit(const std::string& given, const std::string& wanted) {
 
 std::string unit_in_name(const std::string& name) {
   static const std::regex bracketed(R"(.*[(\[]([^()\[\]]+)[)\]] *)"),
-      appended(".*(?:_|/|, ?| in )((?:m?[Rr]ad(?:ians?)?)|[Dd]eg(?:rees?)?|nm|um|mm|cm|mV|kV|V|C)"),
+      appended(
+          ".*(?:_|/|, ?| in )((?:m?[Rr]ad(?:ians?)?)|[Dd]eg(?:rees?)?|nm|um|mm|cm|mV|kV|V|C|A|\xc3\x85|"
+          "[Aa]ngstroms?|eV|THz|cm\\^?-1|gon|grad|arcmin|arcsec|turns?)"),
       place(R"( \(column \d+\)$)");
   const std::string own = std::regex_replace(name, place, "");
   std::smatch found;
