@@ -239,6 +239,7 @@ microscope:
   polarizer_deg: 0
   analyzer_deg: 90
   # objective_na: 0.6
+accuracy: {intensity: 3.0e-3}  # a third of the noise of a bright pixel; the default, 1e-4, takes much longer
 # physics: {ceiling: wave}     # wave optics in place of straight rays; needs objective_na and surround
 )";
 
