@@ -345,6 +345,20 @@ microscope: {light: {wavelength_nm: {value: 589.3, exact: true}}, polarizer_deg:
   EXPECT_GE(inside, intervals * (0.95 - 3 * std::sqrt(0.05 * 0.95 / answers)));
 }
 
+TEST_F(ConfigSignal, LightThatIsStatedIsTakenAsExactAndListed) {
+  std::mt19937_64 random(1);
+  write("turned.csv", seen_by_analyser(200, 0.003, 0, random));
+  const auto listed = [&](const std::string& micrograph) {
+    const std::string text = replaced(kLinear, "{offset: {value: 0, exact: true}}", micrograph);
+    std::string all;
+    for (const std::string& line : load(text, ConfigUse::fit).job.taken_as_exact) all += line;
+    return all;
+  };
+  EXPECT_NE(listed("{gain: 1000, offset: 0}").find("the gain and offset of the table's light"), std::string::npos);
+  EXPECT_NE(listed("{gain: {fit: auto}, offset: 0}").find("the offset of the table's light"), std::string::npos);
+  EXPECT_EQ(listed("{gain: {fit: auto}, offset: {fit: auto}}").find("of the table's light"), std::string::npos);
+}
+
 TEST_F(ConfigSignal, LogarithmsOfLightAreNamed) {
   const auto warns = [&](const std::string& column) {
     write("a.csv", "analyser,\"" + column + "\"\n0,1\n15,2\n30,3\n45,4\n60,5\n");

@@ -325,6 +325,15 @@ void Loading::note_taken_as_exact() {
   if (!tables_.empty() && quantity_ != Quantity::intensity && !reader_.table[tables_[0].gain].free)
     config_.job.taken_as_exact.push_back(
         "the scale of the table's values: an instrument that drifts along its rows looks like a law of the material.");
+  if (!tables_.empty() && quantity_ == Quantity::intensity) {
+    std::string stated;
+    for (const auto& [name, ref] : {std::pair("gain", tables_[0].gain), {"offset", tables_[0].offset}})
+      if (ref && !reader_.table[ref].free) stated += (stated.empty() ? "" : " and ") + std::string(name);
+    if (!stated.empty())
+      config_.job.taken_as_exact.push_back("the " + stated +
+                                           " of the table's light: a leak, a detector's curve or a lamp that changes "
+                                           "the light is read as the sample's. {fit: auto} finds them.");
+  }
   if (const auto* crystal = std::get_if<Crystal>(&config_.scene.sample);
       crystal && !crystal->built_in_bias_v && config_.job.measurements.size() > 1)
     config_.job.taken_as_exact.push_back(
