@@ -249,7 +249,7 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
     if (table.tie_of(index)->law->text() == kByZero || table.tie_of(index)->law->text() == kByScale) continue;
     const Parameter& parameter = table[index];
     const double value = result.theta[static_cast<std::size_t>(index)];
-    const bool of_row = parameter.name.find("].row[") != std::string::npos;  // of which there are hundreds
+    const bool of_row = is_of_row(parameter);  // of which there are hundreds
     if (!of_row)
       add(parameter.name, parameter.unit, *table.tie_of(index), true, value, table.slopes(index, result.theta),
           [index](const Theta& theta) { return theta[static_cast<std::size_t>(index)]; });

@@ -12,6 +12,7 @@
 #include "core/robust.h"
 #include "fit/errors/discrepancy.h"
 #include "fit/errors/report.h"
+#include "fit/errors/stated.h"
 #include "fit/errors/verdict.h"
 #include "fit/problem/constant.h"
 
@@ -57,7 +58,7 @@ std::string judge_rows(const Task& task, const Optimum& optimum, FitResult& resu
 }
 
 std::string judge_discrepancy(const Task& task, const Optimum& optimum, const Inverse& of_noise, FitResult& result) {
-  constexpr double kMostOfContrast = 0.03, kMostOfBounds = 0.25, kFarthest = 11.5;
+  constexpr double kMostOfContrast = 0.03, kMostOfBounds = 0.25, kAtTheEnd = 0.5;
   const bool round = traits_of(task.picture(0).scene).round.has_value();
   const double most_of_value = round ? 0.1 : 0.2;
   double squares = 0;  // over the colours of a photograph
@@ -74,10 +75,10 @@ std::string judge_discrepancy(const Task& task, const Optimum& optimum, const In
     const ParameterEstimate& p = result.parameters[j];
     const Parameter& parameter = task.job.parameters[task.unknowns.table_index(static_cast<int>(j))];
     if (parameter.nuisance) {
-      // What is stated may be wrong by as much, and then it describes the picture; twelve deviations are the end.
+      // What is stated may be wrong by as much, and then it describes the picture; not at the end of what is allowed.
       const bool stated = parameter.prior_sd && parameter.known_to.of(parameter.value) > 0;
       const double off = stated ? std::abs(p.value - parameter.value) / *parameter.prior_sd : 0;
-      if (!(off > kFarthest)) continue;
+      if (!(off > kFarthestStated - kAtTheEnd)) continue;
       result.described = false;
       return fmt::format(
           "Not described: {} would have to be {:.0f} times what it is known to away from what is stated, and the model "

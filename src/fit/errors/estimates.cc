@@ -213,6 +213,9 @@ std::optional<std::array<double, 2>> settle_turning_point(const Question& q, dou
   if (q.unknown >= static_cast<int>(q.task.unknowns.searched.size()) || q.optimum.stopped || !q.optimum.converged ||
       misses_by_far(q.result))
     return std::nullopt;
+  // (Asked before there is a profile, which evaluates.)
+  if (is_known_there(q.task.job, q.parameter(), t * std::sqrt(q.of_noise.covariance(q.unknown, q.unknown))))
+    return std::nullopt;
   Profile profile = q.profile();
   const auto ends = profile.about_turning_point(t * t);
   if (!ends) return std::nullopt;

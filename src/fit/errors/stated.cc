@@ -22,7 +22,7 @@ std::vector<int> uncertain(const Task& task) {
   std::vector<int> found = known_to_some_frames(task);
   std::erase_if(found, [&](int index) {
     const Parameter& stated = task.job.parameters[index];
-    return is_exact(stated) || stated.name.find("].row[") != std::string::npos;
+    return is_exact(stated) || is_of_row(stated);
   });
   return found;
 }
@@ -248,11 +248,10 @@ FitJob with_nuisances(const FitJob& job, const std::vector<int>& numbers) {
   for (const int index : numbers) {
     Parameter& parameter = wider.parameters[index];
     const double sd = parameter.known_to.of(parameter.value);
-    constexpr double kFarthest = 12;  // standard deviations: a wrong model would run off with them
     parameter.free = parameter.nuisance = true;
     parameter.prior_sd = sd;
-    parameter.lower = parameter.value - kFarthest * sd;
-    parameter.upper = parameter.value + kFarthest * sd;
+    parameter.lower = parameter.value - kFarthestStated * sd;
+    parameter.upper = parameter.value + kFarthestStated * sd;
     if (std::isfinite(parameter.physical_lower)) parameter.lower = std::max(parameter.lower, parameter.physical_lower);
     if (std::isfinite(parameter.physical_upper)) parameter.upper = std::min(parameter.upper, parameter.physical_upper);
   }

@@ -40,6 +40,10 @@ WorthFitting worth_fitting(const Task& task, const Optimum& optimum);
 /// Those that the pictures tell anything of, by the weights of noise alone.
 std::vector<int> told_numbers(const Task& task, const Optimum& optimum);
 
+/// Standard deviations that a stated number may be fitted away from what is stated: a wrong model would run off with
+/// it.
+inline constexpr double kFarthestStated = 12;
+
 /// The job with these free, about what is stated, as nuisances.
 FitJob with_nuisances(const FitJob& job, const std::vector<int>& numbers);
 

@@ -37,7 +37,6 @@ std::string path_in_frame(const std::string& name) {
   const std::size_t frame = name.rfind("].");
   return frame == std::string::npos ? name : name.substr(frame + 2);
 }
-bool is_of_row(const Parameter& stated) { return stated.name.find("].row[") != std::string::npos; }
 /// Pictures at several wavelengths have a filter each; rows of a spectrum are read off one scale.
 bool is_of_light(const Parameter& stated) {
   const std::string path = path_in_frame(stated.name);
@@ -143,6 +142,8 @@ void unite(const FitJob& job, const std::vector<ParameterRef*>& places, const st
 }
 
 }  // namespace
+
+bool is_of_row(const Parameter& stated) { return stated.name.find("].row[") != std::string::npos; }
 
 bool has_own_dials(const FitJob& job) {
   const auto numbers = numbers_in<const FitJob, const ParameterRef>(job);

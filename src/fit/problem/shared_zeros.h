@@ -10,6 +10,9 @@ inline constexpr const char* kByZero = "its.zero + as.stated";
 /// And of what is known to a share of it.
 inline constexpr const char* kByScale = "its.scale * as.stated";
 
+/// Whether a row of a table states the number for itself ("signal[1].row[3].sample.temperature_k").
+bool is_of_row(const Parameter& stated);
+
 /// Pictures at several angles, or rows at several temperatures, are read off one dial, whose zero is known no better
 /// than one of its readings: where frames state numbers of their own that are known within a standard deviation
 /// (Parameter::known_to.sd), what all of them are off by is a number of its own, stated as 0. Frames of their own
