@@ -124,11 +124,42 @@ std::unique_ptr<Refit> without_foreign(const Task& task, const Optimum& optimum,
   return best;
 }
 
-/// All that pictures are known to depart by, fitted at once; nothing where that is not to be believed.
-std::unique_ptr<Refit> with_all_departures(const Task& task, const Optimum& optimum, const Minima& minima) {
+/// Whether a number that is fitted along for what it is known to lies where it would hardly be.
+bool is_far_from_stated(const Task& task, const Optimum& optimum) {
+  constexpr double kHardly = 3;  // standard deviations, one of several
+  for (std::size_t j = 0; j < task.unknowns.searched.size(); ++j) {
+    const Parameter& parameter = task.searched(j);
+    if (parameter.nuisance && parameter.prior_sd &&
+        std::abs(optimum.searched[static_cast<Eigen::Index>(j)] - parameter.value) > kHardly * *parameter.prior_sd)
+      return true;
+  }
+  return false;
+}
+
+/// Of one picture of a plate: whether it is not described with what is fitted along, or only with that far from where
+/// it is stated. The right minimum may then be none that a search with everything as stated has seen.
+bool asks_everywhere(const Task& task, const Optimum& optimum) {
+  return !optimum.stopped && task.frames() == 1 && traits_of(task.picture(0).scene).directions &&
+         (optimum.misfit.beyond_noise || is_far_from_stated(task, optimum));
+}
+
+/// The best of minima everywhere; `optimum` where the fit was interrupted.
+Optimum best_everywhere(const Task& task, const Minima& minima, Optimum optimum) {
+  task.say("not described with what is stated fitted along: looking everywhere");
+  Optimum other = settle(task, best_with_nuisances(task, task, optimum, minima, From::everywhere));
+  return other.stopped ? std::move(optimum) : std::move(other);
+}
+
+/// All that pictures are known to depart by, fitted at once; nothing where that is not to be believed. `everywhere`:
+/// where that asks for it.
+std::unique_ptr<Refit> with_all_departures(const Task& task, const Optimum& optimum, const Minima& minima,
+                                           bool everywhere = false) {
   task.say("something is left over: what pictures depart by is fitted as well");
   auto wider = std::make_unique<Refit>(with_catalogue(task, optimum));
   wider->optimum = settle(wider->task, best_with_nuisances(wider->task, task, optimum, minima));
+  if (everywhere && asks_everywhere(wider->task, wider->optimum))
+    wider->optimum =
+        best_everywhere(wider->task, widened(wider->task, task, optimum.theta, minima), std::move(wider->optimum));
   if (wider->optimum.stopped ||
       !believes_catalogue(missed_of_all(task, optimum), missed_of_all(wider->task, wider->optimum)))
     return nullptr;
@@ -164,6 +195,8 @@ std::unique_ptr<Refit> explained(const Task& task, Optimum& optimum, const Minim
 /// object is left out and the rest asked again. `minima` are of this task.
 Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimum, bool beaten) {
   if (beaten || optimum.stopped) return concluded(task, minima, std::move(optimum), beaten);
+  if (asks_everywhere(task, optimum) && !asks_catalogue(task, optimum))
+    optimum = best_everywhere(task, minima, std::move(optimum));
   if (task.frames() > 1 || !asks_catalogue(task, optimum)) {
     std::unique_ptr<Refit> less = without_specks(task, optimum, minima);
     if (task.frames() > 1)
@@ -175,6 +208,10 @@ Outcome with_what_is_left(const Task& task, const Minima& minima, Optimum optimu
     return concluded(less->task, places, std::move(less->optimum), false);
   }
   std::unique_ptr<Refit> last = with_all_departures(task, optimum, minima), less;
+  if (asks_everywhere(task, optimum) && (!last || asks_everywhere(last->task, last->optimum))) {
+    optimum = best_everywhere(task, minima, std::move(optimum));
+    last = asks_catalogue(task, optimum) ? with_all_departures(task, optimum, minima, true) : nullptr;
+  }
   if (!last || leaves_discrepancy(last->task, last->optimum)) {
     less = without_foreign(task, optimum, minima);
     if (less && asks_catalogue(less->task, less->optimum))
@@ -226,7 +263,7 @@ std::unique_ptr<Refit> beside_close_rivals(const Task& task, const Minima& minim
       optimum.stopped || numbers.empty())
     return nullptr;
   auto wider = std::make_unique<Refit>(with_nuisances(task.job, numbers));
-  wider->optimum = best_with_nuisances(wider->task, task, optimum, minima, true);
+  wider->optimum = best_with_nuisances(wider->task, task, optimum, minima, From::all_found);
   if (wider->optimum.stopped || wider->optimum.rivals.empty()) return nullptr;
   wider->optimum = settle(wider->task, std::move(wider->optimum));
   return has_close_rival(wider->task, wider->optimum) ? std::move(wider) : nullptr;

@@ -25,6 +25,7 @@ struct Traits {
   std::optional<Round> round = {};
   bool even = false;   ///< the picture is one number wherever the light is even
   bool quick = false;  ///< and costs microseconds: no field has to be found for it
+  bool directions = false;  ///< the picture is one of directions, not of places: its fringes are those of a cone
   /// Parts of it next to each other tell the same, rows or columns of the picture.
   enum class Strips { none, rows, columns } strips = Strips::none;
   /// Axes turn from place to place: dark lines between linear polarizers hide what quarter-wave plates show.

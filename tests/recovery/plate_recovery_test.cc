@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
+#include <random>
 
 #include "birefit/fit.h"
 #include "independent_camera.h"
@@ -124,6 +127,93 @@ TEST(PlateFit, FourierNumberWithHotSideIsNamedAsDegenerate) {
               hot->value, hot->stderr_, r.correlation.size() ? r.correlation(0, 1) : 0.0, r.verdict.c_str());
   for (const FisherDirection& d : r.directions)
     std::printf("  direction identifiable %d: %s\n", d.identifiable, d.words.c_str());
+}
+
+// Each number that is stated off by what it is known to, light and background that grow across the picture by what they
+// usually do: with any of these as it is stated another fringe order describes the picture best.
+TEST(PlateFit, UnevenLightBesideWhatIsStatedIsFittedToo) {
+  constexpr int kProblems = 8, kPixels = 40, kCells = 2;
+  int answers = 0, plain = 0, held = 0;
+  for (unsigned seed = 1; seed <= kProblems; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    const auto uniform = [&](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    TableBuilder b;
+    // Stated as `value`, known to `sd`; the truth is returned.
+    const auto stated = [&](const std::string& name, double value, double sd, ParameterRef& ref) {
+      ref = b.fixed(name, value);
+      b.table[ref].known_to.sd = sd;
+      return value + sd * normal(random);
+    };
+    Scene scene;
+    Plate plate;
+    IndependentPlate truth;
+    const double thickness = std::round(uniform(150, 300)), tilt = uniform(-65, -55), azimuth = uniform(0, 180);
+    truth.thickness_um = stated("thickness_um", thickness, 0.005 * thickness, plate.thickness_um);
+    const double up = stated("tilt_deg", tilt, 0.5, plate.director.tilt_deg) * M_PI / 180,
+                 round = stated("azimuth_deg", azimuth, 1, plate.director.azimuth_deg) * M_PI / 180;
+    truth.axis = {std::cos(up) * std::cos(round), std::cos(up) * std::sin(round), std::sin(up)};
+    truth.wavelength_um = 1e-3 * stated("wavelength_nm", 600, 1.8, scene.microscope.wavelength_nm);
+    truth.polarizer_deg = stated("polarizer_deg", 0, 1, scene.microscope.polarizer_deg);
+    truth.analyzer_deg = stated("analyzer_deg", 90, 1, scene.microscope.analyzer_deg);
+    const double middle = 0.5 * (kPixels - 1), column = stated("center_x", middle, 1, scene.view.center_x_px),
+                 row = stated("center_y", middle, 1, scene.view.center_y_px);
+    truth.fourier_number = uniform(0.06, 0.2);
+    truth.hot_k = 350;
+    truth.prepare(64);
+    HeatStep heat;
+    heat.fourier_number = b.fitted("fourier_number", truth.fourier_number * uniform(0.7, 1.3), 0.01, 0.4);
+    heat.cold_k = b.fixed("cold_k", truth.cold_k);
+    heat.hot_k = b.fixed("hot_k", truth.hot_k);
+    plate.heat = heat;
+    plate.half_angle_deg = b.fixed("half_angle_deg", truth.half_angle_deg);
+    scene.sample = plate;
+    scene.material = E44Steinberg2020{b.fixed("temperature_k", 298)};
+    scene.surround_index = b.fixed("surround", 1.0);
+    scene.view.width = scene.view.height = kPixels;
+    scene.view.rotation_deg = b.fixed("rotation", 0);
+
+    std::array<double, 6> slope{};
+    for (std::size_t i = 0; i < slope.size(); ++i) slope[i] = (i < 3 ? 0.02 : 0.01) * normal(random);
+    const double gauss[3] = {0.5 - 0.5 * std::sqrt(0.6), 0.5, 0.5 + 0.5 * std::sqrt(0.6)},
+                 weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18}, edge = std::tan(truth.half_angle_deg * M_PI / 180);
+    std::vector<double> counts;
+    for (int y = 0; y < kPixels; ++y)
+      for (int x = 0; x < kPixels; ++x) {
+        double light = 0;
+        for (int j = 0; j < 3 * kCells; ++j)
+          for (int i = 0; i < 3 * kCells; ++i) {
+            const double dx = (i / 3 + gauss[i % 3]) / kCells - 0.5, dy = (j / 3 + gauss[j % 3]) / kCells - 0.5;
+            light += weight[i % 3] * weight[j % 3] / (kCells * kCells) *
+                     truth.intensity(edge * (x + dx - column) * 2 / kPixels, edge * (row - y - dy) * 2 / kPixels);
+          }
+        const double u = 2 * (x - middle) / kPixels, v = 2 * (middle - y) / kPixels;
+        counts.push_back(kOffset +
+                         kGain * (light * (1 + slope[0] * u + slope[1] * v + slope[2] * (u * u + v * v)) +
+                                  slope[3] * u + slope[4] * v + slope[5] * (u * u + v * v)) +
+                         5 * normal(random));
+      }
+    FitJob job;
+    const ParameterRef gain = b.linear("gain", 900), offset = b.linear("offset", 0);
+    job.measurements.push_back(micrograph_of("plate", scene, counts, gain, offset, {5, 0}));
+    job.parameters = b.table;
+    job.options.threads = 1;
+    const FitResult r = fit(job);
+    const ParameterEstimate& p = *find_estimate(r, "fourier_number");
+    std::printf("  %u: %.4f for %.4f, %.4f to %.4f, %.1f s, chi-square %.2f: %.60s\n", seed, p.value,
+                truth.fourier_number, p.interval95_low, p.interval95_high, r.seconds, r.reduced_chi_square,
+                r.verdict.c_str());
+    if (!r.has_answer()) continue;
+    const bool holds = p.interval95_low <= truth.fourier_number && truth.fourier_number <= p.interval95_high;
+    ++answers, held += holds, plain += r.misfit.empty();
+    // Twice as far is once in 10,000.
+    const double half = truth.fourier_number > p.value ? p.interval95_high - p.value : p.value - p.interval95_low;
+    EXPECT_LT(std::abs(p.value - truth.fourier_number), 2 * half) << "seed " << seed << ": " << r.verdict;
+  }
+  EXPECT_GE(held, answers - 1);
+  EXPECT_GE(plain, kProblems - 1);
 }
 
 // The picture of a screen that a camera looked at from the side, by lines of sight in space and plane waves in the

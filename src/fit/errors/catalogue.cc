@@ -95,7 +95,8 @@ bool asks_catalogue(const Task& task, Optimum& optimum) {
   if (optimum.stopped || !task.picture(0).effects.empty()) return false;
   if (task.frames() > 1 && !are_alike(task)) return false;
   const Traits traits = traits_of(task.picture(0).scene);
-  if (!traits.round) return task.frames() > 1 && optimum.misfit.beyond_noise;
+  if (!traits.round && task.frames() > 1) return optimum.misfit.beyond_noise;
+  if (!traits.round && !traits.directions) return false;
   if (!(missed_of_all(task, optimum) < kHopeless)) return false;
   if (task.frames() > 1 && !traits.sphere_diameter_um) return false;  // a calibration's loads
   optimum.explained = !leaves_discrepancy(task, optimum);

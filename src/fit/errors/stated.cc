@@ -10,6 +10,7 @@
 #include "fit/errors/profile.h"
 #include "fit/errors/statistics.h"
 #include "fit/problem/shared_zeros.h"
+#include "fit/search/everywhere.h"
 
 namespace birefit::estimation {
 namespace {
@@ -274,7 +275,7 @@ Minima widened(const Task& wider, const Task& narrow, const Theta& theta, Minima
 }
 
 Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima,
-                            bool beyond_reach) {
+                            From from) {
   Minima places;
   places.frames = optimum.frames;
   for (int g = 0; g < wider.frames(); ++g)
@@ -299,16 +300,18 @@ Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum
       starts.back()[static_cast<Eigen::Index>(j)] += by * *wider.searched(j).prior_sd;
     }
   }
-  const std::size_t most = beyond_reach ? 64 : 12;
+  const std::size_t most = from == From::in_reach ? 12 : 64;
   for (const Eigen::VectorXd& rival : optimum.rivals)
     if (starts.size() < most) starts.push_back(widened(wider, narrow, optimum.theta, rival));
   const std::vector<Candidate>& found = minima.scan.candidates;
   for (std::size_t i = 1; i < found.size() && starts.size() < most; ++i)
-    if (beyond_reach || in_reach(found[i].objective, found.front().objective))
+    if (from != From::in_reach || in_reach(found[i].objective, found.front().objective))
       starts.push_back(widened(wider, narrow, optimum.theta, found[i].searched));
   const std::unique_ptr<LeastSquares> problem = problem_of(wider, few, misfit_expected(wider, few, optimum.theta));
   constexpr int kSteps = 8;
-  places.scan = polish(*problem, wider.job, std::move(starts), kSteps, {}, beyond_reach);
+  places.scan = from == From::everywhere
+                    ? minima_everywhere(*problem, wider, optimum.theta, std::move(starts))
+                    : polish(*problem, wider.job, std::move(starts), kSteps, {}, from == From::all_found);
   places.evaluations += problem->evaluations();
   places.stopped = places.scan.interrupted;
   return best_minimum(wider, places, false);

@@ -53,12 +53,13 @@ Minima widened(const Task& wider, const Task& narrow, const Theta& theta, Minima
 
 /// From the optimum without them, for a few steps: errors are what changes.
 Optimum with_nuisances_from(const Task& wider, const Task& narrow, Optimum optimum);
-/// From all the places that a search without them has found (`minima`, of the narrow task), whose best need not be the
-/// best with them; the focus from one and two standard deviations to either side as well. Pixels that the wider job
-/// masks are left out.
-/// `beyond_reach`: of all places, also those that without them could not be the best.
+/// Where to look for the best minimum with them: at the places that a search without them has found and that could be
+/// the best there, at all of these, or at places spread over what is asked for as well, one a turn of the pictures.
+enum class From { in_reach, all_found, everywhere };
+/// From places of the narrow task (`minima`), whose best need not be the best with them; the focus from one and two
+/// standard deviations to either side as well. Pixels that the wider job masks are left out.
 Optimum best_with_nuisances(const Task& wider, const Task& narrow, const Optimum& optimum, const Minima& minima,
-                            bool beyond_reach = false);
+                            From from = From::in_reach);
 
 /// With what is stated without being written: the zeros of dials that frames are read off (fit/problem/shared_zeros.h);
 /// the focus, where an objective is stated that is not exact, and no focus: set by eye within the depth of field,

@@ -485,7 +485,10 @@ Traits layers_traits(const Scene& scene) {
     traits.even = true;
     traits.quick = !std::holds_alternative<FreederickszDirector>(cell->director);
   }
-  if (std::holds_alternative<Plate>(scene.sample)) traits.strips = Traits::Strips::rows;
+  if (std::holds_alternative<Plate>(scene.sample)) {
+    traits.directions = true;
+    traits.strips = Traits::Strips::rows;
+  }
   return traits;
 }
 
