@@ -136,11 +136,13 @@ bool is_far_from_stated(const Task& task, const Optimum& optimum) {
   return false;
 }
 
-/// Of one picture of a plate: whether it is not described with what is fitted along, or only with that far from where
-/// it is stated. The right minimum may then be none that a search with everything as stated has seen.
+/// Of one picture of directions, as a plate's: whether a hundredth of its contrast is missed with what is fitted along,
+/// or only that far from where it is stated describes it. The right minimum may then be none that a search with
+/// everything as stated has seen.
 bool asks_everywhere(const Task& task, const Optimum& optimum) {
+  constexpr double kMissed = 0.01;
   return !optimum.stopped && task.frames() == 1 && traits_of(task.picture(0).scene).directions &&
-         (optimum.misfit.beyond_noise || is_far_from_stated(task, optimum));
+         (is_far_from_stated(task, optimum) || (optimum.misfit.beyond_noise && missed_of_all(task, optimum) > kMissed));
 }
 
 /// The best of minima everywhere; `optimum` where the fit was interrupted.

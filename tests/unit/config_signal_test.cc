@@ -255,6 +255,41 @@ TEST_F(ConfigSignal, AboutHalfAWaveIntervalsHoldBothSides) {
   }
 }
 
+// A film in air by the interference within it (Airy): fringes know n d to parts in a hundred thousand and their
+// contrast n to a per mille. They act together all but wholly, and each is known.
+TEST_F(ConfigSignal, AFilmsIndexAndThicknessAreAnAnswerWhereEachIsKnown) {
+  constexpr double kIndex = 1.52, kThicknessUm = 12;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 0.0003);
+  std::string rows = "wavelength_nm,signal\n";
+  for (double nm = 500; nm <= 700; nm += 4) {
+    const double r = std::pow((kIndex - 1) / (kIndex + 1), 2), finesse = 4 * r / std::pow(1 - r, 2),
+                 half = 2 * M_PI * kIndex * kThicknessUm / (1e-3 * nm);
+    rows += std::to_string(nm) + "," +
+            std::to_string(1 / (1 + finesse * std::pow(std::sin(half), 2)) + normal(random)) + "\n";
+  }
+  write("film.csv", rows);
+  const FitResult result = fit(load(R"(signal:
+  file: film.csv
+  value: signal
+  columns: {microscope.light.wavelength_nm: wavelength_nm}
+micrograph: {gain: {fit: auto}, offset: 0}
+sample:
+  cell: {thickness_um: {value: 11.9, fit: [11.6, 12.4]}, director: {uniform: {azimuth_deg: 0}}}
+  material: {ordinary: {value: 1.5, fit: [1.4, 1.65]}, birefringence: 0}
+  surround: {index: {value: 1, exact: true}}
+microscope: {light: {wavelength_nm: {value: 600, exact: true}}, polarizer_deg: 0, analyzer_deg: 0}
+physics: {ceiling: reflections}
+)",
+                                    ConfigUse::fit)
+                                   .job);
+  EXPECT_TRUE(result.has_answer()) << result.verdict;
+  EXPECT_GT(std::abs(result.correlation(0, 1)), 0.9999);
+  for (const auto& [name, truth] : {std::pair("thickness_um", kThicknessUm), {"ordinary", kIndex}})
+    for (const ParameterEstimate& e : result.parameters)
+      if (e.name.ends_with(name)) EXPECT_LT(std::abs(e.value - truth), 2 * (e.interval95_high - e.value)) << name;
+}
+
 // Two spectra, each of a cell of its own thickness, which one calliper has measured: what it is off by is in the error,
 // though no number is the same in both tables.
 TEST_F(ConfigSignal, ThicknessesOfTablesAreOffByOneScale) {
