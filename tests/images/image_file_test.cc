@@ -147,6 +147,40 @@ TEST_F(ImageFile, RestoresCountsOfPacked12BitTiff) {
   EXPECT_THAT(image.notes, Contains(HasSubstr("12-bit samples")));
 }
 
+// Colours of 14 bits are handed out as 16: each is a count again before they are averaged.
+TEST_F(ImageFile, MeansOfPackedColoursAreMeansOfCounts) {
+  constexpr int kPixels = 512;
+  ImageSpec spec(kPixels, 1, 3, TypeDesc::UINT16);
+  spec.attribute("oiio:BitsPerSample", 14);
+  std::vector<std::uint16_t> expanded;
+  std::vector<double> means;
+  for (int i = 0; i < kPixels; ++i) {
+    const int counts[3] = {31 * i, 29 * i + 7, 16383 - 13 * i};
+    for (const int c : counts) expanded.push_back(static_cast<std::uint16_t>(std::lround(c * 65535.0 / 16383)));
+    means.push_back((counts[0] + counts[1] + counts[2]) / 3.0);
+  }
+  const LoadedImage image = load(write("a.tif", spec, expanded), "mean");
+  for (int i = 0; i < kPixels; ++i) EXPECT_NEAR(image.values(i, 0), means[static_cast<std::size_t>(i)], 1e-9) << i;
+}
+
+// Of a stack of MetaMorph one directory stands for all planes, as many as its UIC2Tag has entries (of six numbers
+// each).
+TEST_F(ImageFile, AStackOfMetaMorphIsNoSinglePicture) {
+  std::vector<Tag> tags = tiff_tags(2, 1, 8, 1);
+  tags.push_back({33629, 5, {}});
+  std::string bytes = tiff_bytes(tags, std::string("\x05\x06", 2));
+  const std::size_t entry = bytes.find("\x5d\x83");  // 33629, count and place behind its type
+  ASSERT_NE(entry, std::string::npos);
+  bytes[entry + 4] = 3;
+  bytes[entry + 8] = static_cast<char>(bytes.size());
+  bytes += std::string(3 * 24, '\0');
+  const fs::path file = write_bytes("a.stk", bytes);
+  EXPECT_THAT(refusal(file), AllOf(HasSubstr("MetaMorph"), HasSubstr("3 planes"), HasSubstr("`page: 0`")));
+  const LoadedImage first = load(file, "", 0);
+  EXPECT_EQ(first.values(1, 0), 6);
+  EXPECT_THAT(first.notes, Contains(HasSubstr("the first is used")));
+}
+
 TEST_F(ImageFile, RestoresCountsOf4BitGreyPng) {
   const LoadedImage image = load(write_bytes("a.png", png_bytes(2, 2, 4, 0, std::string("\0\x1f\0\x0a", 4))));
   EXPECT_EQ(image.values.values(), (std::vector<double>{1, 15, 0, 10}));

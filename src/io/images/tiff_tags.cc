@@ -20,6 +20,7 @@ enum Tag {
   kSamples = 277,
   kSubIfds = 330,
   kCfaPattern = 33422,
+  kUic2 = 33629,
   kDngVersion = 50706
 };
 constexpr std::uint64_t kMostEntries = 4096, kMostChildren = 16, kMostText = 1 << 26;
@@ -135,6 +136,9 @@ std::optional<TiffDirectory> read_directory(TiffFile& file, std::uint64_t offset
         if (*values == 4)
           for (std::uint64_t k = 0; k < 4; ++k)
             if (const std::uint64_t colour = value(k); colour < 3) directory.pattern += "rgb"[colour];
+        break;
+      case kUic2:
+        directory.stack_planes = *values;
         break;
       case kDngVersion:
         directory.dng = true;

@@ -20,6 +20,7 @@ struct TiffDirectory {
   std::string description;              ///< ImageDescription, of the chain's first page alone
   std::string pattern;                  ///< of colour filters in cells of 2 x 2: "rggb", ..
   std::vector<std::uint64_t> children;  ///< offsets of its SubIFDs
+  std::uint64_t stack_planes = 1;       ///< of MetaMorph (UIC2Tag): planes that this one directory stands for
 };
 
 struct TiffTags {

@@ -118,9 +118,11 @@ struct Block {
   int channels = 1;
 };
 
-/// The pixels of a block that belong to the part of the file whose pixels `values` are.
+/// The pixels of a block that belong to the part of the file whose pixels `values` are. `packed`: what samples that
+/// were expanded to fill 8 or 16 bits are multiplied by to be counts again, each rounded by itself; 1: they were not.
 template <class T>
-void add_samples(const Block& block, const std::vector<int>& offsets, const PixelRect& part, Image& values) {
+void add_samples(const Block& block, const std::vector<int>& offsets, double packed, const PixelRect& part,
+                 Image& values) {
   const double weight = 1.0 / static_cast<double>(offsets.size());
   const std::size_t pixel_bytes = sizeof(T) * block.channels;
   for (int y = std::max(block.at.y0, part.y0); y < std::min(block.at.y1, part.y1); ++y) {
@@ -133,7 +135,7 @@ void add_samples(const Block& block, const std::vector<int>& offsets, const Pixe
       for (const int offset : offsets) {
         T sample;
         std::memcpy(&sample, pixel + sizeof(T) * offset, sizeof(T));
-        sum += static_cast<double>(sample);
+        sum += packed == 1 ? static_cast<double>(sample) : std::round(static_cast<double>(sample) * packed);
       }
       out[x] = offsets.size() == 1 ? sum : sum * weight;
     }
@@ -141,7 +143,8 @@ void add_samples(const Block& block, const std::vector<int>& offsets, const Pixe
 }
 
 Image read_samples(const ImageRequest& request, const Signature& signature, OIIO::ImageInput& input, int page,
-                   const OIIO::ImageSpec& spec, const std::vector<int>& channels, const PixelRect& part) {
+                   const OIIO::ImageSpec& spec, const std::vector<int>& channels, double packed,
+                   const PixelRect& part) {
   if (part.width() == 0) return {};
   const int first = *std::min_element(channels.begin(), channels.end());
   const int last = *std::max_element(channels.begin(), channels.end()) + 1;
@@ -184,28 +187,28 @@ Image read_samples(const ImageRequest& request, const Signature& signature, OIIO
     if (values.empty()) values = Image(part.width(), part.height());
     switch (type.basetype) {
       case TypeDesc::UINT8:
-        add_samples<std::uint8_t>(block, offsets, part, values);
+        add_samples<std::uint8_t>(block, offsets, packed, part, values);
         break;
       case TypeDesc::INT8:
-        add_samples<std::int8_t>(block, offsets, part, values);
+        add_samples<std::int8_t>(block, offsets, packed, part, values);
         break;
       case TypeDesc::UINT16:
-        add_samples<std::uint16_t>(block, offsets, part, values);
+        add_samples<std::uint16_t>(block, offsets, packed, part, values);
         break;
       case TypeDesc::INT16:
-        add_samples<std::int16_t>(block, offsets, part, values);
+        add_samples<std::int16_t>(block, offsets, packed, part, values);
         break;
       case TypeDesc::UINT32:
-        add_samples<std::uint32_t>(block, offsets, part, values);
+        add_samples<std::uint32_t>(block, offsets, packed, part, values);
         break;
       case TypeDesc::INT32:
-        add_samples<std::int32_t>(block, offsets, part, values);
+        add_samples<std::int32_t>(block, offsets, packed, part, values);
         break;
       case TypeDesc::FLOAT:
-        add_samples<float>(block, offsets, part, values);
+        add_samples<float>(block, offsets, packed, part, values);
         break;
       case TypeDesc::DOUBLE:
-        add_samples<double>(block, offsets, part, values);
+        add_samples<double>(block, offsets, packed, part, values);
         break;
       default:
         refuse_image(request, fmt::format("has samples of type {}", type.c_str()),
@@ -213,12 +216,6 @@ Image read_samples(const ImageRequest& request, const Signature& signature, OIIO
     }
   }
   return values;
-}
-
-/// Undoes the expansion of packed 2- to 14-bit samples to the full range of 8 or 16 bits: counts are counts.
-void restore_packed_counts(int bits, double container_top, Image& values, bool averaged) {
-  const double scale = (std::exp2(bits) - 1) / container_top;
-  for (double& value : values.values()) value = averaged ? value * scale : std::round(value * scale);
 }
 
 /// White-is-zero turned round: larger is brighter. Unsigned counts by their top code, signed ones by their bits; floats
@@ -266,6 +263,19 @@ Stored how_stored(const Signature& signature, const OIIO::ImageSpec& spec) {
   return stored;
 }
 
+bool is_small_integer(const OIIO::ImageSpec& spec) {
+  return spec.format == TypeDesc::UINT8 || spec.format == TypeDesc::UINT16;
+}
+
+/// Packed samples of 2 to 14 bits are handed out expanded to the full range of 8 or 16: what makes them counts again; 1
+/// for all others.
+double packed_scale(const Signature& signature, const OIIO::ImageSpec& spec, const Stored& stored) {
+  const int bits = static_cast<int>(spec.format.size()) * 8;
+  const bool packed =
+      is_small_integer(spec) && stored.bits < bits && !stored.palette && (stored.tiff || signature.format == "png");
+  return packed ? (std::exp2(stored.bits) - 1) / (std::exp2(bits) - 1) : 1;
+}
+
 /// From the header, before anything of the image's size is allocated.
 void check_header(const ImageRequest& request, const Signature& signature, const OIIO::ImageSpec& spec,
                   const Stored& stored) {
@@ -298,7 +308,8 @@ int page_asked(const ImageRequest& request, OIIO::ImageInput& input, bool severa
     refuse_image(request,
                  fmt::format("has {}{} pages and none is chosen ({})", pages == kCountedPages ? "at least " : "", pages,
                              list_pages(input, pages, request.path)),
-                 "add `page: 0` for the first; micrographs: {files: ..} takes each as an image");
+                 request.mask ? "save the one that is the mask as a file of its own"
+                              : "add `page: 0` for the first; micrographs: {files: ..} takes each as an image");
   }
   if (request.page) {
     page = *request.page;
@@ -317,13 +328,11 @@ int page_asked(const ImageRequest& request, OIIO::ImageInput& input, bool severa
 
 /// Counts as the camera had them, and what is to be said of their codes.
 void settle_codes(const ImageRequest& request, const Signature& signature, const OIIO::ImageSpec& spec,
-                  const Stored& stored, bool several_channels, LoadedImage& loaded) {
-  const bool small_integer = spec.format == TypeDesc::UINT8 || spec.format == TypeDesc::UINT16;
-  if (small_integer) {
+                  const Stored& stored, bool packed, LoadedImage& loaded) {
+  if (is_small_integer(spec)) {
     loaded.bits = static_cast<int>(spec.format.size()) * 8;
     loaded.top_code = loaded.bits == 8 ? 255 : 65535;
-    if (stored.bits < loaded.bits && !stored.palette && (stored.tiff || signature.format == "png")) {
-      restore_packed_counts(stored.bits, loaded.top_code, loaded.values, several_channels);
+    if (packed) {
       loaded.top_code = std::exp2(stored.bits) - 1;
       if (!request.mask)
         loaded.notes.push_back(fmt::format("{}-bit samples: counts from 0 to {:.0f}", stored.bits, loaded.top_code));
@@ -403,8 +412,9 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
   const PixelRect part = part_asked(request, spec.width, spec.height);
   loaded.width = spec.width, loaded.height = spec.height;
   loaded.x0 = part.x0, loaded.y0 = part.y0;
-  loaded.values = read_samples(request, signature, *input, page, spec, channels, part);
-  settle_codes(request, signature, spec, stored, channels.size() > 1, loaded);
+  const double packed = packed_scale(signature, spec, stored);
+  loaded.values = read_samples(request, signature, *input, page, spec, channels, packed, part);
+  settle_codes(request, signature, spec, stored, packed != 1, loaded);
   if (const int orientation = spec.get_int_attribute("Orientation", 1); orientation > 1 && orientation <= 8)
     loaded.notes.push_back(fmt::format("orientation tag {} ignored: rows and columns are as stored", orientation));
   if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width ||
@@ -416,6 +426,15 @@ LoadedImage load_checked(const ImageRequest& request, const Signature& signature
       refuse_image(request, found, "save the image to be fitted on its own, or add `page: 0` for the first");
     loaded.notes.push_back("it " + found + ": the first is used");
   }
+  if (signature.format == "tiff" && !several)
+    if (const TiffTags tags = read_tiff_tags(request.path, 1);
+        tags.pages.size() == 1 && tags.pages[0].stack_planes > 1) {
+      const std::string found =
+          fmt::format("is a stack of MetaMorph (STK): {} planes under one directory", tags.pages[0].stack_planes);
+      if (!request.page)
+        refuse_image(request, found, "save its planes as pages of a TIFF, or add `page: 0` for the first");
+      loaded.notes.push_back("it " + found + ": the first is used");
+    }
   // Of tifffile, where only the first of many planes has a directory.
   if (!several && !request.page && description.starts_with("{\"shape\"") &&
       description.find("\"truncated\": true") != std::string::npos)
