@@ -6,10 +6,12 @@
 #include "birefit/expression.h"
 #include "birefit/fit.h"
 #include "config_fixture.h"
+#include "io/report/explain.h"
 
 namespace birefit {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class ConfigTies : public testing::ConfigFolder {
@@ -44,6 +46,18 @@ TEST_F(ConfigTies, BeginAsTheExpressionSays) {
   theta[static_cast<std::size_t>(config.job.parameters.find("microscope.polarizer_deg").index)] = 30;
   config.job.parameters.follow(theta);
   EXPECT_EQ(theta[static_cast<std::size_t>(analyzer.index)], 120);
+}
+
+TEST_F(ConfigTies, AreExplainedWithWhatIsReported) {
+  const Config config = load(cell("analyzer_deg: 110", "analyzer_deg: \"microscope.polarizer_deg + 90 * deg\"") +
+                             "report: {retardance_nm: \"sample.cell.thickness_um * sample.material.birefringence\"}\n");
+  const Explanation explanation = explain(config, "");
+  EXPECT_THAT(explanation_text(config, explanation),
+              AllOf(HasSubstr("Tied       microscope.analyzer_deg"), HasSubstr("Reported   retardance_nm")));
+  const std::string json = explanation_json(config, explanation);
+  const std::string follows = json.substr(json.find("\"follows\""));
+  EXPECT_THAT(follows,
+              AllOf(HasSubstr("\"tied\": true, \"start\": 110"), HasSubstr("\"tied\": false, \"start\": 600")));
 }
 
 TEST_F(ConfigTies, OfUnitsAloneAreNumbers) {

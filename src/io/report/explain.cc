@@ -84,20 +84,34 @@ std::string fitted_text(const Config& config) {
 }
 
 /// What is tied and what is to be reported, with their values at the start.
-std::string following_text(const FitJob& job) {
-  const Theta theta = job.parameters.values();
-  std::string text, what = "Tied       ";
-  const auto say = [&](const std::string& name, const Tie& tie, double value, const std::string& unit) {
-    text += fmt::format("{}{} = {} = {:g}{}{}\n", what, name, printable(tie.law->text()), value,
-                        unit.empty() ? "" : " ", unit);
-    what = "           ";
-  };
-  for (const int index : job.parameters.tied())
-    if (const std::string& name = job.parameters[index].name; name.find("].row[") == std::string::npos)
-      say(name, *job.parameters.tie_of(index), theta[static_cast<std::size_t>(index)], job.parameters[index].unit);
-  what = "Reported   ";
+struct Following {
+  std::string name, expression, unit;
+  double value = 0;
+  bool tied = false;
+};
+std::vector<Following> following(const FitJob& job) {
+  const ParameterTable& table = job.parameters;
+  const Theta theta = table.values();
+  std::vector<Following> list;
+  for (const int index : table.tied())
+    if (const std::string& name = table[index].name; name.find("].row[") == std::string::npos)
+      list.push_back(
+          {name, table.tie_of(index)->law->text(), table[index].unit, theta[static_cast<std::size_t>(index)], true});
   for (const Derived& derived : job.derived)
-    say(derived.name, derived.tie, job.parameters.value_of(derived.tie, theta), derived.unit);
+    list.push_back({derived.name, derived.tie.law->text(), derived.unit, table.value_of(derived.tie, theta), false});
+  return list;
+}
+
+std::string following_text(const FitJob& job) {
+  std::string text;
+  const Following* before = nullptr;
+  const std::vector<Following> list = following(job);
+  for (const Following& one : list) {
+    const char* what = before && before->tied == one.tied ? "           " : one.tied ? "Tied       " : "Reported   ";
+    text += fmt::format("{}{} = {} = {:g}{}{}\n", what, one.name, printable(one.expression), one.value,
+                        one.unit.empty() ? "" : " ", one.unit);
+    before = &one;
+  }
   return text;
 }
 
@@ -140,7 +154,11 @@ Explanation explain(const Config& config, const std::string& next) {
 std::string explanation_json(const Config& config, const Explanation& e) {
   const ParameterTable& table = config.job.parameters;
   const Theta theta = table.values();
-  std::string free, next;
+  std::string free, next, follows;
+  for (const Following& one : following(config.job))
+    follows += fmt::format("{}\n    {{\"name\": {}, \"expression\": {}, \"unit\": {}, \"tied\": {}, \"start\": {}}}",
+                           follows.empty() ? "" : ",", quoted(one.name), quoted(one.expression), quoted(one.unit),
+                           one.tied, json_number(one.value));
   for (const Shot& shot : e.next)
     next += fmt::format("{}\n    {{\"shot\": {}, \"stderr\": {}}}", next.empty() ? "" : ",", quoted(shot.words),
                         json_number(shot.stderr_));
@@ -160,10 +178,10 @@ std::string explanation_json(const Config& config, const Explanation& e) {
       "  \"cost_seconds\": {},\n  \"fit_seconds\": {},\n  \"memory_bytes\": {:.0f},\n  \"warnings\": {},\n  "
       "\"identifiable\": {},\n  "
       "\"next\": [{}],\n  \"parameters\": "
-      "[{}]\n}}\n",
+      "[{}],\n  \"follows\": [{}]\n}}\n",
       quoted(e.plan.method), quoted(e.plan.physics), quoted(e.plan.reasons), e.plan.numerical_error, e.plan.model_error,
       e.seconds, json_number(e.fit_seconds), e.memory, quoted(e.warnings),
-      e.expected ? (e.expected->identifiable ? "true" : "false") : "null", next, free);
+      e.expected ? (e.expected->identifiable ? "true" : "false") : "null", next, free, follows);
 }
 
 std::string explanation_text(const Config& config, const Explanation& e) {
