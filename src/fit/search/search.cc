@@ -179,6 +179,24 @@ bool is_hopeless(const Task& task, LeastSquares& sample, const ScanResult& scan)
   return not_described || *constant - best.objective < by_chance * reduced;
 }
 
+/// Whether the plans of both make the same pictures, at the best place and at some spread over all that is looked at:
+/// a second search by the other would find what the first has.
+bool look_the_same(LeastSquares& one, LeastSquares& other, const std::vector<PicturePhase>& phases,
+                   const Eigen::VectorXd& best) {
+  constexpr int kPlaces = 24;
+  constexpr double kShare = 0.01;
+  for (int i = -1; i < kPlaces; ++i) {
+    Eigen::VectorXd x = best;
+    const std::vector<double> share = spread_in_box(std::max(i, 0), phases.size());
+    for (std::size_t j = 0; i >= 0 && j < phases.size(); ++j)
+      if (phases[j].total() > 0) x[static_cast<Eigen::Index>(j)] = phases[j].value_at(share[j] * phases[j].total());
+    one.evaluate(x, false);
+    other.evaluate(x, false);
+    if (!(std::abs(one.objective() - other.objective()) < kShare * one.objective())) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Minima search(const Task& task, const Start& start, double hopeless_above) {
@@ -218,6 +236,8 @@ Minima search(const Task& task, const Start& start, double hopeless_above) {
       break;
     const Theta end = at_bounds(task, minima.theta, upper);
     auto other = std::make_unique<Looks>(task, minima.frames, end);
+    if (look_the_same(looks->at_a_glance(), other->at_a_glance(), phases, minima.scan.candidates.front().searched))
+      continue;
     ScanResult scanned = scan(other->at_a_glance(), other->closely(), task, from, phases, hopeless);
     minima.evaluations += other->evaluations();
     if (scanned.interrupted || !(scanned.candidates.front().objective < lowest())) continue;
