@@ -12,6 +12,24 @@
 
 namespace birefit {
 
+namespace {
+
+/// Of a size within the bounds; where these are made from the picture (`fit: auto`), from all that there is to see
+/// taken for one, of any smaller size as well.
+std::vector<DiscGuess> droplets_of(const Image& values, const Mask& seen, const Parameter& diameter, double pixel_um) {
+  const DiameterPx wanted = diameter_px(diameter, pixel_um);
+  std::vector<DiscGuess> discs = find_discs(values, seen, wanted);
+  constexpr double kStep = 0.7, kSmallest = 0.1, kLeast = 0.4, kMost = 1.4;  // a step's sizes hold the next ones
+  for (double share = kStep; diameter.automatic && discs.empty() && share > kSmallest; share *= kStep) {
+    const double start = share * wanted.start;
+    discs = find_discs(values, seen, {start, kLeast * start, kMost * start});
+    if (!discs.empty() && 2 * discs.front().radius_px > kMost * start) discs.clear();
+  }
+  return discs;
+}
+
+}  // namespace
+
 std::vector<EachDroplet> droplets_in_view(const Config& config) {
   const FitJob& job = config.job;
   const Picture* picture = job.measurements.size() == 1 ? std::get_if<Picture>(&job.measurements.front()) : nullptr;
@@ -32,7 +50,7 @@ std::vector<EachDroplet> droplets_in_view(const Config& config) {
   for (int y = grid.y0; y < seen.height(); y += grid.spacing)
     for (int x = grid.x0; x < seen.width(); x += grid.spacing) seen(x, y) = std::isfinite(picture->values(x, y));
   std::vector<EachDroplet> found;
-  for (const DiscGuess& disc : find_discs(picture->values, seen, diameter_px(diameter, pixel))) {
+  for (const DiscGuess& disc : droplets_of(picture->values, seen, diameter, pixel)) {
     EachDroplet each;
     each.x_px = view.center_x_px.stated(disc.center_x_px), each.y_px = view.center_y_px.stated(disc.center_y_px);
     each.diameter_um = 2 * disc.radius_px * pixel;

@@ -40,7 +40,7 @@ Outcome judge(const Task& task, Optimum& optimum, const Minima& minima, bool bea
   Rivals rivals = weigh_rivals(task, optimum);
   LeftOut left_out;
   measure_propagation(task, optimum, left_out);
-  Covariances covariances = covariances_of(optimum, left_out.propagation);
+  Covariances covariances = covariances_of(task, optimum, left_out.propagation);
   const Eigen::VectorXd sd = covariances.with_misfit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   foretell_curved_rays(task, optimum, sd, left_out);
   foretell_waves(task, optimum, sd, left_out);

@@ -78,6 +78,10 @@ awk -F, '
     $(column["sample.material.birefringence_low95"]) <= 0.22 && 0.22 <= $(column["sample.material.birefringence_high95"]) && $NF ~ /^answer/ { ++right }
   END { exit right != 3 }' each/droplets.csv || { fail 'each: not three right droplets'; cat each/droplets.csv; }
 [ -f each/droplets/3/report.html ] || fail 'each: no report of the third'
+# Of a size that the config leaves to the picture, which taken for one shows a disc around all three.
+mkdir -p auto && cp "$cases"/several_droplets/* auto && sed -i 's/diameter_um: {[^}]*}/diameter_um: {fit: auto}/' auto/config.yaml
+"$birefit" fit auto/config.yaml --each --out each_auto > each.txt 2> each.err || { fail 'each, of any size'; cat each.txt each.err; }
+[ "$(grep -c ',answer' each_auto/droplets.csv)" -eq 3 ] || { fail 'each, of any size: not three'; cat each_auto/droplets.csv; }
 # Neither stands beside the other's results.
 "$birefit" fit "$cases/host_off/config.yaml" --out each > one.txt 2> one.err
 [ $? -eq 2 ] && grep -q 'holds droplets.csv' one.err || fail 'a fit into the folder of --each'

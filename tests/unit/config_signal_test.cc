@@ -200,13 +200,13 @@ physics: {ceiling: e_only}
 report: {retardance_um: "thickness_um * birefringence"}
 )";
 /// What kLinear's analyser sees of this plate, all off by `off` times what each is known to.
-std::string seen_by_analyser(double retardance_nm, double noise, double off, std::mt19937_64& random) {
+std::string seen_by_analyser(double retardance_nm, double noise, double off, std::mt19937_64& random, int step = 15) {
   std::normal_distribution<double> normal;
   const double wavelength = 546.1 * (1 + 0.003 * off * normal(random)), polarizer = off * normal(random),
                zero = off * normal(random), azimuth = 45 + off * normal(random);
   const Eigen::Matrix2cd parts = plate(360 * retardance_nm / wavelength, azimuth);
   std::string rows = "analyser,signal\n";
-  for (int dial = 0; dial < 180; dial += 15)
+  for (int dial = 0; dial < 180; dial += step)
     rows += std::to_string(dial) + "," +
             std::to_string(1000 * std::norm(along(dial + zero).dot(parts * along(polarizer))) +
                            1000 * noise * normal(random)) +
@@ -225,6 +225,48 @@ TEST_F(ConfigSignal, WhatFollowsFromOneNumberHasItsInterval) {
   ASSERT_EQ(result.derived.size(), 1u);
   EXPECT_NEAR(result.derived[0].interval95_low, 0.1 * thickness.interval95_low, 1e-12);
   EXPECT_NEAR(result.derived[0].interval95_high, 0.1 * thickness.interval95_high, 1e-12);
+}
+
+// With the birefringence stated, which the thickness makes up for, light still knows the retardance alone: by the same
+// likelihood.
+TEST_F(ConfigSignal, WhatFollowsFromFittedAndStatedHasTheLikelihoodOfWhatIsSeen) {
+  std::mt19937_64 random(1);
+  write("turned.csv", seen_by_analyser(281, 0.003, 0, random));
+  const auto retardance = [&](const std::string& text) {
+    const FitResult result = fit(load(text, ConfigUse::fit).job);
+    EXPECT_TRUE(result.parameters[0].profiled) << result.verdict;
+    return result.derived.at(0);
+  };
+  const DerivedEstimate alone = retardance(kLinear),
+                        stated = retardance(replaced(kLinear, "{value: 0.1, exact: true}", "0.1"));
+  // The likelihood's two halves differ, and how much wider either is than the other is told to a tenth.
+  const auto low = [](const DerivedEstimate& d) { return d.value - d.interval95_low; };
+  const auto high = [](const DerivedEstimate& d) { return d.interval95_high - d.value; };
+  EXPECT_GT(std::abs(std::log(low(alone) / high(alone))), 0.2);
+  EXPECT_NEAR(low(stated) / low(alone), 1, 0.15);
+  EXPECT_NEAR(high(stated) / high(alone), 1, 0.15);
+}
+
+// Noise that was read off rows is known by as many rows: what they leave over counts where it is more.
+TEST_F(ConfigSignal, NoiseReadOffRowsIsNoBetterKnownThanByThem) {
+  int more = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    std::mt19937_64 random(seed);
+    write("turned.csv", seen_by_analyser(200, 0.003, 0, random, 3));
+    const FitResult read = fit(load(kLinear, ConfigUse::fit).job);
+    if (read.frame_scatter) continue;
+    const std::string noise = std::to_string(read.micrographs[0].noise.read_counts);
+    const FitResult stated =
+        fit(load(replaced(kLinear, "value: signal,", "value: signal, noise: " + noise + ","), ConfigUse::fit).job);
+    // Errors by what is stated are the same in both.
+    const auto of_noise = [](const FitResult& r) { return r.covariance(0, 0) - r.stated_covariance(0, 0); };
+    // (A lamp's jitter, where rows show one, holds it already.)
+    const bool scaled = read.covariance_kind.starts_with("scaled by reduced chi-square");
+    const double scale = scaled ? read.reduced_chi_square : std::min(1.05, std::max(1.0, read.reduced_chi_square));
+    EXPECT_NEAR(of_noise(read) / of_noise(stated), scale, 0.05) << seed << ": " << read.covariance_kind;
+    more += scaled;
+  }
+  EXPECT_GE(more, 3);
 }
 
 // About half a wave a picture knows a retardance by its square alone, and does not know the side: an interval that

@@ -58,6 +58,28 @@ TEST(Fit, IntervalOfABentLikelihoodIsWhereItFallsNotPlusMinus) {
   EXPECT_FALSE(estimate(fit(straight.job), "sample.crystal.bias_v").profiled);
 }
 
+// Where a picture knows a ratio alone, what is stated of the one makes the other's interval: the tails of its prior are
+// heavy, which is no plateau of the likelihood.
+TEST(Fit, TailsOfWhatIsStatedAreNoPlateau) {
+  constexpr double kVolts = 1000, kKnownTo = 0.01;
+  OneVoltage one(0.75);  // two thirds of the half-wave voltage
+  one.bar.free(one.bar.half_wave, kHalfWave, 1100, 1900);
+  Parameter& volts = one.job.parameters[one.bar.bias];
+  volts.nuisance = true;
+  volts.value = kVolts, volts.prior_sd = kKnownTo * kVolts;
+  volts.lower = kVolts * (1 - 12 * kKnownTo), volts.upper = kVolts * (1 + 12 * kKnownTo);
+  picture(one.job, 0).noise->read_counts *= 0.01;
+  for (double& v : picture(one.job, 0).values.values()) v = 0.75 + 0.01 * (v - 0.75);
+  const FitResult result = fit(one.job);
+  const ParameterEstimate& half_wave = estimate(result, "sample.crystal.half_wave_voltage_v");
+  EXPECT_NEAR(half_wave.value, kHalfWave, 0.1);
+  // 2.2 deviations of a prior with four degrees of freedom cost as much as 1.96 of a normal one.
+  for (const double end : {half_wave.interval95_low, half_wave.interval95_high}) {
+    EXPECT_GT(std::abs(end / kHalfWave - 1), 1.9 * kKnownTo);
+    EXPECT_LT(std::abs(end / kHalfWave - 1), 2.5 * kKnownTo);
+  }
+}
+
 TEST(Fit, ProfileFollowsAValleyThatBends) {
   // The other parameters must follow: with one image of a tilted field, V and tilt are both seen; with `tilt` held the
   // interval of V would be its conditional one. Where nothing bends the profile's crossing is the marginal standard

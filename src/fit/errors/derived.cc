@@ -192,6 +192,24 @@ void take_from_draws(const std::vector<double>& deviations, std::size_t drawn, d
   estimate.interval95_high = estimate.value + std::max(0.0, high);
 }
 
+/// As much wider as the intervals of the numbers that it goes with are, whose likelihood does not fall as a parabola's:
+/// by what the regression on each explains, which is nothing where parts make up for each other.
+void widen_by_profiles(const FitResult& result, const Eigen::VectorXd& by, double t, DerivedEstimate& estimate) {
+  const Eigen::VectorXd together = result.covariance * by;
+  double low = 0, high = 0;
+  for (Eigen::Index j = 0; j < by.size(); ++j) {
+    const ParameterEstimate& p = result.parameters[static_cast<std::size_t>(j)];
+    if (!p.profiled || !std::isfinite(p.interval95_high - p.interval95_low) || !(result.covariance(j, j) > 0)) continue;
+    const double slope = together[j] / result.covariance(j, j), normal = t * p.stderr_;
+    const auto beyond = [&](double half) { return std::max(0.0, half * half - normal * normal) * slope * slope; };
+    const double down = beyond(p.value - p.interval95_low), up = beyond(p.interval95_high - p.value);
+    low += slope > 0 ? down : up;
+    high += slope > 0 ? up : down;
+  }
+  estimate.interval95_low = estimate.value - std::hypot(estimate.value - estimate.interval95_low, std::sqrt(low));
+  estimate.interval95_high = estimate.value + std::hypot(estimate.interval95_high - estimate.value, std::sqrt(high));
+}
+
 /// Of one fitted number alone, all else exact: what that number's own interval says, which need not be symmetric.
 void take_from_profile(const Task& task, const Stated& stated, const std::vector<TieSlope>& slopes,
                        const ValueAt& value_at, const FitResult& result, DerivedEstimate& estimate) {
@@ -242,6 +260,7 @@ void report_derived(const Task& task, const Covariances& covariances, FitResult&
       take_from_draws(draws->deviations(value_at, value, known_alone(task, covariances.stated, tie)), draws->size(),
                       half, error_of_parts(task, result, slopes), estimate);
     }
+    if (!std::isnan(estimate.stderr_)) widen_by_profiles(result, of.by, t, estimate);
     if (!std::isnan(estimate.stderr_)) take_from_profile(task, covariances.stated, slopes, value_at, result, estimate);
     result.derived.push_back(std::move(estimate));
   };

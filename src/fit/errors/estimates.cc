@@ -80,6 +80,18 @@ std::optional<Place> upper_limit(const Question& q) {
   return std::nullopt;
 }
 
+/// Whether at the place of a profile nearest to a value what is stated lies so far away that normal priors would make
+/// most of this rise: what has flattened there is the priors' heavy tails and not the likelihood.
+bool flattened_by_priors(const Question& q, const Profile& profile, double value, double rise) {
+  constexpr double kMost = 0.5;
+  const Eigen::VectorXd& place = profile.place_nearest(value);
+  double by_priors = 0;
+  for (std::size_t j = 0; j < q.task.unknowns.searched.size(); ++j)
+    if (const Parameter& parameter = q.task.searched(j); parameter.nuisance && parameter.prior_sd)
+      by_priors += std::pow((place[static_cast<Eigen::Index>(j)] - parameter.value) / *parameter.prior_sd, 2);
+  return by_priors > kMost * rise;
+}
+
 /// value +- t stderr where the objective is a parabola that far and twice as far; else the places where the profile
 /// likelihood has fallen as much, or half as far as those where it has fallen four times as much: beyond the edge of an
 /// interval there may be a plateau. What models err by is added to either half.
@@ -115,7 +127,9 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
       return to == end || !(length > kLeast * t * sd) ? std::max(length, t * sd) : length;
     };
     const double near = reaching(t), beyond = far ? reaching(kFar * t) : 0;
-    return beyond > kPlateau * near ? beyond : near;
+    if (!(beyond > kPlateau * near)) return near;
+    const double there = estimate.value + (end > estimate.value ? 1 : -1) * kFar * beyond;
+    return flattened_by_priors(q, profile, there, kFar * kFar * t * t) ? near : beyond;
   };
   const double low = half(parameter.lower), high = half(parameter.upper);
   constexpr double kBetter = 1;  // of chi-square

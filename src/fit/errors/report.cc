@@ -44,6 +44,19 @@ Eigen::MatrixXd larger_of(const Eigen::MatrixXd& covariance, const Eigen::Matrix
   return along * axes.eigenvalues().cwiseMax(1).asDiagonal() * along.transpose();
 }
 
+/// Noise that was read off the rows of a table is no better known than by as many rows: what these leave over counts in
+/// place of it where it is more. 1 elsewhere, and where rows are seen to scatter by more than noise, or as a lamp does,
+/// which holds it.
+double beyond_noise_read(const Task& task, const Optimum& optimum) {
+  const auto is_read = [](const Measurement& measurement) {
+    const Readings* readings = std::get_if<Readings>(&measurement);
+    return readings && readings->noise_at_most;
+  };
+  const bool read = std::all_of(task.job.measurements.begin(), task.job.measurements.end(), is_read) &&
+                    !optimum.misfit.frames_scatter && !(optimum.misfit.lamp_share > 0);
+  return read ? std::max(1.0, optimum.reduced_chi_square(task)) : 1;
+}
+
 /// What the standard errors contain, in words.
 std::string covariance_words(const Task& task, const Optimum& optimum, const Covariances& covariances,
                              const LeftOut& left_out) {
@@ -71,6 +84,8 @@ std::string covariance_words(const Task& task, const Optimum& optimum, const Cov
                                largest / found.largest_area, found.largest_area)
                  : fmt::format("scaled by reduced chi-square {:.3g}", largest);
   }
+  if (const double more = beyond_noise_read(task, optimum); words.empty() && more > 1.05)
+    words = fmt::format("scaled by reduced chi-square {:.3g}: the rows' noise is read off the rows", more);
   if (words.empty()) words = "white noise: the noise model explains the residuals";
   if (covariances.along > 1)
     words += fmt::format(", standard errors up to {:.2g} times larger by what the residual does along the parameters",
@@ -151,7 +166,7 @@ void take_in_close_rivals(const Task& task, FitResult& result) {
 
 }  // namespace
 
-Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation) {
+Covariances covariances_of(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& propagation) {
   Covariances covariances;
   covariances.factor = optimum.problem->factor();
   covariances.of_noise = invert_normal_equations(covariances.factor);
@@ -159,6 +174,7 @@ Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propag
   // What the lamp does is not one value: errors are those over all that it may be.
   if (const Eigen::VectorXd& wider = optimum.misfit.lamp_wider; wider.size() > 0)
     covariances.with_misfit.covariance = wider.asDiagonal() * covariances.with_misfit.covariance * wider.asDiagonal();
+  covariances.with_misfit.covariance *= beyond_noise_read(task, optimum);
   covariances.with_misfit.covariance += propagation * propagation.transpose();
   covariances.along = pay_for_misfit(*optimum.problem, covariances.of_noise, covariances.with_misfit);
   return covariances;

@@ -24,7 +24,7 @@ struct Covariances {
   Stated stated;             ///< what it would be to state these otherwise is in `with_misfit`, too
 };
 /// `propagation`: LeftOut::propagation.
-Covariances covariances_of(const Optimum& optimum, const Eigen::MatrixXd& propagation);
+Covariances covariances_of(const Task& task, const Optimum& optimum, const Eigen::MatrixXd& propagation);
 /// Adds what a discrepancy could do. After what better models would change is foretold: that is judged in units of the
 /// errors without it.
 void pay_for_discrepancy(const Task& task, const Optimum& optimum, Covariances& covariances);
