@@ -146,14 +146,18 @@ void judge_pair(FitResult& result, const FitJob& job, const Unknowns& unknowns, 
   weights /= direction.stderr_;
   direction.weights = {{pa.name, weights[0]}, {pb.name, weights[1]}};
   direction.identifiable = false;
+  // No end of an interval lies where the number cannot be.
+  const auto end = [](const ParameterEstimate& p, double at) {
+    return std::isfinite(p.upper - p.lower) ? std::clamp(at, p.lower, p.upper) : at;
+  };
   const double across = t * sa * std::sqrt(std::max(0.0, 1 - correlation * correlation));
   direction.words = fmt::format(
       "{0} up {1:.3g}{2} with {3} {4} {5:.3g}{6} leaves the image nearly unchanged: only this combination of the "
       "two is determined. Along it the 95 % interval is {0} {7:.5g} to {8:.5g}{2} (with {3} {9:.5g} to {10:.5g}{6}); "
       "across it, with {3} known, {0} would be known to +-{11:.2g}{2}",
       name_in(result, a), t * sa, unit_suffix(pa), name_in(result, b), sign > 0 ? "up" : "down", t * sb,
-      unit_suffix(pb), pa.value - t * sa, pa.value + t * sa, pb.value - sign * t * sb, pb.value + sign * t * sb,
-      across);
+      unit_suffix(pb), end(pa, pa.value - t * sa), end(pa, pa.value + t * sa), end(pb, pb.value - sign * t * sb),
+      end(pb, pb.value + sign * t * sb), across);
   result.directions.push_back(std::move(direction));
 }
 

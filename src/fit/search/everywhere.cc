@@ -78,7 +78,8 @@ std::vector<Eigen::VectorXd> orders_beside(const Task& task, const std::vector<P
     if (is_stated(parameter) && !phases[j].of_fringes && std::abs(at - parameter.value) > kFar * *parameter.prior_sd)
       at = parameter.value;
   }
-  std::vector<Eigen::VectorXd> beside{from, place};
+  std::vector<Eigen::VectorXd> beside{place};
+  if (from != place) beside.push_back(from);
   for (const std::size_t j : axes) {
     const double here = phases[j].at(from[static_cast<Eigen::Index>(j)]);
     for (const double there : {here - kTurn, here + kTurn}) {
