@@ -485,10 +485,8 @@ Traits layers_traits(const Scene& scene) {
     traits.even = true;
     traits.quick = !std::holds_alternative<FreederickszDirector>(cell->director);
   }
-  if (std::holds_alternative<Plate>(scene.sample)) {
-    traits.directions = true;
-    traits.strips = Traits::Strips::rows;
-  }
+  traits.directions = has_cone(scene);
+  if (std::holds_alternative<Plate>(scene.sample)) traits.strips = Traits::Strips::rows;
   return traits;
 }
 
