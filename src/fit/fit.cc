@@ -235,7 +235,7 @@ bool has_close_rival(const Task& wider, const Optimum& optimum) {
   constexpr double kApart = 5;  // standard errors, as of rivals
   LeastSquares& problem = *optimum.problem;
   problem.evaluate(optimum.searched, true);
-  const double best = deviance(wider, optimum.frames, problem);
+  const double best = deviance(wider, problem);
   const Eigen::MatrixXd root = projected_information(problem);
   const Eigen::VectorXd sd = (root.transpose() * root)
                                  .ldlt()
@@ -250,7 +250,7 @@ bool has_close_rival(const Task& wider, const Optimum& optimum) {
     for (Eigen::Index k = 0; k < rival.size(); ++k)
       elsewhere = elsewhere || (!wider.searched(static_cast<std::size_t>(k)).nuisance &&
                                 std::abs(rival[k] - optimum.searched[k]) > kApart * sd[k]);
-    return elsewhere && deviance(wider, optimum.frames, problem) < best + kClose;
+    return elsewhere && deviance(wider, problem) < best + kClose;
   });
   problem.evaluate(optimum.searched, true);
   return close;

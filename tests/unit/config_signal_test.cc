@@ -260,10 +260,11 @@ TEST_F(ConfigSignal, NoiseReadOffRowsIsNoBetterKnownThanByThem) {
         fit(load(replaced(kLinear, "value: signal,", "value: signal, noise: " + noise + ","), ConfigUse::fit).job);
     // Errors by what is stated are the same in both.
     const auto of_noise = [](const FitResult& r) { return r.covariance(0, 0) - r.stated_covariance(0, 0); };
-    // (A lamp's jitter, where rows show one, holds it already.)
+    // What is stated may be exceeded by a lamp's jitter as well, up to a tenth here; what is read holds it already.
     const bool scaled = read.covariance_kind.starts_with("scaled by reduced chi-square");
-    const double scale = scaled ? read.reduced_chi_square : std::min(1.05, std::max(1.0, read.reduced_chi_square));
-    EXPECT_NEAR(of_noise(read) / of_noise(stated), scale, 0.05) << seed << ": " << read.covariance_kind;
+    const double scale = scaled ? read.reduced_chi_square : 1, ratio = of_noise(read) / of_noise(stated);
+    EXPECT_LT(ratio, scale + 0.05) << seed << ": " << read.covariance_kind;
+    EXPECT_GT(ratio, 0.9 * scale) << seed << ": " << read.covariance_kind;
     more += scaled;
   }
   EXPECT_GE(more, 3);

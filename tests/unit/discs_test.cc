@@ -62,6 +62,32 @@ TEST(Discs, OneIsNotSeveralWhateverItsRings) {
   EXPECT_TRUE(found(picture(160, {}), {112, 90, 140}).empty());
 }
 
+// Two lobes of one droplet lie further apart than its rings do where a brighter one beside it sets what is seen.
+TEST(Discs, LobesOfOneAreNotTwoBesideABrighterOne) {
+  constexpr double kRadius = 23, kPi = 3.14159265358979;
+  for (const double azimuth_deg : {0.0, 30.0, 75.0}) {
+    Image image = picture(130, {{30, 92, 20, 1.5}});
+    const double cosine = std::cos(azimuth_deg * kPi / 180), sine = std::sin(azimuth_deg * kPi / 180);
+    for (int row = 0; row < image.height(); ++row)
+      for (int column = 0; column < image.width(); ++column) {
+        const double dx = column - 84.0, dy = row - 40.0, along = dx * cosine + dy * sine,
+                     across = dy * cosine - dx * sine;
+        if (std::hypot(dx, dy) < kRadius && std::abs(along) > 0.24 * kRadius && std::abs(across) < 0.7 * kRadius)
+          image(column, row) += 1300;
+      }
+    const std::vector<DiscGuess> discs = found(image, {42, 25, 63});
+    ASSERT_EQ(discs.size(), 2u) << azimuth_deg;
+    EXPECT_NEAR(discs[0].center_x_px, 84, 2) << azimuth_deg;
+    EXPECT_NEAR(discs[0].center_y_px, 40, 2) << azimuth_deg;
+    EXPECT_NEAR(discs[0].radius_px, kRadius, 0.15 * kRadius) << azimuth_deg;
+  }
+}
+
+// What stands closer than its diameter is two all the same, where both are as large as what is looked for.
+TEST(Discs, TwoThatTouchAreNotJoined) {
+  EXPECT_EQ(found(picture(160, {{45, 80, 30, 2.0}, {113, 80, 30, 2.0}}), {60, 40, 90}).size(), 2u);
+}
+
 using DiscsInConfigs = birefit::testing::ConfigFolder;
 TEST_F(DiscsInConfigs, TheOneWithinTheBoundsIsMeantAndTheOthersAreLeftOut) {
   save("a.tif", picture(224, kThree));

@@ -17,7 +17,7 @@ std::vector<Candidate> distinct_minima(const Task& task, Optimum& optimum, Candi
   std::vector<Candidate> others;
   for (Eigen::VectorXd x : optimum.rivals) {
     solve(task, optimum, x, "", 30);
-    Candidate rival{x, deviance(task, optimum.frames, *optimum.problem), projected_information(*optimum.problem)};
+    Candidate rival{x, deviance(task, *optimum.problem), projected_information(*optimum.problem)};
     if (optimum.stopped) break;
     if (one_valley(main, rival)) {
       if (rival.objective < main.objective) std::swap(main, rival);
@@ -38,7 +38,7 @@ Rivals weigh_rivals(const Task& task, Optimum& optimum) {
   Rivals rivals;
   LeastSquares& problem = *optimum.problem;
   if (!optimum.stopped && !optimum.rivals.empty()) {
-    Candidate main{optimum.searched, deviance(task, optimum.frames, problem), projected_information(problem)};
+    Candidate main{optimum.searched, deviance(task, problem), projected_information(problem)};
     const bool rippled = has_ripples(task, problem.theta());
     std::vector<Candidate> others = distinct_minima(task, optimum, main);
     // Of a dip and the valley it lies in, the valley, whose interval holds both.

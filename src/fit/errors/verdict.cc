@@ -126,6 +126,8 @@ void judge_pair(FitResult& result, const FitJob& job, const Unknowns& unknowns, 
   const double of_data_a = std::sqrt(inverse.covariance(a, a)), of_data_b = std::sqrt(inverse.covariance(b, b)),
                correlation = inverse.covariance(a, b) / (of_data_a * of_data_b);
   if (!(std::abs(correlation) > kTogether)) return;
+  // Of the camera alone: nobody asks for either, and what slides along with them has valleys of its own.
+  if (pa.linear && pb.linear) return;
   const auto is_nuisance = [&](int j) { return job.parameters[unknowns.table_index(j)].nuisance; };
   if (is_nuisance(a) || is_nuisance(b)) return;                              // what it is known to ends the valley
   if (in_joint_prior(job, pa.name) && in_joint_prior(job, pb.name)) return;  // the prior's own correlation

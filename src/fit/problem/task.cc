@@ -35,7 +35,7 @@ void add_sights(const Readings& readings, std::vector<Sight>& sights) {
     const auto picture =
         as_picture(readings, readings.rows[i], readings.values.segment(static_cast<Eigen::Index>(i), 1));
     if (i < readings.lines.size()) picture->name += ":" + std::to_string(readings.lines[i]);
-    sights.push_back({picture, readings.observable, readings.name});
+    sights.push_back({picture, readings.observable, readings.name, readings.noise_at_most});
   }
 }
 

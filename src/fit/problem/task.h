@@ -38,6 +38,8 @@ struct Sight {
   std::shared_ptr<const Picture> picture;  ///< the job's, or its own
   Observable observable;
   std::string table;  ///< name of the table that it is a row of; of pictures and rings their own
+  /// Its noise was read off neighbouring rows: it holds a lamp's jitter, and is no better known than by so many rows.
+  bool noise_of_rows = false;
 };
 
 /// The sights of a job's measurements, in their order. The job has to outlive them.

@@ -109,7 +109,7 @@ bool ranks_lower(const Minimum& a, const Minimum& b) { return a.rank < b.rank; }
 Minimum minimum_from(const Task& task, Optimum& optimum, Eigen::VectorXd x, const std::string& label,
                      int max_iterations) {
   const SolveSummary summary = solve(task, optimum, x, label, max_iterations);
-  const Candidate at{x, deviance(task, optimum.frames, *optimum.problem), projected_information(*optimum.problem)};
+  const Candidate at{x, deviance(task, *optimum.problem), projected_information(*optimum.problem)};
   return {at, rank(task, optimum.problem->theta(), at), summary.converged, summary.report};
 }
 
@@ -154,7 +154,7 @@ bool look_among_ripples(const Task& task, Optimum& optimum, std::vector<Minimum>
         const Eigen::VectorXd x = moved(side * off * sd);
         if (!allowed(x)) break;
         optimum.problem->evaluate(x, false);
-        const double objective = deviance(task, optimum.frames, *optimum.problem);
+        const double objective = deviance(task, *optimum.problem);
         if (objective < std::min(least, from.at.objective + 0.5 * off * off)) least = objective, start = x;
       }
       if (start) look_from(*start);

@@ -66,7 +66,7 @@ bool has_ripples(const Task& task, const Theta& theta);
 /// -2 ln of the likelihood where `problem` was evaluated last, but for a constant. Of several frames, each with its
 /// mean: these may scatter as a lamp does, or by more, at the price of their smaller likelihood, whatever the problem's
 /// weights are, which have been settled elsewhere.
-double deviance(const Task& task, const Frames& frames, const LeastSquares& problem);
+double deviance(const Task& task, const LeastSquares& problem);
 /// -2 ln of a minimum's evidence.
 double score(const Task& task, const Candidate& minimum);
 /// What the best minimum has least of. Only of a sphere's ripples, which are alike but for their width, is that the

@@ -97,13 +97,12 @@ double sum_of_squares(const FrameSums& frames, const std::vector<double>& ratio,
 
 /// What the lamp's jitter is over each frame's noise, per unit of its brightness; 0 where a row's noise is not known,
 /// so that its scatter holds the jitter already.
-std::vector<double> lamp_over_noise(const Task& task, const Frames& setup, const FrameSums& frames) {
-  const bool rows = are_rows(setup);
+std::vector<double> lamp_over_noise(const Task& task, const FrameSums& frames) {
   std::vector<double> ratio;
   for (int g = 0; g < task.frames(); ++g) {
     const auto& frame = frames[static_cast<std::size_t>(g)];
     const bool known = task.observable(g).quantity == Quantity::intensity &&
-                       !(rows && setup[static_cast<std::size_t>(g)].noise.estimated);
+                       !task.sights[static_cast<std::size_t>(g)].noise_of_rows;
     ratio.push_back(known ? std::abs(frame.mean_light) / frame.mean_noise_sd : 0);
   }
   return ratio;
@@ -217,15 +216,15 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
   found.frames_scatter = false;
   found.lamp_wider.resize(0);
   if (!own_scatter) return misfit;
-  const std::vector<double> ratio = lamp_over_noise(task, optimum.frames, frames);
+  const std::vector<double> ratio = lamp_over_noise(task, frames);
   const LampJitter lamp = lamp_of(task, optimum, frames, ratio);
   found.lamp_jitter = lamp.share;
   // What scatters by more than a lamp does is not the lamp, nor need it be where frames are not described either.
   // The noise that was read off a table's rows is no better known than what they scatter by.
   constexpr double kSignificant = 0.999, kOfNoiseRead = 0.95;
   const bool rows = are_rows(optimum.frames),
-             read = rows && std::any_of(optimum.frames.begin(), optimum.frames.end(),
-                                        [](const Frame&frame) { return frame.noise.estimated; });
+             read = std::any_of(task.sights.begin(), task.sights.end(),
+                                [](const Sight& sight) { return sight.noise_of_rows; });
   const double significant = chi_square_quantile(read ? kOfNoiseRead : kSignificant, dof);
   constexpr double kTellsWhich = 2;  // degrees of freedom: a single one tells of any scatter only that it is there
   const bool of_model = found.beyond_noise && dof > kTellsWhich - 0.1 &&
@@ -255,7 +254,7 @@ std::vector<Misfit> assess_misfit(const Task& task, const Optimum& optimum, Misf
 
 }  // namespace
 
-double deviance(const Task& task, const Frames& setup, const LeastSquares& problem) {
+double deviance(const Task& task, const LeastSquares& problem) {
   if (task.frames() < 2) return problem.objective();
   FrameSums frames;
   double shapes = 0, squares = 0;
@@ -265,7 +264,7 @@ double deviance(const Task& task, const Frames& setup, const LeastSquares& probl
               problem.misfit()[static_cast<std::size_t>(g)].shape_variance;
     squares += frames.back().mean_whitened * frames.back().mean_whitened;
   }
-  const double of_means = std::min(deviance_by_lamp(frames, lamp_over_noise(task, setup, frames)),
+  const double of_means = std::min(deviance_by_lamp(frames, lamp_over_noise(task, frames)),
                                    deviance_by_scatter(task, problem.theta(), frames));
   return shapes + std::min(squares, of_means) + problem.prior_chi_square();
 }

@@ -111,6 +111,48 @@ DiscGuess disc_in(const Image& values, const Mask& mask, const Activity& activit
   return disc;
 }
 
+struct Object {
+  Patch patch;
+  int number;  ///< its cells' label
+  DiscGuess disc;
+};
+
+/// Lobes of one object lie further apart than cells reach where another one is brighter, so that what is dark between
+/// them is wider: two objects are one where a disc around both holds their centres, is of a size within the bounds and
+/// nearer to what is looked for than either of them.
+void join_lobes(const Image& values, const Mask& mask, const Activity& activity, const DiameterPx& diameter,
+                Grid<int>& label, std::vector<Object>& objects) {
+  const auto away = [&](const DiscGuess& disc) {
+    return std::abs(std::log(std::max(2 * disc.radius_px, 1.0) / diameter.start));
+  };
+  const auto join = [&](Object& a, const Object& b) {
+    Object both{a.patch, a.number, {}};
+    both.patch.left = std::min(a.patch.left, b.patch.left), both.patch.right = std::max(a.patch.right, b.patch.right);
+    both.patch.top = std::min(a.patch.top, b.patch.top), both.patch.bottom = std::max(a.patch.bottom, b.patch.bottom);
+    both.patch.cells += b.patch.cells;
+    if (both.patch.extent() * activity.side > diameter.most) return false;
+    Grid<int> joined = label;
+    for (int& number : joined.values())
+      if (number == b.number) number = a.number;
+    both.disc = disc_in(values, mask, activity, joined, both.patch, both.number);
+    const auto holds = [&](const DiscGuess& disc) {
+      return std::hypot(disc.center_x_px - both.disc.center_x_px, disc.center_y_px - both.disc.center_y_px) <
+             both.disc.radius_px;
+    };
+    if (!diameter.holds(both.disc) || !holds(a.disc) || !holds(b.disc) ||
+        away(both.disc) >= std::min(away(a.disc), away(b.disc)))
+      return false;
+    label = std::move(joined), a = both;
+    return true;
+  };
+  for (std::size_t i = 0; i < objects.size(); ++i)
+    for (std::size_t j = i + 1; j < objects.size();)
+      if (join(objects[i], objects[j]))
+        objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j)), j = i + 1;
+      else
+        ++j;
+}
+
 }  // namespace
 
 DiameterPx diameter_px(const Parameter& diameter_um, double pixel_um) {
@@ -146,13 +188,15 @@ std::vector<DiscGuess> find_discs(const Image& values, const Mask& mask, const D
            patch.cells > kFilled * width * height;
   };
   if (std::count_if(patches.begin(), patches.end(), is_object) < 2) return {};
+  std::vector<Object> objects;
+  for (std::size_t i = 0; i < patches.size(); ++i)
+    if (const int number = static_cast<int>(i); is_object(patches[i]))
+      objects.push_back({patches[i], number, disc_in(values, mask, activity, label, patches[i], number)});
+  join_lobes(values, mask, activity, diameter, label, objects);
   constexpr double kLeastContrast = 3;  // as of a single one
   std::vector<DiscGuess> discs;
-  for (std::size_t i = 0; i < patches.size(); ++i)
-    if (is_object(patches[i]))
-      if (const DiscGuess disc = disc_in(values, mask, activity, label, patches[i], static_cast<int>(i));
-          disc.contrast >= kLeastContrast)
-        discs.push_back(disc);
+  for (const Object& object : objects)
+    if (object.disc.contrast >= kLeastContrast) discs.push_back(object.disc);
   std::sort(discs.begin(), discs.end(),
             [](const DiscGuess& a, const DiscGuess& b) { return a.radius_px > b.radius_px; });
   if (discs.size() < 2) return {};
