@@ -20,9 +20,10 @@ struct Question {
   const Inverse& of_noise;
   FitResult& result;
   int unknown;
+  std::vector<Eigen::VectorXd>& known;  ///< places that profiles came by
   const Parameter& parameter() const { return task.job.parameters[task.unknowns.table_index(unknown)]; }
   Profile profile() const {
-    return Profile(*optimum.problem, task.job, task.unknowns, optimum.searched, of_noise.covariance, unknown);
+    return Profile(*optimum.problem, task.job, task.unknowns, optimum.searched, of_noise.covariance, unknown, known);
   }
 };
 
@@ -132,6 +133,7 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
     return flattened_by_priors(q, profile, there, kFar * kFar * t * t) ? near : beyond;
   };
   const double low = half(parameter.lower), high = half(parameter.upper);
+  q.known = profile.places();
   constexpr double kBetter = 1;  // of chi-square
   if (profile.lowest() < -kBetter) q.optimum.better = profile.lowest_place();
   if (std::abs(low / (t * sd) - 1) < 0.5 * kBent && std::abs(high / (t * sd) - 1) < 0.5 * kBent)
@@ -221,26 +223,54 @@ void pay_for(const Place& place, double t, int unknown, FitResult& result) {
   result.covariance += change * change.transpose();
 }
 
-/// The ends of the interval of an unknown that its likelihood on both sides knows, though its slope at the estimate
-/// says next to nothing; it and what others owe to it are in the covariance then.
-std::optional<std::array<double, 2>> settle_turning_point(const Question& q, double t) {
+/// What is known on both sides of an unknown whose slope at the estimate says next to nothing.
+struct Turn {
+  std::optional<std::array<double, 2>> ends;  ///< of its interval, where its likelihood excludes both bounds
+  bool up_to_bound = false;                   ///< it does not: nothing tells where between
+  std::vector<Place> places;                  ///< the ends, or the bounds that are not excluded
+  ProfileTrace trace;
+};
+
+Turn turning_point(const Question& q, double t) {
   if (q.unknown >= static_cast<int>(q.task.unknowns.searched.size()) || q.optimum.stopped || !q.optimum.converged ||
       misses_by_far(q.result))
-    return std::nullopt;
+    return {};
   // (Asked before there is a profile, which evaluates.)
-  if (is_known_there(q.task.job, q.parameter(), t * std::sqrt(q.of_noise.covariance(q.unknown, q.unknown))))
-    return std::nullopt;
+  if (is_known_there(q.task.job, q.parameter(), t * std::sqrt(q.of_noise.covariance(q.unknown, q.unknown)))) return {};
+  Turn turn;
   Profile profile = q.profile();
-  const auto ends = profile.about_turning_point(t * t);
-  if (!ends) return std::nullopt;
+  turn.ends = profile.about_turning_point(t * t);
   constexpr double kBetter = 1;  // of chi-square
-  if (profile.lowest() < -kBetter) q.optimum.better = profile.lowest_place();
-  q.result.covariance.row(q.unknown).setZero();
-  q.result.covariance.col(q.unknown).setZero();
-  for (const double end : *ends) pay_for(place_at(q, profile, end), std::numbers::sqrt2 * t, q.unknown, q.result);
-  q.result.covariance(q.unknown, q.unknown) = std::pow(0.5 * ((*ends)[1] - (*ends)[0]) / t, 2);
-  q.result.profiles.push_back(profile.trace());
-  return ends;
+  if (turn.ends && profile.lowest() < -kBetter) q.optimum.better = profile.lowest_place();
+  if (turn.ends)
+    for (const double end : *turn.ends) turn.places.push_back(place_at(q, profile, end));
+  else
+    for (const double bound : {q.parameter().lower, q.parameter().upper})
+      if (profile.rise(bound, t * t) <= t * t)
+        turn.places.push_back(place_at(q, profile, bound)), turn.up_to_bound = true;
+  turn.trace = profile.trace();
+  return turn;
+}
+
+/// An unknown with both ends, and what others owe to it, are in the covariance then.
+void settle_turning_point(const Turn& turn, double t, int unknown, FitResult& result) {
+  result.covariance.row(unknown).setZero();
+  result.covariance.col(unknown).setZero();
+  for (const Place& place : turn.places) pay_for(place, std::numbers::sqrt2 * t, unknown, result);
+  result.covariance(unknown, unknown) = std::pow(0.5 * ((*turn.ends)[1] - (*turn.ends)[0]) / t, 2);
+  result.profiles.push_back(turn.trace);
+}
+
+/// What others owe to an unknown that may lie anywhere up to a bound: by as much as they follow it there further than
+/// the slopes at the estimate say.
+void pay_up_to_bounds(const Question& q, const Turn& turn, double t) {
+  const double variance = q.of_noise.covariance(q.unknown, q.unknown);
+  for (Place place : turn.places) {
+    const double moved = place.change[q.unknown];
+    if (variance > 0 && std::isfinite(variance))
+      place.change -= q.of_noise.covariance.col(q.unknown) * (moved / variance);
+    pay_for(place, t, q.unknown, q.result);
+  }
 }
 
 /// t standard errors of what the fit itself has found; what is stated has a standard deviation that is no estimate.
@@ -255,10 +285,11 @@ double half_width(const FitResult& result, int unknown, double t) {
 void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noise, FitResult& result) {
   const Eigen::VectorXd gradient = optimum.problem->gradient();
   const double t = student_t_quantile(0.975, result.interval_degrees_of_freedom);
-  const auto question = [&](int j) { return Question{task, optimum, of_noise, result, j}; };
+  std::vector<Eigen::VectorXd> known;
+  const auto question = [&](int j) { return Question{task, optimum, of_noise, result, j, known}; };
   // The curvature at the estimate need not be that of the way to nature's bound: ask there.
   std::vector<std::optional<Place>> limits(static_cast<std::size_t>(task.unknowns.size()));
-  std::vector<std::optional<std::array<double, 2>>> turns(limits.size());
+  std::vector<Turn> turns(limits.size());
   for (int j = 0; j < task.unknowns.size(); ++j) {
     ParameterEstimate estimate = estimate_of(task, optimum, result.covariance, j);
     FitResult unused;
@@ -266,7 +297,16 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
     auto& limit = limits[static_cast<std::size_t>(j)];
     if (may_have_a_limit(question(j), estimate, at_upper)) limit = upper_limit(question(j));
     if (limit) pay_for(*limit, t, j, result);
-    if (!limit && !estimate.at_bound) turns[static_cast<std::size_t>(j)] = settle_turning_point(question(j), t);
+    if (!limit && !estimate.at_bound) turns[static_cast<std::size_t>(j)] = turning_point(question(j), t);
+  }
+  // Beside an unknown that may lie anywhere, profiles of others are of the places where theirs leave it, about which
+  // nothing is known: what its own profile and the slopes say is more.
+  const bool open = std::any_of(turns.begin(), turns.end(), [](const Turn& turn) { return turn.up_to_bound; });
+  for (int j = 0; j < task.unknowns.size(); ++j) {
+    Turn& turn = turns[static_cast<std::size_t>(j)];
+    if (open) turn.ends.reset();
+    if (turn.ends) settle_turning_point(turn, t, j, result);
+    if (turn.up_to_bound) pay_up_to_bounds(question(j), turn, t);
   }
   for (int j = 0; j < task.unknowns.size(); ++j) {
     ParameterEstimate estimate = estimate_of(task, optimum, result.covariance, j);
@@ -280,12 +320,13 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
       estimate.interval95_low = question(j).parameter().lower;
       estimate.interval95_high = limit->value;
     }
-    if (const auto& ends = turns[static_cast<std::size_t>(j)]) {
+    if (const auto& ends = turns[static_cast<std::size_t>(j)].ends) {
       estimate.interval95_low = (*ends)[0], estimate.interval95_high = (*ends)[1];
       estimate.profiled = true;
     }
     // (Of what is fitted along for its error alone no interval is reported.)
-    else if (!estimate.linear && !estimate.at_bound && estimate.limit.empty() && !question(j).parameter().nuisance)
+    else if (!open && !estimate.linear && !estimate.at_bound && estimate.limit.empty() &&
+             !question(j).parameter().nuisance)
       settle_interval(question(j), estimate);
     result.names.push_back(question(j).parameter().name);
     result.parameters.push_back(std::move(estimate));

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace birefit::estimation {
 
@@ -13,8 +15,8 @@ bool is_known_there(const FitJob& job, const Parameter& parameter, double reach)
 }
 
 Profile::Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best,
-                 const Eigen::MatrixXd& covariance, int unknown)
-    : problem_(problem), job_(job), unknowns_(unknowns), best_(best), unknown_(unknown) {
+                 const Eigen::MatrixXd& covariance, int unknown, std::vector<Eigen::VectorXd> known)
+    : problem_(problem), job_(job), unknowns_(unknowns), best_(best), unknown_(unknown), known_(std::move(known)) {
   const Eigen::Index p = best.size();
   const double variance = covariance(unknown, unknown);
   sd_ = std::sqrt(variance);
@@ -25,8 +27,7 @@ Profile::Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unkno
   places_.push_back({best_[unknown_], 0, best_});
 }
 
-Eigen::VectorXd Profile::along(const Eigen::VectorXd& from, double value) const {
-  Eigen::VectorXd x = from + (value - from[unknown_]) * direction_;
+Eigen::VectorXd Profile::within_bounds(Eigen::VectorXd x, double value) const {
   for (Eigen::Index j = 0; j < x.size(); ++j) {
     const Parameter& parameter = job_.parameters[unknowns_.searched[static_cast<std::size_t>(j)]];
     x[j] = std::clamp(x[j], parameter.lower, parameter.upper);
@@ -35,13 +36,54 @@ Eigen::VectorXd Profile::along(const Eigen::VectorXd& from, double value) const 
   return x;
 }
 
+Eigen::VectorXd Profile::along(const Eigen::VectorXd& from, double value) const {
+  return within_bounds(from + (value - from[unknown_]) * direction_, value);
+}
+
+/// Of three guesses that at which the objective is lowest: the straight way, Hermite's polynomial through the estimate,
+/// with its slope, and the one or two nearest places, and where another unknown's profile came by.
+Eigen::VectorXd Profile::start_at(double value) {
+  constexpr double kApart = 0.2;  // places closer than that, relative to their distance, tell no bend
+  const double from = best_[unknown_], u = value - from;
+  const Eigen::VectorXd straight = along(place_nearest(value), value);
+  const auto bend = [&](const Place& place) -> Eigen::VectorXd {
+    const double there = place.value - from;
+    return (place.searched - best_ - there * direction_) / (there * there);
+  };
+  const auto nearest = [&](const Place* other) {
+    const Place* found = nullptr;
+    for (const Place& place : places_)
+      if (std::abs(place.value - from) > kApart * std::abs(u) && std::isfinite(place.rise) &&
+          (!other || std::abs(place.value - other->value) > kApart * std::abs(u)) &&
+          (!found || std::abs(place.value - value) < std::abs(found->value - value)))
+        found = &place;
+    return found;
+  };
+  std::vector<Eigen::VectorXd> starts{straight};
+  if (const Place* first = nearest(nullptr); first && std::abs(u) > 0) {
+    Eigen::VectorXd bent = bend(*first);
+    if (const Place* second = nearest(first))
+      bent += (bend(*second) - bent) * ((value - first->value) / (second->value - first->value));
+    starts.push_back(within_bounds(best_ + u * direction_ + u * u * bent, value));
+  }
+  const auto near = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
+    return std::abs(a[unknown_] - value) < std::abs(b[unknown_] - value);
+  });
+  if (near != known_.end()) starts.push_back(along(*near, value));
+  if (starts.size() == 1) return straight;
+  std::vector<double> objective;
+  for (const Eigen::VectorXd& start : starts)
+    problem_.evaluate(start, false), objective.push_back(problem_.objective());
+  return starts[static_cast<std::size_t>(std::min_element(objective.begin(), objective.end()) - objective.begin())];
+}
+
 double Profile::rise(double value, double enough) {
-  Eigen::VectorXd x = along(place_nearest(value), value);
+  Eigen::VectorXd x = start_at(value);
   problem_.evaluate(x, false);
   if (problem_.objective() - least_ > enough) {
     SolveOptions options;
     options.max_iterations = 20;
-    options.function_tolerance = std::max(1e-9, 1e-4 / std::max(1.0, least_));  // 1e-4 of a chi-square unit
+    options.function_tolerance = std::max(1e-9, 2e-3 / std::max(1.0, least_));  // 2e-3 of a chi-square unit
     options.held = unknown_;
     options.interrupted = job_.options.interrupted;
     problem_.solve(x, options);
@@ -70,7 +112,16 @@ std::optional<double> Profile::newton_crossing(double end, double allowed) {
     }
     return true;
   };
-  Eigen::VectorXd x = along(best_, limited(from + sign * wanted * sd_));
+  const double first = limited(from + sign * wanted * sd_);
+  Eigen::VectorXd x = start_at(first);
+  double fall_before = std::numeric_limits<double>::infinity();
+  problem_.evaluate(x, false);
+  // A valley so bent that its straight line leaves it by far: a place on the way tells how it bends.
+  constexpr double kLeft = 5, kNear = 0.25, kConverges = 0.5;
+  if (problem_.objective() - least_ > kLeft * allowed) {
+    rise(from + kNear * (first - from));
+    x = start_at(first);
+  }
   for (int i = 0; i < kMostPlaces && within(x); ++i) {
     if (job_.options.interrupted && *job_.options.interrupted) return std::nullopt;
     problem_.evaluate(x, true);
@@ -90,6 +141,13 @@ std::optional<double> Profile::newton_crossing(double end, double allowed) {
     const double slope = rest.dot(free), curvature = free.squaredNorm();
     if (!std::isfinite(rise + slope + curvature) || !(curvature > 0)) return std::nullopt;
     const Eigen::VectorXd step = (wish.array() / length.array()).head(p);
+    if (fall > allowed) {  // first to where the others want to be
+      if (!(fall < kConverges * fall_before)) return std::nullopt;
+      fall_before = fall;
+      x += step;
+      x[unknown_] = value;
+      continue;
+    }
     if (std::abs(fall) < 0.02 * allowed) {
       Eigen::VectorXd there = x + step;
       there[unknown_] = value;
@@ -178,6 +236,13 @@ std::array<double, 2> Profile::straightness(double allowed) {
     ratio[static_cast<std::size_t>(side)] = (problem_.objective() - least_) / (share * share);
   }
   return ratio;
+}
+
+std::vector<Eigen::VectorXd> Profile::places() const {
+  std::vector<Eigen::VectorXd> all = known_;
+  for (const Place& place : places_)
+    if (place.rise > 0) all.push_back(place.searched);
+  return all;
 }
 
 ProfileTrace Profile::trace() const {

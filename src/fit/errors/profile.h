@@ -18,9 +18,10 @@ bool is_known_there(const FitJob& job, const Parameter& parameter, double reach)
 /// it there again.
 class Profile {
  public:
-  /// `covariance` of the searched unknowns at `best`: along it the others start.
+  /// `covariance` of the searched unknowns at `best`: along it the others start, or from places that profiles of other
+  /// unknowns came by, which follow the same valleys.
   Profile(LeastSquares& problem, const FitJob& job, const Unknowns& unknowns, const Eigen::VectorXd& best,
-          const Eigen::MatrixXd& covariance, int unknown);
+          const Eigen::MatrixXd& covariance, int unknown, std::vector<Eigen::VectorXd> known = {});
 
   /// Above the objective at the optimum; not minimised further where that is below `enough` already.
   double rise(double value, double enough = -1);
@@ -41,6 +42,8 @@ class Profile {
   /// both 1 where the objective is a parabola. Clipped at the bounds.
   std::array<double, 2> straightness(double allowed);
 
+  /// All searched unknowns at all places, those of other profiles first.
+  std::vector<Eigen::VectorXd> places() const;
   /// Places that rise() was asked for, in order of value.
   ProfileTrace trace() const;
 
@@ -49,7 +52,10 @@ class Profile {
     double value, rise;
     Eigen::VectorXd searched;
   };
+  Eigen::VectorXd within_bounds(Eigen::VectorXd x, double value) const;
   Eigen::VectorXd along(const Eigen::VectorXd& from, double value) const;
+  /// Where the others are likely to be at `value`: valleys bend, and the places that are known already tell how.
+  Eigen::VectorXd start_at(double value);
   std::optional<double> newton_crossing(double end, double allowed);
   double bisected_crossing(double end, double allowed);
 
@@ -59,6 +65,7 @@ class Profile {
   Eigen::VectorXd best_, direction_;  ///< direction_: change of all per change of the one
   double sd_, least_;
   int unknown_;
+  std::vector<Eigen::VectorXd> known_;
   std::vector<Place> places_;
 };
 

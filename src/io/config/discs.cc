@@ -118,14 +118,20 @@ struct Object {
 };
 
 /// Lobes of one object lie further apart than cells reach where another one is brighter, so that what is dark between
-/// them is wider: two objects are one where a disc around both holds their centres, is of a size within the bounds and
-/// nearer to what is looked for than either of them.
+/// them is wider: two objects are one where the discs around them next to touch, or overlap, and a disc around both
+/// holds their centres, is of a size within the bounds and nearer to what is looked for than either of them.
 void join_lobes(const Image& values, const Mask& mask, const Activity& activity, const DiameterPx& diameter,
                 Grid<int>& label, std::vector<Object>& objects) {
   const auto away = [&](const DiscGuess& disc) {
     return std::abs(std::log(std::max(2 * disc.radius_px, 1.0) / diameter.start));
   };
+  const auto touch = [](const DiscGuess& a, const DiscGuess& b) {
+    constexpr double kTouch = 1.15;
+    return std::hypot(a.center_x_px - b.center_x_px, a.center_y_px - b.center_y_px) <
+           kTouch * (a.radius_px + b.radius_px);
+  };
   const auto join = [&](Object& a, const Object& b) {
+    if (!touch(a.disc, b.disc)) return false;
     Object both{a.patch, a.number, {}};
     both.patch.left = std::min(a.patch.left, b.patch.left), both.patch.right = std::max(a.patch.right, b.patch.right);
     both.patch.top = std::min(a.patch.top, b.patch.top), both.patch.bottom = std::max(a.patch.bottom, b.patch.bottom);
