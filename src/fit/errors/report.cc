@@ -48,9 +48,9 @@ Eigen::MatrixXd larger_of(const Eigen::MatrixXd& covariance, const Eigen::Matrix
 /// place of it where it is more. 1 elsewhere, and where rows are seen to scatter by more than noise, or as a lamp does,
 /// which holds it.
 double beyond_noise_read(const Task& task, const Optimum& optimum) {
-  const bool read = std::all_of(task.sights.begin(), task.sights.end(),
-                                [](const Sight& sight) { return sight.noise_of_rows; }) &&
-                    !optimum.misfit.frames_scatter && !(optimum.misfit.lamp_share > 0);
+  const bool read =
+      std::all_of(task.sights.begin(), task.sights.end(), [](const Sight& sight) { return sight.noise_of_rows; }) &&
+      !optimum.misfit.frames_scatter && !(optimum.misfit.lamp_share > 0);
   return read ? std::max(1.0, optimum.reduced_chi_square(task)) : 1;
 }
 
