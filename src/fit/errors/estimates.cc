@@ -95,8 +95,9 @@ bool flattened_by_priors(const Question& q, const Profile& profile, double value
 
 /// value +- t stderr where the objective is a parabola that far and twice as far; else the places where the profile
 /// likelihood has fallen as much, or half as far as those where it has fallen four times as much: beyond the edge of an
-/// interval there may be a plateau. What models err by is added to either half.
-void settle_interval(const Question& q, ParameterEstimate& estimate) {
+/// interval there may be a plateau. What models err by is added to either half. `beside_untold`: it becomes no
+/// narrower.
+void settle_interval(const Question& q, bool beside_untold, ParameterEstimate& estimate) {
   const auto unknown = static_cast<std::size_t>(q.unknown);
   const double t = student_t_quantile(0.975, q.result.interval_degrees_of_freedom);
   const double sd = std::sqrt(q.of_noise.covariance(q.unknown, q.unknown));
@@ -132,7 +133,8 @@ void settle_interval(const Question& q, ParameterEstimate& estimate) {
     const double there = estimate.value + (end > estimate.value ? 1 : -1) * kFar * beyond;
     return flattened_by_priors(q, profile, there, kFar * kFar * t * t) ? near : beyond;
   };
-  const double low = half(parameter.lower), high = half(parameter.upper);
+  const double least = beside_untold ? t * sd : 0, low = std::max(least, half(parameter.lower)),
+               high = std::max(least, half(parameter.upper));
   q.known = profile.places();
   constexpr double kBetter = 1;  // of chi-square
   if (profile.lowest() < -kBetter) q.optimum.better = profile.lowest_place();
@@ -299,8 +301,8 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
     if (limit) pay_for(*limit, t, j, result);
     if (!limit && !estimate.at_bound) turns[static_cast<std::size_t>(j)] = turning_point(question(j), t);
   }
-  // Beside an unknown that may lie anywhere, profiles of others are of the places where theirs leave it, about which
-  // nothing is known: what its own profile and the slopes say is more.
+  // About a place where one unknown is not told, the solver of another's profile may stay: such a profile may widen
+  // what the slopes say, and never narrow it.
   const bool open = std::any_of(turns.begin(), turns.end(), [](const Turn& turn) { return turn.up_to_bound; });
   for (int j = 0; j < task.unknowns.size(); ++j) {
     Turn& turn = turns[static_cast<std::size_t>(j)];
@@ -325,9 +327,8 @@ void report_parameters(const Task& task, Optimum& optimum, const Inverse& of_noi
       estimate.profiled = true;
     }
     // (Of what is fitted along for its error alone no interval is reported.)
-    else if (!open && !estimate.linear && !estimate.at_bound && estimate.limit.empty() &&
-             !question(j).parameter().nuisance)
-      settle_interval(question(j), estimate);
+    else if (!estimate.linear && !estimate.at_bound && estimate.limit.empty() && !question(j).parameter().nuisance)
+      settle_interval(question(j), open, estimate);
     result.names.push_back(question(j).parameter().name);
     result.parameters.push_back(std::move(estimate));
   }
